@@ -1,0 +1,150 @@
+"""Forward kinematics and the Jacobian of any arm.
+
+Every arm, whatever its convention, is one chain
+
+    T(q) = link[0] Z1(q1) link[1] Z2(q2) ... Zn(qn) link[n],   Z = Rz (revolute) or Tz (prismatic)
+
+(Craig, Introduction to Robotics, eq. 3.6 with the constant factors of neighbouring rows
+merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin import soa
+from armkin.errors import UsageError
+from armkin.soa import Array, Entry, Pose
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+
+def fk(arm: Arm, q: ArrayLike) -> Array:
+    """Pose of the tool for joint values.
+
+    q: (..., n) [rad | mm]. Returns (..., 4, 4) [mm].
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> armkin.fk(arm, np.deg2rad([0, 90, -90]))[:3, 3].round(9).tolist()
+    [258.0, 10.0, 367.0]
+    """
+
+    def tip(q: list[Entry], out: Array) -> None:
+        P = soa.constant(arm.link[0])
+        for i in range(arm.n):
+            P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
+        soa.write(P, out)
+
+    return _batched(arm, q, (4, 4), tip)
+
+
+def frames(arm: Arm, q: ArrayLike) -> Array:
+    """Pose of the base, of every joint's frame and of the tool.
+
+    q: (..., n) [rad | mm]. Returns (..., n + 2, 4, 4) [mm]. Joint frames are those of the
+    robot file's convention: DH frame i, or with screws the moving body's frame that stands
+    on the joint's axis with the base's axes when all joints are zero.
+    """
+
+    def all_frames(q: list[Entry], out: Array) -> None:
+        out[..., 0, :, :] = arm.base
+        P = soa.constant(arm.link[0])
+        for i in range(arm.n):
+            P = _move(arm, P, i, q[i])
+            soa.write(soa.times(P, soa.constant(arm.frame[i])), out[..., i + 1, :, :])
+            P = soa.times(P, soa.constant(arm.link[i + 1]))
+        soa.write(P, out[..., arm.n + 1, :, :])
+
+    return _batched(arm, q, (arm.n + 2, 4, 4), all_frames)
+
+
+def jacobian(arm: Arm, q: ArrayLike) -> Array:
+    """Geometric Jacobian of the tool in the base's axes, linear rows first.
+
+    q: (..., n) [rad | mm]. Returns (..., 6, n) [mm/rad, 1; prismatic: 1, 0]
+    (Siciliano et al., Robotics, eq. 3.30).
+    """
+
+    def columns(q: list[Entry], out: Array) -> None:
+        P = soa.constant(arm.link[0])
+        axes = []
+        for i in range(arm.n):
+            axes.append((P[6:9], P[9:12]))
+            P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
+        for i, (z, origin) in enumerate(axes):
+            lever = soa.combine(1.0, P[9:12], -1.0, origin)
+            linear = z if arm.prismatic[i] else soa.cross(z, lever)
+            angular = [0.0, 0.0, 0.0] if arm.prismatic[i] else z
+            for row, entry in enumerate([*linear, *angular]):
+                out[..., row, i] = entry
+
+    return _batched(arm, q, (6, arm.n), columns)
+
+
+def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+    """Yoshikawa's measure ``sqrt(det(J J^T))``, or ``|det J|`` products of singular values.
+
+    q: (..., n) [rad | mm]; rows: which rows of the Jacobian count, by default the linear
+    ones for arms of up to three joints and all six otherwise. Returns (...). Lengths are in
+    mm, so the value carries a power of mm (Yoshikawa, Manipulability of Robotic Mechanisms,
+    1985, eq. 13).
+    """
+    values = _singular_values(arm, q, rows)
+    product: Array = np.prod(values, axis=-1)
+    return product
+
+
+def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+    """Condition number of the Jacobian, its linear rows divided by the arm's reach.
+
+    q: (..., n) [rad | mm]; rows as in `manipulability`. Returns (...), inf at a singularity.
+    """
+    values = _singular_values(arm, q, rows, scale=arm.reach)
+    with np.errstate(divide="ignore"):
+        ratio: Array = values[..., 0] / values[..., -1]
+    return ratio
+
+
+def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, scale: float = 1.0) -> Array:
+    if rows is None:
+        rows = slice(0, 3) if arm.n <= 3 else slice(0, 6)
+    J = jacobian(arm, q)
+    J[..., :3, :] /= scale
+    return np.asarray(np.linalg.svd(J[..., rows, :], compute_uv=False))
+
+
+def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
+    """The pose after a joint's motion."""
+    return soa.slide(P, value) if arm.prismatic[joint] else soa.rotate(P, *soa.cos_sin(value))
+
+
+def as_joints(arm: Arm, q: ArrayLike) -> Array:
+    """``q`` as a float array with the arm's number of joints on its last axis."""
+    values = np.asarray(q, dtype=np.float64)
+    if values.ndim == 0 or values.shape[-1] != arm.n:
+        got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
+        raise UsageError(
+            f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}): "
+            f"expected {arm.n} values on the last axis, got {got}"
+        )
+    return values
+
+
+def _batched(arm: Arm, q: ArrayLike, shape: tuple[int, ...], kernel: Callable[[list[Entry], Array], None]) -> Array:
+    """Run a kernel over the batch axes of q in chunks that stay in the cache."""
+    values = as_joints(arm, q)
+    out = np.empty(values.shape[:-1] + shape)
+    if values.ndim == 1:
+        kernel([float(v) for v in values], out)
+        return out
+    flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, *shape)
+    for start in range(0, len(flat_q), soa.CHUNK):
+        columns = np.ascontiguousarray(flat_q[start : start + soa.CHUNK].T)
+        kernel(list(columns), flat_out[start : start + soa.CHUNK])
+    return out
