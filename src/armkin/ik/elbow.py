@@ -1,0 +1,87 @@
+"""One joint, then two parallel revolute joints: the arm under most wrists, in closed form.
+
+The tip's distance along the parallel axes is the same for all angles of the two parallel
+joints, which gives the first joint; what remains is a planar two-link arm (Siciliano et
+al., Robotics, 2.12.2 and 2.12.4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armkin import soa
+from armkin.ik.chain import FLIP, Chain, inverse
+from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.soa import Array, Entry
+
+
+class Elbow:
+    """``link[0] Z1 link[1] Z2 link[2] Z3 m``: joints 2 and 3 revolute and parallel.
+
+    `plane_to_tip` is the planar rigid motion after joint 3 to the tip (a point), all in the frame of joint 2.
+    """
+
+    def __init__(self, chain: Chain, tip: Array) -> None:
+        """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
+        L2 = chain.link[2]
+        self.sense3 = 1.0 if L2[2, 2] > 0 else -1.0
+        if self.sense3 < 0:
+            L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
+        self.prismatic1 = bool(chain.prismatic[0])
+        self.from_base = soa.constant(inverse(chain.link[0]))
+        self.shoulder = soa.constant(chain.link[1])  # frame of joint 2 seen from joint 1
+        self.upper = [float(v) for v in L2[:3, 3]]  # upper arm, frame of joint 2
+        self.fore = [float(v) for v in L2[:3, :3] @ tip]  # forearm at q3 = 0, frame of joint 2
+        self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
+
+    def solve(
+        self, p: list[Entry], past: list[Entry], prefer: list[Pair]
+    ) -> tuple[list[Pair], Array]:
+        """Angles of the three joints that bring the tip to p.
+
+        p: position in the base, entries (N,); past: an offset added to the tip in the frame
+        of joint 2 turned to its final direction (what lies past joint 3 and has a known
+        direction), else zeros; prefer: values given to joints that a target leaves free.
+        Returns three pairs on branch axes (shoulder, elbow, 1, N), and doubt.
+        """
+        x, y, z = soa.apply(self.from_base, p)
+        n, o = self.shoulder[6:9], self.shoulder[9:12]
+        along = soa.add(self.upper[2] + self.fore[2], past[2])
+        if self.prismatic1:
+            ahead = soa.sub(soa.dot(n, [x, y, z]), along + soa.dot(n, o))
+            first, doubt1 = Pair(ahead / n[2], None), np.zeros(1, bool)
+            z = z - first.c
+        else:
+            a = soa.combine(n[0], [x], n[1], [y])[0]
+            b = soa.combine(n[0], [y], -n[1], [x])[0]
+            rest = soa.sub(along + soa.dot(n, o), soa.mul(n[2], z))
+            first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+            c1, s1 = first
+            x, y = c1 * x + s1 * y, c1 * y - s1 * x
+        lever = [soa.sub(x, o[0]), soa.sub(y, o[1]), soa.sub(z, o[2])]
+        rx = soa.sub(soa.dot(self.shoulder[0:3], lever), past[0])
+        ry = soa.sub(soa.dot(self.shoulder[3:6], lever), past[1])
+        lx, ly, _ = self.upper
+        mx, my, _ = self.fore
+        # |r|^2 = |l + Rz(q3) m|^2
+        third, doubt3 = linear(
+            2.0 * (lx * mx + ly * my),
+            2.0 * (ly * mx - lx * my),
+            rx * rx + ry * ry - (lx * lx + ly * ly + mx * mx + my * my),
+            1,
+            self.scale**2,
+            prefer[2],
+        )
+        c3, s3 = third
+        ux = lx + soa.sub(soa.mul(c3, mx), soa.mul(s3, my))
+        uy = ly + soa.add(soa.mul(s3, mx), soa.mul(c3, my))
+        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer[1])
+        doubt = any_branch(doubt1) | any_branch(doubt2) | any_branch(doubt3)
+        if self.sense3 < 0:
+            third = Pair(c3, -s3)
+        return [first, second, third], doubt
+
+
+def any_branch(doubt: Array) -> Array:
+    """Whether any branch of a pose is in doubt: (b0, b1, b2, N) -> (N,)."""
+    return np.asarray(doubt.reshape(-1, doubt.shape[-1]).any(axis=0)) if doubt.ndim > 1 else doubt
