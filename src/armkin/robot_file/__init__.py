@@ -1,0 +1,140 @@
+"""Robot files: YAML in, one validated, immutable model out, or an error with its line.
+
+    strict_yaml -> model (pydantic: keys, types, bounds) -> checks (rules between values)
+                -> messages (errors in the file's own words)
+
+This package imports pydantic and yaml, and is itself imported only when a robot file is read.
+"""
+
+import hashlib
+import os
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from armkin import strict_yaml
+from armkin.errors import FileError, RobotFileError
+from armkin.robot_file import messages
+from armkin.robot_file.model import (
+    DH,
+    Board,
+    Drive,
+    Gripper,
+    Homing,
+    Joint,
+    Motor,
+    Pose,
+    RobotFile,
+    Screw,
+)
+
+__all__ = [
+    "DH",
+    "Board",
+    "Drive",
+    "Gripper",
+    "Homing",
+    "Joint",
+    "Motor",
+    "Pose",
+    "RobotFile",
+    "Screw",
+    "json_schema",
+    "parse",
+    "read",
+]
+
+
+def read(path: str | os.PathLike[str]) -> RobotFile:
+    """Read and validate a robot file.
+
+    Raises FileError if it cannot be read, RobotFileError (``file:line: what; what is allowed``) if it
+    is not valid.
+    """
+    name = os.fspath(path)
+    try:
+        with Path(name).open("rb") as file:
+            # One byte more than is allowed: enough to know, also of /dev/zero.
+            raw = file.read(strict_yaml.MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        hint = "; name a file, for example robots/three_dof.yaml" if Path(name).is_dir() else ""
+        raise FileError(f"{name}: cannot read the robot file: {reason}{hint}") from None
+    return parse(raw, name)
+
+
+def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
+    """Validate the text of a robot file; ``name`` is what messages call it."""
+    if isinstance(raw, str):
+        raw = raw.encode()
+    try:
+        document = strict_yaml.loads(raw)
+    except strict_yaml.StrictYamlError as error:
+        raise RobotFileError(_located(name, error.line, error.problem)) from None
+    try:
+        robot = _validated(document.data)
+    except ValidationError as error:
+        problems = sorted(
+            (document.line(path), f"{_where(path, document.data)}{text}")
+            for path, text in messages.told(error.errors(include_url=False))
+        )
+        raise RobotFileError(_message(name, problems)) from None
+    robot._path = name
+    robot._sha256 = hashlib.sha256(raw).hexdigest()
+    return robot
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a robot file, for editors (see ``robots/robot.schema.json``)."""
+    from armkin.robot_file import schema
+
+    return schema.json_schema()
+
+
+def _validated(data: dict[str, Any]) -> RobotFile:
+    if not RobotFile.__pydantic_complete__:
+        # Looking for pydantic's plugins reads the metadata of every installed package, which takes
+        # longer than all the rest of a robot file; nothing here is for them to observe.
+        before = os.environ.get("PYDANTIC_DISABLE_PLUGINS")
+        os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
+        try:
+            RobotFile.model_rebuild()
+        finally:
+            if before is None:
+                del os.environ["PYDANTIC_DISABLE_PLUGINS"]
+            else:
+                os.environ["PYDANTIC_DISABLE_PLUGINS"] = before
+    return RobotFile.model_validate(data)
+
+
+def _located(name: str, line: int, text: str) -> str:
+    return f"{name}:{line}: {text}" if line else f"{name}: {text}"
+
+
+def _message(name: str, problems: list[tuple[int, str]]) -> str:
+    """The first problem in full; of the others, where they are."""
+    first = _located(name, *problems[0])
+    if len(problems) == 1:
+        return first
+    if len(problems) == 2:
+        return f"{first}\n{_located(name, *problems[1])}"
+    lines = sorted({line for line, _ in problems[1:]})
+    places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
+    return f"{first}\n{len(problems) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
+
+
+def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:
+    """The place in words: ``joint q2: dh.alpha: ``."""
+    words: list[str] = []
+    if len(path) > 1 and path[0] in ("joints", "motors") and isinstance(path[1], int):
+        item = data[path[0]][path[1]]
+        name = item.get("name") if isinstance(item, dict) else None
+        what = str(path[0])[:-1]
+        words.append(f"{what} {name}" if isinstance(name, str) and name else f"{what} number {path[1] + 1}")
+        path = path[2:]
+    while path and isinstance(path[-1], int):  # the line is the item's; its number says nothing
+        path = path[:-1]
+    if path:
+        words.append(".".join(str(part) for part in path))
+    return "".join(f"{word}: " for word in words)

@@ -1,0 +1,294 @@
+"""What pydantic's types cannot say: rules that tie several values of a robot file together.
+
+Each rule yields ``(path, message)``; the path leads to the line, the message says what is wrong, what is
+allowed and what to do. All rules run, so that a file's problems are found in one go.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from armkin.robot_file.model import Drive, Joint, Motor, RobotFile
+
+MAX_JOINTS = 12
+
+Path = tuple[str | int, ...]
+Problem = tuple[Path, str]
+Triple = tuple[float, float, float]
+
+# Outputs of the boards: steppers, servos. (Pins: firmware/boards.)
+BOARD_AXES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "uno_cnc_shield": (("X", "Y", "Z", "A"), ("S0",)),
+    "mega_ramps14": (("X", "Y", "Z", "E0", "E1"), ("S0", "S1", "S2", "S3")),
+    "uno_servos": ((), ("S0", "S1", "S2", "S3", "S4", "S5")),
+}
+_STEPPER_KEYS = ("full_steps", "microsteps", "gear", "pulley", "lead")
+_SERVO_KEYS = ("travel", "pulse_us", "zero")
+_PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
+# A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
+_ROUNDING = 1e-3
+
+
+def dot(a: Triple, b: Triple) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Triple, b: Triple) -> Triple:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def problems(robot: RobotFile) -> Iterator[Problem]:
+    """All problems of a file whose keys and types are right."""
+    if "\n" in robot.name or not robot.name.strip():
+        yield ("name",), "must be one line of text"
+    if "pitch_offset" in robot.model_fields_set and robot.task not in (None, *_PITCH_TASKS):
+        yield ("pitch_offset",), f"task {robot.task} has no pitch; it belongs to {' and '.join(_PITCH_TASKS)}"
+    if robot.convention == "screws" and robot.zero_pose is None:
+        yield ("convention",), "screws need zero_pose: {xyz: ..., rpy: ...}, the end frame when all joints are 0"
+    if robot.convention != "screws" and robot.zero_pose is not None:
+        yield ("zero_pose",), f"belongs to convention screws, not to {robot.convention}; use tool for a fixed frame"
+    yield from _repeated("joint", [joint.name for joint in robot.joints], "joints")
+    for i, joint in enumerate(robot.joints):
+        for path, message in _joint(joint, robot.convention):
+            yield ("joints", i, *path), message
+    yield from _motors(robot)
+    yield from _axes(robot)
+
+
+def _repeated(what: str, names: list[str], key: str) -> Iterator[Problem]:
+    seen: set[str] = set()
+    for i, name in enumerate(names):
+        if name in seen:
+            yield (key, i, "name"), f"a {what} named {name} is there already; {what} names are unique"
+        seen.add(name)
+
+
+def _joint(joint: Joint, convention: str) -> Iterator[Problem]:
+    if joint.sign == 0:
+        yield ("sign",), "must be 1 or -1, not 0"
+    if convention == "screws":
+        if joint.dh is not None:
+            yield ("dh",), "convention screws takes no DH row; write screw: {w: ..., v: ...} or change convention"
+        if joint.screw is None:
+            yield (), "has no screw; convention screws needs screw: {w: [0, 0, 1], v: [0, 0, 0]} for each joint"
+        else:
+            yield from _screw(joint)
+    else:
+        if joint.screw is not None:
+            yield ("screw",), f"convention {convention} takes no screw; write dh: {{...}} or change convention"
+        if joint.dh is None:
+            yield (), f"has no dh; convention {convention} needs dh: {{alpha: 90, a: 0, d: 170}} for each joint"
+    yield from _range(joint)
+    if joint.homing is not None:
+        yield from _homing(joint)
+
+
+def _range(joint: Joint) -> Iterator[Problem]:
+    if joint.limits is None:
+        return
+    lower, upper = joint.limits
+    if lower > upper:
+        yield ("limits",), f"lower {lower:g} is above upper {upper:g}; write [{upper:g}, {lower:g}]"
+    elif lower == upper:
+        yield ("limits",), f"leave no room to move: {lower:g} to {upper:g}; a fixed joint belongs in base or tool"
+    elif not lower <= joint.home <= upper:
+        if "home" in joint.model_fields_set:
+            yield ("home",), f"{joint.home:g} is outside the limits {lower:g} to {upper:g}"
+        else:
+            yield ("limits",), f"home is 0 unless given, and outside {lower:g} to {upper:g}; add home:"
+
+
+def _screw(joint: Joint) -> Iterator[Problem]:
+    assert joint.screw is not None
+    w, v, q = joint.screw.w, joint.screw.v, joint.screw.q
+    length = math.hypot(*w)
+    if joint.type == "prismatic":
+        if length != 0:
+            yield ("screw", "w"), "must be [0, 0, 0] for a prismatic joint; its direction is v"
+        if q is not None:
+            yield ("screw", "q"), "a prismatic joint has no axis point; its direction is v"
+        if v is None:
+            yield ("screw",), "has no v; for a prismatic joint v is its direction, for example [0, 0, 1]"
+        else:
+            yield from _unit("v", v)
+        return
+    if length == 0:
+        yield ("screw", "w"), "is zero; give the axis direction, or type: prismatic"
+        return
+    yield from _unit("w", w)
+    if (v is None) == (q is None):
+        has = "neither v nor q" if v is None else "both v and q"
+        yield ("screw",), f"has {has}; give v, or a point q on the axis"
+    elif v is not None:
+        pitch = dot(v, w) / length
+        if abs(pitch) > _ROUNDING * max(1.0, math.hypot(*v)):
+            yield ("screw", "v"), f"v.w is {pitch:g} and must be 0: a revolute joint has no pitch (v = -w x q)"
+
+
+def _unit(key: str, vector: Triple) -> Iterator[Problem]:
+    length = math.hypot(*vector)
+    if length == 0:
+        yield ("screw", key), "is zero; give the direction of motion, of length 1"
+    elif abs(length - 1) > _ROUNDING:
+        better = ", ".join(f"{x / length:.6g}" for x in vector)
+        yield ("screw", key), f"has length {length:g}, must be 1; write [{better}]"
+
+
+def _homing(joint: Joint) -> Iterator[Problem]:
+    assert joint.homing is not None
+    homing = joint.homing
+    if homing.direction == 0:
+        yield ("homing", "direction"), "must be 1 (switch at the upper end) or -1 (at the lower end), not 0"
+    if joint.max_speed is not None and homing.speed > joint.max_speed:
+        yield ("homing", "speed"), f"{homing.speed:g} is above the joint's max_speed {joint.max_speed:g}"
+    if joint.drive is not None and joint.drive.kind == "servo":
+        yield ("homing",), "a servo knows its angle and has no switch; remove homing"
+
+
+def _drive(drive: Drive) -> Iterator[Problem]:
+    """A motor's own values, apart from the joints that it turns."""
+    given = drive.model_fields_set
+    own, other = (_STEPPER_KEYS, _SERVO_KEYS) if drive.kind == "stepper" else (_SERVO_KEYS, _STEPPER_KEYS)
+    for key in (key for key in other if key in given):
+        message = f"a {drive.kind} has no {key}; it takes {', '.join(own)}"
+        yield (key,), message + ("; for a servo write kind: servo" if drive.kind == "stepper" else "")
+    if drive.kind == "stepper":
+        missing = [key for key in ("full_steps", "microsteps") if getattr(drive, key) is None]
+        if missing and not any(key in given for key in _SERVO_KEYS):
+            example = "full_steps: 200, microsteps: 16"
+            yield (), f"a stepper needs {' and '.join(missing)}, for example {example} (an RC servo: kind: servo)"
+        elif not missing and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
+            yield (), f"{drive.pulses_per_turn():g} pulses per turn; 0.001 to 1e9 can be right"
+        return
+    missing = [key for key in ("travel", "pulse_us") if getattr(drive, key) is None]
+    if missing:
+        example = "travel: [0, 180], pulse_us: [500, 2500]"
+        yield (), f"a servo needs {' and '.join(missing)}, for example {example}"
+    for key in ("travel", "pulse_us"):
+        pair = getattr(drive, key)
+        if pair is not None and pair[0] >= pair[1]:
+            hint = "for a servo that turns the other way write invert: true"
+            yield (key,), f"must go up, [{pair[1]:g}, {pair[0]:g}]; {hint}"
+
+
+def _servo_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
+    """A joint value that the servo cannot take: its pulse would be outside pulse_us."""
+    if drive.kind != "servo" or drive.travel is None or drive.travel[0] >= drive.travel[1]:
+        return
+    turn = -1.0 if drive.invert else 1.0
+    at = "home" if joint.limits is None else "limits"
+    for value in joint.limits or (joint.home,):
+        angle = drive.zero + turn * value
+        if not drive.travel[0] - 1e-9 <= angle <= drive.travel[1] + 1e-9:
+            low, high = sorted(turn * (end - drive.zero) for end in drive.travel)
+            yield (at,), f"{value:g} needs servo angle {angle:g}; its travel allows joint values {low:g} to {high:g}"
+            return
+
+
+def _motors(robot: RobotFile) -> Iterator[Problem]:
+    for i, joint in enumerate(robot.joints):
+        drive = joint.drive
+        if drive is None:
+            continue
+        if robot.motors is not None:
+            yield ("joints", i, "drive"), "the file also has motors; put all of them there, or use drives only"
+        for path, message in _drive(drive):
+            yield ("joints", i, "drive", *path), message
+        if joint.type == "prismatic":
+            if drive.kind == "servo":
+                hint = f"use motors: with joints: {{{joint.name}: degrees per mm}}"
+                yield ("joints", i, "drive"), f"a servo turns, and the joint is prismatic; {hint}"
+            elif drive.lead is None:
+                yield ("joints", i, "drive"), "a prismatic joint's stepper needs lead, the mm per turn"
+        elif drive.lead is not None:
+            yield ("joints", i, "drive", "lead"), "is for prismatic joints; use gear or pulley for a revolute one"
+        else:
+            for path, message in _servo_reach(drive, joint):
+                yield ("joints", i, *path), message
+    if robot.motors is not None:
+        yield from _repeated("motor", [motor.name for motor in robot.motors], "motors")
+        for i, motor in enumerate(robot.motors):
+            for path, message in (*_drive(motor), *_weights(motor, robot)):
+                yield ("motors", i, *path), message
+        yield from _determined(robot.motors)
+    if robot.gripper is not None:
+        yield from _gripper(robot)
+
+
+def _weights(motor: Motor, robot: RobotFile) -> Iterator[Problem]:
+    types = {joint.name: joint.type for joint in robot.joints}
+    for name, weight in motor.joints.items():
+        if name not in types:
+            yield ("joints", name), f"there is no joint {name}; the joints are {', '.join(types)}"
+        if weight == 0:
+            yield ("joints", name), f"weight 0 does nothing; leave {name} out"
+    turned = {types[name] for name in motor.joints if name in types}
+    if motor.lead is not None and "revolute" in turned:
+        yield ("lead",), "is for motors of prismatic joints only; give weights in degrees per mm instead"
+    if motor.kind == "stepper" and motor.lead is None and turned == {"prismatic"}:
+        yield (), "a prismatic joint's stepper needs lead, the mm per turn"
+
+
+def _determined(motors: tuple[Motor, ...]) -> Iterator[Problem]:
+    """The joints must follow from the motors: the weights' rank is the number of joints they name."""
+    names = sorted({name for motor in motors for name in motor.joints})
+    rows = [[motor.joints.get(name, 0.0) for name in names] for motor in motors]
+    for column, name in enumerate(names):
+        pivot = max(rows, key=lambda row: abs(row[column]), default=None)
+        if pivot is None or abs(pivot[column]) < 1e-9 * max(1.0, *(abs(x) for x in pivot)):
+            yield ("motors",), f"leave joint {name} undetermined: as many independent motors as joints are needed"
+            return
+        rows = [
+            [x - row[column] / pivot[column] * p for x, p in zip(row, pivot, strict=True)]
+            for row in rows
+            if row is not pivot
+        ]
+
+
+def _gripper(robot: RobotFile) -> Iterator[Problem]:
+    gripper = robot.gripper
+    assert gripper is not None
+    for path, message in _drive(gripper):
+        yield ("gripper", *path), message
+    if gripper.open == gripper.closed:
+        yield ("gripper", "closed"), f"is the same as open, {gripper.open:g}"
+    if gripper.kind == "servo" and gripper.travel is not None:
+        turn = -1.0 if gripper.invert else 1.0
+        for key in ("open", "closed"):
+            angle = gripper.zero + turn * getattr(gripper, key)
+            if not gripper.travel[0] <= angle <= gripper.travel[1]:
+                low, high = gripper.travel
+                yield ("gripper", key), f"needs servo angle {angle:g}, outside the travel {low:g} to {high:g}"
+
+
+def _axes(robot: RobotFile) -> Iterator[Problem]:
+    """Each axis is used once, and the board has it."""
+    drives: list[tuple[Path, Drive]] = [
+        (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
+    ]
+    drives += [(("motors", i), motor) for i, motor in enumerate(robot.motors or ())]
+    if robot.gripper is not None:
+        drives.append((("gripper",), robot.gripper))
+    used: set[str] = set()
+    for path, drive in drives:
+        if drive.axis is None:
+            continue
+        if drive.axis in used:
+            yield (*path, "axis"), f"{drive.axis} is used already; each motor has its own axis"
+        used.add(drive.axis)
+        if robot.board is None:
+            continue
+        steppers, servos = BOARD_AXES[robot.board.kind]
+        allowed = steppers if drive.kind == "stepper" else servos
+        if drive.axis not in allowed:
+            what = f"{robot.board.kind} has no {drive.kind} axis {drive.axis}"
+            yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
+    if robot.board is not None and not BOARD_AXES[robot.board.kind][0]:
+        for key in ("driver", "enable"):
+            if getattr(robot.board, key) is not None:
+                yield ("board", key), f"{robot.board.kind} has no stepper drivers; remove it"

@@ -1,0 +1,271 @@
+"""pydantic's errors in the robot file's own words: what is wrong, where, what is allowed.
+
+pydantic names types; the person who wrote the file needs the joint, the key and an example. Each error
+becomes ``(path, text)``; the reader adds the file and the line.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from armkin.robot_file import model
+
+Path = tuple[str | int, ...]
+
+# Which model the keys under a name belong to.
+_MODELS: dict[str, type[model.BaseModel]] = {
+    "": model.RobotFile,
+    "joints": model.Joint,
+    "dh": model.DH,
+    "screw": model.Screw,
+    "drive": model.Drive,
+    "motors": model.Motor,
+    "gripper": model.Gripper,
+    "homing": model.Homing,
+    "board": model.Board,
+    "base": model.Pose,
+    "tool": model.Pose,
+    "zero_pose": model.Pose,
+}
+_EXAMPLES: dict[str, str] = {
+    "xyz": "[x, y, z] in mm",
+    "rpy": "[roll, pitch, yaw] in degrees",
+    "w": "[x, y, z], of length 1",
+    "v": "[x, y, z]",
+    "q": "[x, y, z] in mm",
+    "limits": "[lower, upper], for example [-90, 90]",
+    "travel": "[from, to] in degrees, for example [0, 180]",
+    "pulse_us": "[from, to] in microseconds, for example [500, 2500]",
+    "dh": "{alpha: 90, a: 0, d: 170, theta: 0}",
+    "screw": "{w: [0, 0, 1], v: [0, 0, 0]}",
+    "drive": "{full_steps: 200, microsteps: 16, gear: 1, axis: X}",
+    "base": "{xyz: [0, 0, 0], rpy: [0, 0, 0]}",
+    "tool": "{xyz: [0, 0, 0], rpy: [0, 0, 0]}",
+    "zero_pose": "{xyz: [0, 0, 0], rpy: [0, 0, 0]}",
+    "joints": "a list, each item beginning with - name: q1",
+    "motors": "a list, each item beginning with - name: M1",
+    "board": "{kind: uno_cnc_shield, driver: A4988}",
+    "gripper": "{kind: servo, axis: S0, travel: [0, 180], pulse_us: [500, 2500], open: 30, closed: 120}",
+    "homing": "{switch: X, direction: -1, at: -90, speed: 10, backoff: 3, normally: open}",
+    "name": "a word, for example q1",
+    "gear": "a number or {motor: 16, joint: 80}",
+    "pulley": "a number or {motor: 16, joint: 80}",
+}
+# What other programs and papers call our keys and values.
+_SYNONYMS: dict[str, str] = {
+    "offset": "theta",
+    "joint_offset": "theta",
+    "r": "a",
+    "length": "a",
+    "twist": "alpha",
+    "link_length": "a",
+    "link_offset": "d",
+    "range": "limits",
+    "min": "limits",
+    "max": "limits",
+    "lower": "limits",
+    "upper": "limits",
+    "qlim": "limits",
+    "speed": "max_speed",
+    "velocity": "max_speed",
+    "acceleration": "max_accel",
+    "accel": "max_accel",
+    "steps": "full_steps",
+    "steps_per_rev": "full_steps",
+    "ratio": "gear",
+    "reduction": "gear",
+    "pitch": "lead",
+    "tcp": "tool",
+    "links": "joints",
+    "reversed": "invert",
+    "inverted": "invert",
+    "position": "xyz",
+    "translation": "xyz",
+    "rotation": "rpy",
+    "mdh": "modified",
+    "craig": "modified",
+    "proximal": "modified",
+    "dh": "standard",
+    "sdh": "standard",
+    "distal": "standard",
+    "classic": "standard",
+    "poe": "screws",
+    "screw": "screws",
+    "linear": "prismatic",
+    "p": "prismatic",
+    "rotary": "revolute",
+    "rotational": "revolute",
+    "r_joint": "revolute",
+}
+
+
+def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
+    """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
+    suggested: set[Path] = set()
+    for error in errors:  # a misspelt key is also a missing one: say it once
+        if error["type"] == "extra_forbidden":
+            key = _suggestion(error["loc"])
+            if key is not None:
+                suggested.add((*error["loc"][:-1], key))
+    wrong_lengths: set[Path] = set()
+    for error in errors:
+        path: Path = error["loc"]
+        if error["type"] == "problems":
+            yield from error["ctx"]["problems"]
+        elif error["type"] == "missing" and path and isinstance(path[-1], int):
+            if path[:-1] not in wrong_lengths:  # [1] for a triple misses two numbers: one message
+                wrong_lengths.add(path[:-1])
+                yield path[:-1], f"is too short; write {_example(path[:-1])}"
+        elif error["type"] != "missing" or path not in suggested:
+            yield path, _text(error)
+
+
+def _text(error: Any) -> str:
+    kind, path, value = error["type"], error["loc"], error["input"]
+    context = error.get("ctx", {})
+    if path and path[-1] in ("sign", "direction"):
+        return f"must be 1 or -1, not {shown(value)}"
+    if kind == "extra_forbidden":
+        return _unknown_key(path)
+    if kind == "missing":
+        key = str(path[-1])
+        return f"is required: {_EXAMPLES.get(key) or _first_sentence(_owner(path), key)}"
+    if kind == "too_long" and "joints" in path:
+        return f"{context['actual_length']} joints; armkin takes 1 to {context['max_length']}"
+    if kind == "too_short" and path == ("joints",):
+        return "is empty; an arm has at least one joint"
+    if kind in ("too_short", "too_long"):
+        return f"is too {'short' if kind == 'too_short' else 'long'}; write {_example(path)}"
+    if kind in ("tuple_type", "model_type", "dict_type", "model_attributes_type"):
+        return f"must be {_example(path)}, not {shown(value)}"
+    if kind in ("float_type", "int_type"):
+        return _not_a_number(kind, path, value)
+    if kind == "string_type":
+        return f'must be text, not {shown(value)}; write "{value}" in quotes if that is meant'
+    if kind == "bool_type":
+        return f"must be true or false, not {shown(value)}"
+    if kind == "literal_error":
+        return _not_a_choice(str(value), context["expected"].replace("'", ""), shown(value))
+    if kind == "string_pattern_mismatch":
+        return f"{shown(value)} is not a name: letters, digits, _ . and -, beginning with a letter"
+    if kind == "string_too_long":
+        return f"is longer than {context['max_length']} characters"
+    if kind == "string_too_short":
+        return "is empty"
+    bound = {
+        "greater_than": "must be above {gt:.10g}",
+        "greater_than_equal": "must be at least {ge:.10g}",
+        "less_than": "must be below {lt:.10g}",
+        "less_than_equal": "must be at most {le:.10g}",
+    }.get(kind)
+    if bound:
+        text = f"{bound.format(**context)}, not {shown(value)}"
+        if path[-1] in ("gear", "pulley") and value < 0:
+            text += "; for the other direction write invert: true"
+        return text
+    return str(error["msg"])
+
+
+def _not_a_number(kind: str, path: Path, value: Any) -> str:
+    what = "a number" if kind == "float_type" else "a whole number"
+    if path[-1] in ("gear", "pulley"):
+        what += " or teeth {motor: 16, joint: 80}"
+    text = f"must be {what}, not {shown(value)}"
+    if not isinstance(value, str):
+        return text
+    bare = value.strip().lower()
+    for unit in ("mm", "deg", "degrees", "°", "us"):
+        bare = bare.removesuffix(unit).strip()
+    if bare != value.strip().lower():
+        return f"{text}; units are fixed (mm, degrees), write {bare}" if _is_number(bare) else text
+    if _is_number(bare):
+        return f"{text}; write {bare} without quotes"
+    if _is_number(bare.replace(",", ".")):
+        return f"{text}; write {bare.replace(',', '.')} with a point"
+    if "pi" in bare:
+        return f"{text}; angles are in degrees, so pi/2 is 90"
+    return text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return abs(float(text)) < 1e300
+    except ValueError:
+        return False
+
+
+def _not_a_choice(value: str, expected: str, what: str) -> str:
+    choices = expected.replace(" or ", ", ").split(", ")
+    near = _nearest(value, choices)
+    return f"must be {expected}, not {what}" + (f"; did you mean {near}?" if near else "")
+
+
+def _unknown_key(path: Path) -> str:
+    key, owner = str(path[-1]), _owner(path)
+    near = _suggestion(path)
+    if near is not None:
+        return f"unknown key; did you mean {near}?"
+    for name, other in _MODELS.items():
+        if key in other.model_fields and other is not owner and name:
+            return f"unknown key here; it belongs in {_place(name)}"
+    if key in model.RobotFile.model_fields:
+        return "unknown key here; it belongs at the top of the file"
+    return f"unknown key; the keys here are {', '.join(owner.model_fields)}"
+
+
+def _place(name: str) -> str:
+    return {"joints": "a joint", "motors": "motors"}.get(name, name)
+
+
+def _suggestion(path: Path) -> str | None:
+    key, owner = str(path[-1]), _owner(path)
+    belongs = any(key in other.model_fields for other in _MODELS.values())
+    return None if belongs else _nearest(key, list(owner.model_fields))
+
+
+def _nearest(word: str, choices: list[str]) -> str | None:
+    import difflib
+
+    low = word.strip().lower().replace("-", "_").replace(" ", "_")
+    by_lower = {choice.lower(): choice for choice in choices}
+    synonym = _SYNONYMS.get(low, low)
+    if synonym.lower() in by_lower:
+        return by_lower[synonym.lower()]
+    near = difflib.get_close_matches(low, by_lower, n=1, cutoff=0.65)
+    return by_lower[near[0]] if near else None
+
+
+def _owner(path: Path) -> type[model.BaseModel]:
+    names = [part for part in path[:-1] if isinstance(part, str)]
+    return _MODELS.get(names[-1] if names else "", model.RobotFile)
+
+
+def _example(path: Path) -> str:
+    names = [part for part in path if isinstance(part, str)]
+    key = names[-1] if names else ""
+    if path and isinstance(path[-1], int):
+        return {"joints": "a joint: name: q1, dh: {...}", "motors": "a motor: name: M1, joints: {q1: 1}"}.get(
+            key, "a number"
+        )
+    if key == "joints" and "motors" in names:
+        return "{q1: 1, q2: 2}, weights by joint name"
+    return _EXAMPLES.get(key, "a mapping of keys")
+
+
+def _first_sentence(owner: type[model.BaseModel], key: str) -> str:
+    field = owner.model_fields.get(key)
+    text = (field.description if field else None) or "see the schema"
+    return text.split(". ")[0].split("; ")[0].rstrip(".")
+
+
+def shown(value: Any) -> str:
+    """A value as the file's author would recognise it, on one short line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return f"{value:.10g}"
+    if isinstance(value, dict):
+        return "a mapping" if value else "an empty mapping {}"
+    if isinstance(value, tuple | list):
+        return "a list" if value else "an empty list []"
+    text = " ".join(str(value).split())
+    return f"the text '{text if len(text) <= 40 else text[:37] + '...'}'"

@@ -1,0 +1,301 @@
+"""The robot file as pydantic sees it: every key, its unit, its bounds and its help text.
+
+Strict: no unknown keys, no text or booleans for numbers, finite numbers only; immutable. What needs
+several values to judge (limits against home, axes against the board) stands in ``checks``.
+Angles are degrees and lengths millimetres here; ``armkin.arm`` turns them into radians, once.
+"""
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from armkin.robot_file import checks
+
+Convention = Literal["standard", "modified", "screws"]
+JointType = Literal["revolute", "prismatic"]
+Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_axis", "pose"]
+BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos"]
+Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
+
+# Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
+Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
+Length = Annotated[float, Field(ge=-1e7, le=1e7)]
+Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres
+Rate = Annotated[float, Field(gt=0, le=1e6)]
+Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
+# A name may stand in `--lock J3=20` and in tables: no spaces, commas, colons or equal signs.
+Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
+# An int and not a Literal, which would take `true` for 1; 0 is for `checks` to find.
+Sign = Annotated[int, Field(ge=-1, le=1, json_schema_extra={"enum": [1, -1]})]
+
+
+def _ratio(value: Any) -> Any:
+    """Teeth ``{motor: 16, joint: 80}`` to the reduction 5.0; a number stays what it is."""
+    if not isinstance(value, dict):
+        return value
+    motor, joint = value.get("motor"), value.get("joint")
+    if set(value) == {"motor", "joint"} and type(motor) is type(joint) is int:
+        if 1 <= motor <= 10_000 and 1 <= joint <= 10_000:
+            return joint / motor
+    raise PydanticCustomError("problem", "teeth are whole numbers from 1 to 10000: {motor: 16, joint: 80}")
+
+
+_TEETH = {"type": "integer", "minimum": 1, "maximum": 10_000}
+Ratio = Annotated[
+    float,
+    Field(gt=0, le=1e6),
+    BeforeValidator(_ratio),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                {
+                    "type": "object",
+                    "properties": {"motor": _TEETH, "joint": _TEETH},
+                    "required": ["motor", "joint"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]
+
+
+class _Model(BaseModel):
+    # defer_build: RobotFile's validator holds those of all the others, and is built by the reader.
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
+    )
+
+
+class Pose(_Model):
+    """A fixed frame: a position, then R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    xyz: tuple[Length, Length, Length] = Field((0.0, 0.0, 0.0), description="Position [x, y, z] in mm.")
+    rpy: tuple[Angle, Angle, Angle] = Field(
+        (0.0, 0.0, 0.0), description="Roll, pitch, yaw in degrees: R = Rz(yaw) Ry(pitch) Rx(roll)."
+    )
+
+
+class DH(_Model):
+    """One row of a Denavit-Hartenberg table."""
+
+    alpha: Angle = Field(description="Twist in degrees. With `convention: modified` it stands before the joint.")
+    a: Length = Field(description="Link length in mm. With `convention: modified` it stands before the joint.")
+    d: Length = Field(description="Link offset in mm; a prismatic joint's value is added to it.")
+    theta: Angle = Field(0.0, description="Constant offset in degrees: DH angle = sign x joint value + theta.")
+
+
+class Screw(_Model):
+    """A joint's screw axis at the zero pose, in the base frame."""
+
+    w: tuple[Unit, Unit, Unit] = Field(
+        description="Direction of the axis, of length 1; [0, 0, 0] for a prismatic joint."
+    )
+    v: tuple[Length, Length, Length] | None = Field(
+        None,
+        description="Linear part: -w x q for a point q on the axis; a prismatic joint's direction, of length 1.",
+    )
+    q: tuple[Length, Length, Length] | None = Field(
+        None, description="A point on the axis of a revolute joint, in mm, instead of `v`."
+    )
+
+
+class Drive(_Model):
+    """One motor: a stepper with its chain to the joint, or an RC servo."""
+
+    kind: Literal["stepper", "servo"] = Field("stepper", description="A stepper (default) or an RC servo.")
+    axis: Name | None = Field(
+        None, description="The board's output: X, Y, Z, A on a CNC shield; X, Y, Z, E0, E1 on RAMPS; S0... for servos."
+    )
+    invert: bool = Field(
+        False, description="Wiring: the motor turns the other way. (A joint's `sign` is geometry.)"
+    )
+    full_steps: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
+        None, description="Stepper: full steps per motor turn, mostly 200."
+    )
+    microsteps: Annotated[int, Field(ge=1, le=65_536)] | None = Field(
+        None, description="Stepper: microsteps per full step, as the driver's jumpers set it."
+    )
+    gear: Ratio = Field(
+        1.0, description="Stepper: motor turns per joint turn, a number or teeth {motor: 16, joint: 80}."
+    )
+    pulley: Ratio = Field(1.0, description="Stepper: a second reduction, like `gear`; the two are multiplied.")
+    lead: Annotated[float, Field(gt=0, le=1e4)] | None = Field(
+        None, description="Stepper on a prismatic joint: mm per turn after gear and pulley."
+    )
+    travel: tuple[Angle, Angle] | None = Field(
+        None, description="Servo: its own angles in degrees at the two pulse widths, [0, 180] for most."
+    )
+    pulse_us: tuple[Annotated[int, Field(ge=100, le=5000)], Annotated[int, Field(ge=100, le=5000)]] | None = (
+        Field(None, description="Servo: pulse widths in microseconds at the two ends of `travel`.")
+    )
+    zero: Angle = Field(0.0, description="Servo: its own angle in degrees where the joint value is 0.")
+
+    def pulses_per_turn(self) -> float:
+        """A stepper's pulses per joint turn: full_steps x microsteps x gear x pulley."""
+        return (self.full_steps or 0) * (self.microsteps or 0) * self.gear * self.pulley
+
+    def pulses_per_unit(self) -> float:
+        """Pulses (or microseconds) per degree, or per mm if there is a lead; `invert` is not in it."""
+        if self.kind == "servo":
+            (a0, a1), (p0, p1) = self.travel or (0.0, 1.0), self.pulse_us or (0, 0)
+            return (p1 - p0) / (a1 - a0)
+        return self.pulses_per_turn() / (self.lead if self.lead is not None else 360.0)
+
+
+class Motor(Drive):
+    """One motor of an arm whose motors and joints are not one to one."""
+
+    name: Name = Field(description="The motor's name in messages and results.")
+    joints: dict[str, Value] = Field(
+        description="Weights: motor angle before its ratio = sum of weight x joint value.", min_length=1
+    )
+
+
+class Gripper(Drive):
+    """The gripper's motor and its two positions, in degrees of the drive (mm with a lead)."""
+
+    open: Value = Field(description="Position when open, in the drive's degrees (mm with a lead).")
+    closed: Value = Field(description="Position when closed, in the drive's degrees (mm with a lead).")
+
+
+class Homing(_Model):
+    """How a joint finds its limit switch."""
+
+    switch: Name = Field(description="The board's limit input, for example X.")
+    direction: Sign = Field(description="1: the switch is at the upper end of the joint; -1: at the lower end.")
+    at: Value = Field(description="Joint value where the switch closes, in degrees or mm.")
+    speed: Rate = Field(description="Approach speed in deg/s or mm/s; the second approach is slower.")
+    backoff: Annotated[float, Field(gt=0, le=1e6)] = Field(
+        description="How far to back off the switch, in degrees or mm."
+    )
+    order: Annotated[int, Field(ge=1, le=99)] | None = Field(
+        None, description="1 homes first; joints of the same order home together. Absent: in the file's order."
+    )
+    normally: Literal["open", "closed"] = Field(
+        description="The switch when it is not pressed: `closed` also notices a cut wire."
+    )
+
+
+class Board(_Model):
+    """The controller that drives the motors."""
+
+    kind: BoardKind = Field(description="Which of armkin's firmware boards.")
+    driver: Driver | None = Field(None, description="Stepper driver: it sets the pulse timing.")
+    enable: Literal["low", "high"] | None = Field(
+        None, description="Level of the ENABLE pin that switches the drivers on; low for the listed ones."
+    )
+
+
+class Joint(_Model):
+    """One joint, its place in the chain, its range and its motor."""
+
+    name: Name = Field(description="The joint's name in tables, messages and `--lock`.")
+    type: JointType = Field("revolute", description="revolute (default) or prismatic.")
+    dh: DH | None = Field(None, description="The DH row (conventions standard and modified).")
+    screw: Screw | None = Field(None, description="The screw axis (convention screws).")
+    sign: Sign = Field(1, description="1 or -1: the joint counts against the axis of its row or screw.")
+    limits: tuple[Value, Value] | None = Field(
+        None, description="[lower, upper] in degrees or mm. Absent: unlimited."
+    )
+    home: Value = Field(0.0, description="The pose from which pulses are counted, in degrees or mm.")
+    max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")
+    max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2; needed to send motion.")
+    drive: Drive | None = Field(None, description="The joint's own motor. For coupled joints use `motors`.")
+    homing: Homing | None = Field(None, description="The limit switch. Absent: `armkin home` refuses the joint.")
+
+    def twist(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Screw axis (w, v) without the rounding of printed tables.
+
+        Revolute: w of length 1 and v perpendicular to it; prismatic: w = 0 and v of length 1.
+        """
+        if self.screw is None:
+            raise ValueError(f"joint {self.name} has no screw")
+        w, v, q = self.screw.w, self.screw.v, self.screw.q
+        if self.type == "prismatic":
+            length = math.hypot(*(v or ()))
+            return (0.0, 0.0, 0.0), tuple(x / length for x in v or ())
+        length = math.hypot(*w)
+        w = (w[0] / length, w[1] / length, w[2] / length)
+        if v is None:
+            v = checks.cross(q or (0.0, 0.0, 0.0), w)
+        else:  # the screw as a whole is scaled: (w, v) is one six-vector
+            v = (v[0] / length, v[1] / length, v[2] / length)
+            pitch = checks.dot(v, w)
+            v = (v[0] - pitch * w[0], v[1] - pitch * w[1], v[2] - pitch * w[2])
+        return w, v
+
+
+class RobotFile(_Model):
+    """A robot arm: geometry, limits and drives. Millimetres and degrees throughout."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)] = Field(description="The arm's name, one line.")
+    description: str = Field("", description="Free text.")
+    source: str = Field("", description="Where the numbers come from.")
+    convention: Convention = Field(
+        description="standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz) DH rows, or screws. Never guessed."
+    )
+    task: Task | None = Field(
+        None, description="What `armkin ik` solves for. Absent: by structure; `armkin info` shows it."
+    )
+    pitch_offset: Angle = Field(
+        0.0, description="Degrees added to the sum of the parallel joints' angles in the tasks with a pitch."
+    )
+    base: Pose = Field(Pose.model_construct(), description="Fixed frame before joint 1.")
+    tool: Pose = Field(Pose.model_construct(), description="Fixed frame after the last joint: the TCP.")
+    zero_pose: Pose | None = Field(
+        None, description="Convention screws: the end frame in the base frame when all joints are 0."
+    )
+    joints: tuple[Joint, ...] = Field(
+        description="The joints, from the base outwards.", min_length=1, max_length=checks.MAX_JOINTS
+    )
+    motors: tuple[Motor, ...] | None = Field(
+        None, description="Motors that are not one to one with joints, instead of the joints' `drive`.", min_length=1
+    )
+    gripper: Gripper | None = Field(None, description="A servo or stepper with `open` and `closed`.")
+    board: Board | None = Field(None, description="The controller, for `armkin send`.")
+
+    _path: str = PrivateAttr("")
+    _sha256: str = PrivateAttr("")
+
+    @property
+    def path(self) -> str:
+        """The file as it was named when read; empty for a model made in memory."""
+        return self._path
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes; empty for a model made in memory."""
+        return self._sha256
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if problems := list(checks.problems(self)):
+            raise PydanticCustomError("problems", "{text}", {"text": problems[0][1], "problems": problems})
+        return self
+
+    def motor_list(self) -> tuple[Motor, ...]:
+        """The motors, whether they are written as `motors` or as the joints' drives; () if there are none."""
+        if self.motors is not None:
+            return self.motors
+        return tuple(
+            Motor.model_construct(
+                joint.drive.model_fields_set | {"name", "joints"},
+                **dict(joint.drive),
+                name=joint.name,
+                joints={joint.name: 1.0},
+            )
+            for joint in self.joints
+            if joint.drive is not None
+        )
