@@ -1,0 +1,316 @@
+"""Writes the golden vectors from PROTOCOL.md: ``python3 generate.py`` in this folder.
+
+Standalone on purpose: it shares no code with the firmware or with armkin, so that it can accuse both.
+"""
+
+import struct
+import zlib
+from pathlib import Path
+
+HERE = Path(__file__).parent
+AXES = 5  # uno_cnc_shield: X Y Z A and a servo
+
+
+def cobs(data: bytes) -> bytes:
+    out = bytearray()
+    for block in data.split(b"\0"):
+        assert len(block) < 254
+        out += bytes([len(block) + 1]) + block
+    return bytes(out)
+
+
+def wire(payload: bytes) -> bytes:
+    return cobs(payload + struct.pack("<I", zlib.crc32(payload))) + b"\0"
+
+
+def hello(tag: int, nonce: int, version: int = 1) -> bytes:
+    return struct.pack("<BBBI", 0x01, tag, version, nonce)
+
+
+def status(tag: int, page: int = 0) -> bytes:
+    return struct.pack("<BBB", 0x02, tag, page)
+
+
+def hold(tag: int) -> bytes:
+    return struct.pack("<BB", 0x03, tag)
+
+
+def config(tag: int, offset: int, data: bytes) -> bytes:
+    return struct.pack("<BBH", 0x10, tag, offset) + data
+
+
+def commit(tag: int, image: bytes) -> bytes:
+    return struct.pack("<BBHI", 0x11, tag, len(image), zlib.crc32(image))
+
+
+def enable(tag: int, what: int) -> bytes:
+    return struct.pack("<BBB", 0x12, tag, what)
+
+
+def set_position(tag: int, mask: int, counts: list[int]) -> bytes:
+    return struct.pack(f"<BBH{len(counts)}i", 0x13, tag, mask, *counts)
+
+
+Segment = tuple[int, int, int, list[int]]
+
+
+def motion(tag: int, mask: int, flags: int, start: list[int], end: list[int], segments: list[Segment]) -> bytes:
+    k = len(start)
+    form = f"<HHh{k}h" if flags & 2 else f"<BHh{k}b"
+    body = struct.pack(f"<BBHBB{k}i{k}i", 0x14, tag, mask, flags, len(segments), *start, *end)
+    return body + b"".join(struct.pack(form, t, i, a, *s) for t, i, a, s in segments)
+
+
+def home(tag: int, switch: int, flags: int, slow: int, backoff: int, travel: int, time: int, rate: list[int]) -> bytes:
+    return struct.pack(f"<BBBBBHIH{len(rate)}h", 0x15, tag, switch, flags, slow, backoff, travel, time, *rate)
+
+
+def jog(tag: int, rate: list[int]) -> bytes:
+    return struct.pack(f"<BB{len(rate)}h", 0x16, tag, *rate)
+
+
+def image(rows: list[tuple[int, int, list[int]]] | None = None, flags: int = 0) -> bytes:
+    """The three-joint arm on X Y Z, nothing on A, a gripper on the servo. A4988 timing."""
+    rows = rows or []
+    out = struct.pack("<8BI", 1, AXES, len(rows), flags, 10, 10, 2, 1, 0x1234ABCD)
+    out += struct.pack("<BiiiHI", 1, -4267, 4267, 0, 3000, 9000)
+    out += struct.pack("<BiiiHI", 1, -13127, 3580, 0, 8000, 24000)
+    out += struct.pack("<BiiiHI", 3, -2000, 14000, 0, 6000, 18000)
+    out += struct.pack("<BiiiHI", 0, 0, 0, 0, 0, 0)
+    out += struct.pack("<BiiiHI", 1, 900, 2100, 1500, 1000, 4000)
+    for lower, upper, weight in rows:
+        out += struct.pack(f"<ii{AXES}h", lower, upper, *weight)
+    return out
+
+
+def ack(next_: int, error: int = 0, detail: int = 0, state: int = 0, free: int = 32, queued: int = 0) -> bytes:
+    return struct.pack("<6BH", 0x80, next_, error, detail, state, free, queued)
+
+
+def info(tag: int, nonce: int, config_crc: int, known: int, flags: int) -> str:
+    head = struct.pack("<BBB", 0x81, tag, 1).hex() + "????" + struct.pack("<IBBHBBBB", nonce, 1, 5, 16, 3, 5, 32, 160).hex()
+    return head + "????" + struct.pack("<IIHB", 16_000_000, config_crc, known, flags).hex() + "??????"
+
+
+def report(tag: int, next_: int, error: int, detail: int, state: int, flags: int, known: int, counts: list[int],
+           free: int = 32, queued: int = 0, page: int = 0, bad: str = "00") -> str:
+    head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
+    return head + "??00" + bad + struct.pack(f"<B{AXES}i", page, *counts).hex()
+
+
+def steps_of(segments: list[Segment]) -> list[int]:
+    return [sum(column) for column in zip(*(s for *_, s in segments), strict=True)]
+
+
+# three narrow segments for X Y Z, then one wide one back and a gripper move
+RAMP: list[Segment] = [
+    (100, 8000, -2000, [-10, -95, 53]),
+    (200, 7200, 0, [-20, -127, 106]),
+    (100, 7200, 2000, [-10, -95, 53]),
+]
+BACK: list[Segment] = [(400, 6000, 0, [40, 317, -212])]
+GRIP: list[Segment] = [(300, 16000, 0, [300])]
+
+
+def units(segments: list[Segment]) -> int:
+    total = 0
+    for t, i, a, _ in segments:
+        total += (t * ((i + ((256 * i + (t - 1) * a) >> 8)) // 2)) >> 8
+    return total * 2 // 125
+
+
+def frames() -> str:
+    img = image()
+    lines: list[tuple[str, bytes]] = []
+
+    def add(text: str, payload: bytes) -> None:
+        lines.append((text, payload))
+
+    def add_motion(tag: int, mask: int, flags: int, start: list[int], segments: list[Segment]) -> None:
+        end = [a + b for a, b in zip(start, steps_of(segments), strict=True)]
+        text = ";".join(f"{t}/{i}/{a}/" + ",".join(map(str, s)) for t, i, a, s in segments)
+        commas = (",".join(map(str, v)) for v in (start, end))
+        add(f"MOTION tag={tag} mask={mask} flags={flags} start={next(commas)} end={next(commas)} segments={text}",
+            motion(tag, mask, flags, start, end, segments))
+
+    add("HELLO tag=5 version=1 nonce=3735928559", hello(5, 3735928559))
+    add("HELLO tag=0 version=1 nonce=0", hello(0, 0))
+    add("STATUS? tag=7 page=0", status(7))
+    add("STATUS? tag=255 page=1", status(255, 1))
+    add("HOLD tag=9", hold(9))
+    add(f"CONFIG tag=0 offset=0 data={img.hex()}", config(0, 0, img))
+    add(f"COMMIT tag=1 length={len(img)} crc={zlib.crc32(img)}", commit(1, img))
+    add("ENABLE tag=2 what=3", enable(2, 3))
+    add("SET_POSITION tag=3 mask=23 counts=0,-1,70000,1500", set_position(3, 23, [0, -1, 70000, 1500]))
+    add_motion(4, 7, 1, [0, 0, 0], RAMP)
+    add_motion(5, 7, 3, [-40, -317, 212], BACK)
+    add_motion(6, 16, 3, [1500], GRIP)
+    add_motion(255, 1, 0, [-128], [(255, 400, -1, [127]), (255, 65535, 1, [-128])])
+    add("HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
+        home(7, 2, 1, 26, 200, 100000, 300, [0, -4000, 0, 0, 0]))
+    add("JOG tag=8 rate=100,0,-100,0,0", jog(8, [100, 0, -100, 0, 0]))
+    add("ACK next=6 error=0 detail=0 state=1 free=28 queued=313", ack(6, 0, 0, 1, 28, 313))
+    add("ACK next=6 error=17 detail=2 state=2 free=0 queued=65535", ack(6, 17, 2, 2, 0, 65535))
+    add("INFO tag=5 version=1 firmware=1,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 queue=32 frame=160 "
+        "min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
+        struct.pack("<5BIBBHBBBBHIIHBHB", 0x81, 5, 1, 1, 0, 3735928559, 1, 5, 16, 3, 5, 32, 160, 400, 16_000_000,
+                    305441741, 23, 5, 3, 2))
+    add("STATUS tag=7 next=6 error=0 detail=0 state=1 flags=7 free=28 queued=313 known=23 switches=7 overruns=0 bad=1 page=0 "
+        "counts=-40,-317,212,0,1500",
+        struct.pack("<8BHH4B5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, -40, -317, 212, 0, 1500))
+    head = "# NAME field=value ... | payload | wire, written by generate.py from PROTOCOL.md\n"
+    return head + "".join(f"{text} | {p.hex()} | {wire(p).hex()}\n" for text, p in lines)
+
+
+class Talk:
+    """Collects the lines of a conversation; `tag` counts the sequence."""
+
+    def __init__(self, title: str) -> None:
+        self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", "board uno_cnc_shield"]
+
+    def note(self, text: str) -> None:
+        self.lines.append(f"# {text}")
+
+    def raw(self, text: str) -> None:
+        self.lines.append(text)
+
+    def say(self, payload: bytes, answer: bytes | str) -> None:
+        self.lines += [f"> {payload.hex()}", f"< {answer if isinstance(answer, str) else answer.hex()}"]
+
+    def setup(self, nonce: int, what: int = 3) -> int:
+        """Opens a session on a board with no memory, configures it, declares its position; the next sequence number."""
+        img = image()
+        self.say(hello(1, nonce), info(1, nonce, 0, 0, 0))
+        self.say(config(0, 0, img[:100]), ack(1))
+        self.say(config(1, 100, img[100:]), ack(2))
+        self.say(commit(2, img), ack(3))
+        self.say(set_position(3, 0b10111, [0, 0, 0, 1500]), ack(4))
+        self.say(enable(4, what), ack(5))
+        return 5
+
+    def write(self, name: str) -> None:
+        (HERE / name).write_text("\n".join(self.lines) + "\n")
+
+
+def talks() -> None:
+    crc = zlib.crc32(image())
+
+    t = Talk("HELLO, configuration, position, three moves, a reset at rest")
+    t.setup(0xDEADBEEF)
+    end = steps_of(RAMP)
+    t.say(motion(5, 7, 1, [0, 0, 0], end, RAMP), ack(6, 0, 0, 1, 29, units(RAMP)))
+    t.raw("wait 400")
+    t.say(status(7), report(7, 6, 0, 0, 0, 7, 0b10111, [*end, 0, 1500]))
+    t.note("wide segments, back home; then the gripper: an axis like the others")
+    t.say(motion(6, 7, 3, end, [0, 0, 0], BACK), ack(7, 0, 0, 1, 31, units(BACK)))
+    t.raw("wait 300")
+    t.say(motion(7, 16, 3, [1500], [1800], GRIP), ack(8, 0, 0, 1, 31, units(GRIP)))
+    t.raw("wait 450")
+    t.say(status(8), report(8, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1800]))
+    t.note("a duplicate moves nothing")
+    t.say(motion(7, 16, 3, [1500], [1800], GRIP), ack(8))
+    t.say(status(9), report(9, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1800]))
+    t.note("position and image survive a reset at rest, drivers come back on, servo pulses do not")
+    t.raw("reset")
+    t.say(status(10), report(10, 0, 1, 0, 0, 0b1101, 0b10111, [0, 0, 0, 0, 1800]))
+    t.say(hello(11, 77), info(11, 77, crc, 0b10111, 0b1101))
+    t.say(set_position(0, 1, [0]), ack(0, 10))
+    t.write("move.talk")
+
+    t = Talk("Every refusal ends the session and moves nothing")
+    t.say(status(1), report(1, 0, 1, 0, 0, 0, 0, [0] * AXES))
+    t.say(enable(0, 1), ack(0, 1))
+    t.say(hello(2, 5, version=9), info(2, 5, 0, 0, 0))
+    t.say(enable(0, 1), ack(0, 2))
+    t.say(hello(1, 100), info(1, 100, 0, 0, 0))
+    t.say(motion(0, 1, 1, [0], [1], [(1, 16000, 0, [1])]), ack(0, 6))
+    t.note("the session is over: the same HELLO does not open it again, a new one does")
+    t.say(enable(0, 1), ack(0, 6))
+    t.say(hello(1, 100), info(1, 100, 0, 0, 0))
+    t.say(enable(0, 1), ack(0, 6))
+    t.setup(101, what=0b11)
+    t.note("a gap is not executed")
+    t.say(motion(6, 1, 1, [0], [1], [(1, 16000, 0, [1])]), ack(5))
+    known, at_home = 0b10111, [0, 0, 0, 0, 1500]
+    slow = (100, 16000, 0)
+    for nonce, payload, error, detail in (
+        (1000, b"\x17\x00", 3, 0),
+        (1001, motion(0, 1, 1, [0], [5], [(*slow, [5])]) + b"\0", 4, 0),
+        (1002, motion(0, 1, 1, [0], [5], [(*slow, [5])])[:-1], 4, 0),
+        (1003, motion(0, 1, 4, [0], [5], [(*slow, [5])]), 4, 0),
+        (1004, struct.pack("<BBHBBii", 0x14, 0, 1, 1, 0, 0, 0), 4, 0),
+        (1005, motion(0, 8, 1, [0], [5], [(*slow, [5])]), 5, 3),
+        (1006, motion(0, 32, 1, [0], [5], [(*slow, [5])]), 5, 5),
+        (1007, motion(0, 3, 1, [0, 7], [5, 12], [(*slow, [5, 5])]), 12, 1),
+        (1008, motion(0, 3, 1, [0, 0], [5, 6], [(*slow, [5, 5])]), 13, 1),
+        (1009, motion(0, 1, 1, [0], [5], [(*slow, [4]), (100, 100, 0, [1])]), 14, 1),
+        (1010, motion(0, 1, 1, [0], [5], [(100, 65000, 2000, [5])]), 14, 0),
+        (1011, motion(0, 3, 1, [0, 0], [5, 6], [(5, 16000, 0, [5, 6])]), 15, 1),
+        (1012, motion(0, 1, 1, [0], [100], [(100, 4000, 0, [100])]), 16, 0),
+        (1013, motion(0, 17, 3, [0, 1500], [0, 2101], [(601, 16000, 0, [0, 601])]), 17, 4),
+        (1015, set_position(0, 3, [0, 0]), 10, 0),
+        (1016, set_position(0, 8, [0]), 5, 3),
+        (1017, jog(0, [0, 8001, 0, 0, 0]), 16, 1),
+        (1018, jog(0, [0, 0, 0, 1, 0]), 5, 3),
+        (1019, home(0, 9, 0, 26, 100, 1000, 10, [100, 0, 0, 0, 0]), 5, 0),
+        (1020, home(0, 0, 0, 26, 100, 1000, 10, [0, 0, 0, 0, 0]), 5, 0),
+        (1021, home(0, 0, 0, 26, 100, 1000, 10, [0, 0, 0, 0, 10]), 5, 4),
+        (1022, hold(0), 21, 0),
+    ):
+        t.say(hello(1, nonce), info(1, nonce, crc, known, 0b111))
+        t.say(payload, ack(0, error, detail))
+    t.note("nothing has moved")
+    t.say(status(2), report(2, 0, 21, 0, 0, 7, known, at_home))
+    t.note("drivers off: steppers are lost; pulses off: servos too")
+    t.say(hello(1, 2000), info(1, 2000, crc, known, 0b111))
+    t.say(enable(0, 2), ack(1))
+    t.say(motion(1, 16, 1, [1500], [1510], [(*slow, [10])]), ack(2, 0, 0, 1, 31, units([(*slow, [10])])))
+    t.raw("wait 150")
+    t.say(motion(2, 1, 1, [0], [5], [(*slow, [5])]), ack(2, 9, 0))
+    t.say(hello(1, 2001), info(1, 2001, crc, 0b10000, 0b110))
+    t.say(set_position(0, 7, [0, 0, 0]), ack(1))
+    t.say(motion(1, 1, 1, [0], [5], [(*slow, [5])]), ack(1, 11, 0))
+    t.note("a broken image is not taken, and what was known is lost")
+    bad = bytearray(image())
+    bad[12 + 19 + 13 : 12 + 19 + 15] = b"\0\0"
+    t.say(hello(1, 2002), info(1, 2002, crc, known, 0b110))
+    t.say(config(0, 0, bytes(bad)), ack(1))
+    t.say(commit(1, bytes(bad)), ack(1, 7))
+    t.say(status(3), report(3, 1, 7, 0, 0, 0, 0, [0, 0, 0, 0, 1510]))
+    t.write("refuse.talk")
+
+    t = Talk("A joint limit of coupled motors: Y and Z turn one joint by their sum")
+    img = image(rows=[(-1000, 1000, [0, 2, 2, 0, 0])])
+    t.say(hello(1, 9), info(1, 9, 0, 0, 0))
+    t.say(config(0, 0, img), ack(1))
+    t.say(commit(1, img), ack(2))
+    t.say(set_position(2, 7, [0, 0, 0]), ack(3))
+    t.say(enable(3, 1), ack(4))
+    pair: list[Segment] = [(600, 4000, 0, [600, -600]), (400, 4000, 0, [0, 400])]
+    t.say(motion(4, 6, 3, [0, 0], [600, -200], pair), ack(5, 0, 0, 1, 30, units(pair)))
+    t.raw("wait 350")
+    t.say(motion(5, 6, 3, [600, -200], [701, -200], [(101, 16000, 0, [101, 0])]), ack(5, 18))
+    t.write("joint_limit.talk")
+
+    t = Talk("Damaged bytes are dropped without an answer, and counted")
+    t.say(hello(1, 3), info(1, 3, 0, 0, 0))
+    whole = wire(status(2))
+    broken = bytearray(whole)
+    broken[2] ^= 0x10
+    for data in (bytes(broken), whole[:-3] + b"\0", b"\x05\x01\0", bytes([1] * 200) + b"\0"):
+        t.raw(f"wire {data.hex()}")
+        t.raw("silent")
+    t.note("empty frames are ignored, a question after them is answered")
+    t.raw("wire 000000" + whole.hex())
+    t.raw("< " + report(2, 0, 0, 0, 0, 0, 0, [0] * AXES, bad="04"))
+    t.note("an unknown type outside of the sequence gets no answer, nor does a HELLO of the wrong length")
+    t.raw("wire " + wire(b"\x0f\x01").hex())
+    t.raw("wire " + wire(hello(1, 4) + b"\0").hex())
+    t.raw("wire " + wire(b"\x80\x01").hex())
+    t.raw("silent")
+    t.write("noise.talk")
+
+
+if __name__ == "__main__":
+    (HERE / "frames.txt").write_text(frames())
+    talks()
