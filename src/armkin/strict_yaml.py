@@ -34,25 +34,18 @@ _EMPTY = "the file is empty; a robot file has at least name, convention and join
 _LOADER: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 # YAML 1.1's own patterns, from PyYAML's resolver.py, and what people write that misses them by a hair.
-_INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
-_FLOAT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?")
-_LIKE_FLOAT = re.compile(r"([-+]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([-+]?)([0-9]+))?")
-_SEXAGESIMAL = re.compile(r"[-+]?[0-9][0-9_]*(?::[0-9]+)+(?:\.[0-9_]*)?")
-_LEADING_ZERO = re.compile(r"([-+]?)0+([0-9_]+(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?)")
-_OTHER_BASE = re.compile(r"[-+]?0[xXbBoO][0-9a-fA-F_]+")
-_UNDERSCORE = re.compile(r"[-+]?[0-9][0-9_]*_[0-9_]*(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?")
-_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
-_TIMESTAMP = re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?")
-_WORDS_FOR_TRUE = {"yes", "on"}
-_WORDS_FOR_FALSE = {"no", "off"}
-
-# What a text file may hold: YAML 1.2, production 1, less what is a line break to YAML and to no editor
-# (U+0085, U+2028, U+2029), so that our line numbers are everybody's.
-_BINARY = re.compile(
-    "[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
-)
-# What a value may hold: no terminal escapes, no half characters.
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\u2028\u2029]")
+# Plain text, compiled by `re` when first needed: most files need the first two only.
+_INT = r"[-+]?(?:0|[1-9][0-9]*)"
+_FLOAT = r"[-+]?(?:0|[1-9][0-9]*)\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?"
+_LIKE_FLOAT = r"([-+]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([-+]?)([0-9]+))?"
+_SEXAGESIMAL = r"[-+]?[0-9][0-9_]*(?::[0-9]+)+(?:\.[0-9_]*)?"
+_LEADING_ZERO = r"([-+]?)0+([0-9_]+(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?)"
+_OTHER_BASE = r"[-+]?0[xXbBoO][0-9a-fA-F_]+"
+_UNDERSCORE = r"[-+]?[0-9][0-9_]*_[0-9_]*(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?"
+_NOT_FINITE = r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+_TIMESTAMP = r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?"
+_WORDS_FOR_TRUE = ("yes", "on")
+_WORDS_FOR_FALSE = ("no", "off")
 
 
 class StrictYamlError(ValueError):
@@ -102,11 +95,21 @@ def _decode(raw: bytes | str) -> str:
     if len(text) > MAX_BYTES:
         raise StrictYamlError(0, f"larger than {MAX_BYTES // 1024} kB; no robot file is that long")
     text = text.removeprefix("\ufeff")
-    if binary := _BINARY.search(text):
-        line = text.count("\n", 0, binary.start()) + 1
-        character = f"U+{ord(binary.group()):04X}"
-        raise StrictYamlError(line, f"character {character} has no place in a robot file, which is YAML text")
+    for character in set(text):
+        if not _is_text(ord(character)):
+            line = text.count("\n", 0, text.index(character)) + 1
+            what = f"U+{ord(character):04X} has no place in a robot file, which is YAML text"
+            raise StrictYamlError(line, f"character {what}")
     return text
+
+
+def _is_text(code: int) -> bool:
+    """YAML 1.2, production 1, less the line breaks that no editor counts (U+0085, U+2028, U+2029)."""
+    if code < 0x7F:
+        return code >= 0x20 or code in (0x09, 0x0A, 0x0D)
+    if code < 0xA0 or code in (0x2028, 0x2029, 0xFEFF, 0xFFFE, 0xFFFF):
+        return False
+    return not 0xD800 <= code <= 0xDFFF
 
 
 def _parse(text: str) -> Iterator[Any]:
@@ -260,36 +263,36 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
 
 
 def _number(text: str, line: int) -> str | int | float:
-    if _INT.fullmatch(text):
+    if re.fullmatch(_INT, text):
         if len(text) > MAX_DIGITS:
             raise StrictYamlError(line, f"{_shown(text)} has more than {MAX_DIGITS} digits; is it a number?")
         return int(text)
-    if _FLOAT.fullmatch(text):
+    if re.fullmatch(_FLOAT, text):
         value = float(text)
         if not math.isfinite(value):
             raise StrictYamlError(line, f"{_shown(text)} is too large for a number")
         return value
-    if _NOT_FINITE.fullmatch(text):
+    if re.fullmatch(_NOT_FINITE, text):
         raise StrictYamlError(line, f"{text} is not a finite number; leave the key out if there is no bound")
-    if _SEXAGESIMAL.fullmatch(text):
+    if re.fullmatch(_SEXAGESIMAL, text):
         raise StrictYamlError(line, _sexagesimal(text))
-    if zeros := _LEADING_ZERO.fullmatch(text):
+    if zeros := re.fullmatch(_LEADING_ZERO, text):
         plain = zeros[1] + (zeros[2].lstrip("0") or "0") if "." not in zeros[2] else zeros[1] + zeros[2]
         what = f"{_shown(text)} begins with 0, which YAML may read as octal"
         raise StrictYamlError(line, f"{what}; write {_shown(plain)}, or quotes for text")
-    if _OTHER_BASE.fullmatch(text):
-        raise StrictYamlError(line, f"{_shown(text)} is not decimal; write a decimal number, or quotes for text")
-    if _UNDERSCORE.fullmatch(text):
+    if re.fullmatch(_OTHER_BASE, text):
+        raise StrictYamlError(line, f"{_shown(text)} is not decimal; write it in decimal, or in quotes")
+    if re.fullmatch(_UNDERSCORE, text):
         plain = text.replace("_", "")
         raise StrictYamlError(line, f"{_shown(text)} has underscores; write {_shown(plain)}")
-    if (near := _LIKE_FLOAT.fullmatch(text)) and (near[2] or near[3]):
+    if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
         sign, whole, part, exponent_sign, exponent = near.groups()
         better = f"{sign.replace('+', '')}{whole or '0'}.{part or '0'}"
         if exponent:
             better += f"e{exponent_sign or '+'}{exponent}"
         what = f"{_shown(text)} is text to YAML, not a number"
         raise StrictYamlError(line, f"{what}; write {_shown(better)}, or quotes for text")
-    if _TIMESTAMP.fullmatch(text):
+    if re.fullmatch(_TIMESTAMP, text):
         raise StrictYamlError(line, f'{_shown(text)} is a date to YAML; write "{text}" for text')
     return text
 
@@ -305,8 +308,13 @@ def _sexagesimal(text: str) -> str:
 
 
 def _check_text(text: str, line: int) -> None:
-    if control := _CONTROL.search(text):
-        raise StrictYamlError(line, f"control character U+{ord(control.group()):04X} in a text; remove it")
+    """No terminal escapes and no half characters, which quotes can smuggle in as "\\e" or "\\ud800"."""
+    if text.isascii() and text.isprintable():
+        return
+    for character in set(text) - {"\t", "\n"}:
+        if not _is_text(ord(character)) or character == "\r":
+            what = f"control character U+{ord(character):04X} in a text"
+            raise StrictYamlError(line, f"{what}; remove it")
 
 
 def _shown(text: str) -> str:

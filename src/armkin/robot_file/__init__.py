@@ -15,7 +15,6 @@ from pydantic import ValidationError
 
 from armkin import strict_yaml
 from armkin.errors import FileError, RobotFileError
-from armkin.robot_file import messages
 from armkin.robot_file.model import (
     DH,
     Board,
@@ -75,6 +74,8 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     try:
         robot = _validated(document.data)
     except ValidationError as error:
+        from armkin.robot_file import messages  # for invalid files only
+
         problems = sorted(
             (document.line(path), f"{_where(path, document.data)}{text}")
             for path, text in messages.told(error.errors(include_url=False))
