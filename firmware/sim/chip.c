@@ -8,16 +8,15 @@
 #include <avr_uart.h>
 #include <sim_avr.h>
 #include <sim_core.h>
-#include <sim_elf.h>
 
 #include "inputs.h"
 #include "line.h"
 #include "pins.h"
+#include "program.h"
 #include "uart.h"
 
 enum { MCUSR = 0x54, WDTCSR = 0x60 };             /* data-space addresses on both chips */
 enum { WDCE = 0x10, WDE = 0x08 };
-enum { DATA_OFFSET = 0x800000 };                  /* where the linker puts the data space */
 enum { BOOTLOADER_STACK = 64 };
 
 const board *chip_board;
@@ -25,7 +24,6 @@ avr_t *chip;
 bool chip_stop;
 double chip_bootloader_ms = -1;
 
-static elf_firmware_t program;
 static uint64_t base;                 /* cycles before the present chip was made */
 static uint64_t boot_end;             /* the bootloader runs until then */
 static uint64_t random_state;
@@ -115,13 +113,6 @@ static void on_log(avr_t *avr, const int wanted, const char *format, va_list val
         vfprintf(stderr, format, values);
 }
 
-long chip_symbol(const char *name) {
-    for (uint32_t i = 0; i < program.symbolcount; i++)
-        if (program.symbol[i]->addr >= DATA_OFFSET && !strcmp(program.symbol[i]->symbol, name))
-            return (long)(program.symbol[i]->addr & 0xFFFF);
-    return -1;
-}
-
 static bool in_sram(long address, int n) { return address > 0 && n > 0 && address + n - 1 <= chip->ramend; }
 
 bool chip_peek(long address, uint8_t *bytes, int n) {
@@ -155,9 +146,7 @@ bool chip_load(const board *b, const char *elf, uint64_t seed) {
     avr_global_logger_set(on_log);
     chip_board = b;
     random_state = seed * 0x9E3779B97F4A7C15ULL | 1;
-    if (elf_read_firmware(elf, &program))
-        return false;
-    return program.flashsize > 0;
+    return program_load(elf);
 }
 
 static avr_t *make_chip(void) {
@@ -196,7 +185,7 @@ void chip_reset(reset_kind kind) {
 
     if (!pattern) {
         pattern = calloc(1, (size_t)top + 1);
-        long end = chip_symbol("__heap_start");
+        long end = program_symbol("_end");
         stack_floor = end > 0 ? end : sram;
         lowest_touched = top + 1;
     }

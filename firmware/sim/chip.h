@@ -37,8 +37,7 @@ struct avr_int_vector_t *chip_vector(int number);
 /* When the interrupt that is being served was raised; 0 outside of interrupts. */
 uint64_t chip_interrupt_raised(void);
 
-/* Data-space address of a variable of the program, -1 if unknown. */
-long chip_symbol(const char *name);
+/* The chip's data space. */
 bool chip_peek(long address, uint8_t *bytes, int n);
 bool chip_poke(long address, const uint8_t *bytes, int n);
 

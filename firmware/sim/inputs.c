@@ -54,12 +54,22 @@ static void drive(char port, int bit, int level) {
     apply(port, bit);
 }
 
+/* The contact connects the pin to ground; open, the pin is left to the chip's pull-up. */
+static void set_contact(limit_switch *s, bool closed) {
+    s->contact = closed;
+    drive(s->port, s->bit, closed ? INPUT_LOW : INPUT_RELEASED);
+}
+
+static bool wanted(const limit_switch *s) { return s->pressed != s->set.normally_closed; }
+
 void inputs_attach(avr_t *avr) {
     (void)avr;
     for (int p = 0; p < 16; p++)
         for (int bit = 0; bit < 8; bit++)
             if (driven[p].mask >> bit & 1)
                 apply((char)('A' + p), bit);
+    for (int i = 0; i < switch_count; i++)    /* the timers of bouncing contacts went with the old chip */
+        set_contact(&switches[i], wanted(&switches[i]));
 }
 
 bool inputs_drive(const char *pin, int level) {
@@ -70,14 +80,6 @@ bool inputs_drive(const char *pin, int level) {
     drive(port, bit, level);
     return true;
 }
-
-/* The contact connects the pin to ground; open, the pin is left to the chip's pull-up. */
-static void set_contact(limit_switch *s, bool closed) {
-    s->contact = closed;
-    drive(s->port, s->bit, closed ? INPUT_LOW : INPUT_RELEASED);
-}
-
-static bool wanted(const limit_switch *s) { return s->pressed != s->set.normally_closed; }
 
 static avr_cycle_count_t on_bounce(avr_t *avr, avr_cycle_count_t when, void *param) {
     (void)avr;
@@ -151,8 +153,10 @@ bool inputs_force_switch(const char *pin, int pressed) {
         pressed = 0;
     if (pressed < 0)
         pressed = beyond(s, pins_position(s->set.axis));
-    press(s, pressed);
-    set_contact(s, wanted(s));
+    if (s->pressed == pressed)
+        set_contact(s, wanted(s));
+    else
+        press(s, pressed);
     return true;
 }
 

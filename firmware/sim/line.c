@@ -8,6 +8,7 @@
 
 line_noise line_way[2];
 double line_host_baud;
+int line_stop_byte = -1;
 
 /* Growing byte queues; bytes leave at `head`. */
 typedef struct {
@@ -102,6 +103,8 @@ void line_put(uint8_t byte) {
         return;
     uint8_t b = (uint8_t)passed;
     push(&queues[LINE_OUT], &b, 1);
+    if (b == line_stop_byte)
+        chip_stop = true;
 }
 
 void line_json(FILE *out) {

@@ -22,6 +22,9 @@ extern line_noise line_way[2];
 /* True bits per second of the host's side; 0 = the standard rate nearest to the board's. */
 extern double line_host_baud;
 
+/* A byte towards the host that makes chip_run_until() return at once; -1: none. */
+extern int line_stop_byte;
+
 void line_seed(int way, uint64_t seed);
 
 /* Host side. */

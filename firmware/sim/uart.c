@@ -43,12 +43,12 @@ static double board_baud(void) {
 /* The host's true rate: as given, else the standard rate that the board's divider approximates. */
 static double host_baud(void) {
     static const double standard[] = {9600, 19200, 38400, 57600, 115200, 230400, 250000, 500000, 1000000, 2000000};
-    double board = board_baud();
+    double ours = board_baud();
     if (line_host_baud > 0)
         return line_host_baud;
-    double best = board, distance = 0.03;
+    double best = ours, distance = 0.03;
     for (size_t i = 0; i < sizeof standard / sizeof *standard; i++) {
-        double off = fabs(board / standard[i] - 1);
+        double off = fabs(ours / standard[i] - 1);
         if (off < distance) {
             distance = off;
             best = standard[i];

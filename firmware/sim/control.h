@@ -1,0 +1,31 @@
+/* The control channel: one command a line, one line of JSON back. `help` lists the commands. */
+#ifndef SIM_CONTROL_H
+#define SIM_CONTROL_H
+
+#include <poll.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+extern bool control_quit;
+extern bool control_stepped;              /* time moves by `run` only */
+
+bool control_listen(const char *path);    /* a UNIX socket */
+void control_stdin(bool until_end);       /* read commands from standard input; its end quits if `until_end` */
+void control_end(void);
+int control_wait_for(struct pollfd *fds); /* at most CONTROL_FDS */
+void control_service(void);
+
+enum { CONTROL_FDS = 10 };
+
+/* Run the chip and what `after` has put off until then. */
+void control_run_until(uint64_t cycle);
+
+/* Carry out one command, write the reply with its newline. */
+void control_execute(char *line, FILE *reply);
+void control_stats(FILE *out);
+
+/* "3ms", "250us", "2s", "800cycles", "800" (cycles) to cycles; false: no such time. */
+bool control_time(const char *text, uint64_t *cycles);
+
+#endif

@@ -1,0 +1,51 @@
+#include "pace.h"
+
+#include <time.h>
+
+#include "chip.h"
+
+double pace_speed = 1;
+uint64_t pace_ahead = CLOCK_HZ / 20;
+
+/* A simulator that fell behind (a busy machine) lets its clock slip by what exceeds this, rather than
+ * race through the lost time while the host has had no chance to answer. */
+static const int64_t MOST_CATCHING_UP = 20000000;
+
+static int64_t anchor_real;
+static uint64_t anchor_cycle, host_cycle;
+static int64_t slipped;
+
+static int64_t now_ns(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+void pace_reset(void) {
+    anchor_real = now_ns();
+    anchor_cycle = chip_now();
+}
+
+void pace_host_spoke(void) { host_cycle = chip_now(); }
+
+int64_t pace_wait(void) {
+    double speed = pace_speed;
+    if (speed <= 0) {
+        if (chip_now() < host_cycle + pace_ahead) {
+            pace_reset();
+            return 0;
+        }
+        speed = 1;
+    }
+    int64_t due = anchor_real + (int64_t)((double)(chip_now() - anchor_cycle) * (1e9 / CLOCK_HZ) / speed);
+    int64_t wait = due - now_ns();
+    if (wait < -MOST_CATCHING_UP) {
+        slipped -= wait;
+        pace_reset();
+    }
+    return wait > 0 ? wait : 0;
+}
+
+void pace_json(FILE *out) {
+    fprintf(out, "{\"speed\": %g, \"slipped_ms\": %.3f}", pace_speed, (double)slipped / 1e6);
+}

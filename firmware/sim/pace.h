@@ -1,0 +1,19 @@
+/* How fast simulated time runs. */
+#ifndef SIM_PACE_H
+#define SIM_PACE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+extern double pace_speed;                 /* simulated per real second; 0: as fast as possible */
+
+/* At speed 0, how far simulated time may run away from the host, in cycles after its last byte. */
+extern uint64_t pace_ahead;
+
+void pace_reset(void);
+void pace_host_spoke(void);
+int64_t pace_wait(void);                  /* nanoseconds to wait before simulating on */
+void pace_json(FILE *out);
+
+#endif
