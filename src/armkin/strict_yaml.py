@@ -132,6 +132,9 @@ def _parse(text: str) -> Iterator[Any]:
         begin = error.context_mark.line + 1 if error.context_mark else line
         where = f" ({error.context} that begins on line {begin})" if begin < line else ""
         hint = "check the colon and space after keys, the indentation, brackets and quotes"
+        if problem.startswith("mapping values are not allowed"):
+            problem = "a key inside a value"
+            hint = "text with ': ' in it needs quotes; the keys of one mapping are indented alike"
         raise StrictYamlError(line, f"not YAML: {problem}{where}; {hint}") from None
     except yaml.YAMLError as error:  # the reader's: a character that YAML has no place for
         raise StrictYamlError(0, f"not YAML: {' '.join(str(error).split())}") from None
