@@ -243,17 +243,20 @@ def _perpendicular(z: Array) -> Array:
 def _motors(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     """Pulses per rad | mm of every motor and joint, and the pulses at home (servos only).
 
-    A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley; a
-    servo's pulse width is linear in its joint over `travel`.
+    A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley,
+    counted from home; a servo's pulse width is linear in its joint over `travel`, and
+    `invert` mirrors it (for a stepper it is wiring: the level of DIR, not the count).
     """
     index = {joint.name: i for i, joint in enumerate(file.joints)}
+    home = [joint.home for joint in file.joints]
     motors = file.motor_list()
     gain = np.zeros((len(motors), len(file.joints)))
     bias = np.zeros(len(motors))
     for k, motor in enumerate(motors):
+        servo = motor.travel if motor.kind == "servo" and motor.pulse_us is not None else None
+        turn = -1.0 if servo is not None and motor.invert else 1.0
         for name, weight in motor.joints.items():
-            gain[k, index[name]] = weight * motor.pulses_per_unit(file.joints[index[name]].type)
-        if motor.kind == "servo":
-            home = sum(w * file.joints[index[name]].home for name, w in motor.joints.items())
-            bias[k] = motor.pulse_at(home)
+            gain[k, index[name]] = turn * weight * motor.pulses_per_unit()
+        if servo is not None and motor.pulse_us is not None:
+            bias[k] = motor.pulse_us[0] + (motor.zero - servo[0]) * motor.pulses_per_unit() + gain[k] @ home
     return gain / unit, bias
