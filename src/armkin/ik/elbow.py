@@ -7,18 +7,25 @@ al., Robotics, 2.12.2 and 2.12.4).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import FLIP, Chain, inverse
+from armkin.ik.chain import FLIP, Chain, inverse, is_parallel
+from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
 
 
 class Elbow:
-    """``link[0] Z1 link[1] Z2 link[2] Z3 m``: joints 2 and 3 revolute and parallel.
+    """``link[0] Z1 link[1] Z2 link[2] Z3 tip``: joints 2 and 3 revolute and parallel.
 
-    `plane_to_tip` is the planar rigid motion after joint 3 to the tip (a point), all in the frame of joint 2.
+    All inside is seen from the frame of joint 2, in whose x-y plane the arm bends.
     """
 
     def __init__(self, chain: Chain, tip: Array) -> None:
@@ -85,3 +92,55 @@ class Elbow:
 def any_branch(doubt: Array) -> Array:
     """Whether any branch of a pose is in doubt: (b0, b1, b2, N) -> (N,)."""
     return np.asarray(doubt.reshape(-1, doubt.shape[-1]).any(axis=0)) if doubt.ndim > 1 else doubt
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_pitch, xyz_pitch_roll."""
+    n = {"xyz": 3, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
+    if n != arm.n or arm.prismatic[1:].any():
+        return None
+    parallels = 2 if n == 3 else 3
+    link = arm.link.copy()
+    for i in range(2, parallels + 1):
+        if not is_parallel(link[i], EXACT):
+            return None
+    if arm.prismatic[0] and abs(link[1][2, 2]) < 1e-6:
+        return None  # the slide lies in the arm's plane
+    why = "joints 2 and 3 are parallel" if n == 3 else "joints 2, 3 and 4 are parallel"
+    if n == 3:
+        elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
+
+        def xyz(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+            return elbow.solve(goal, [0.0, 0.0, 0.0], prefer)
+
+        return Geometry("elbow", why, True, xyz, labels=("shoulder", "elbow"))
+
+    elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
+    # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
+    past = soa.constant(link[4])
+    # Rz(q2) R2 Rz(q3) R3 Rz(q4) = Rz(q2 +- q3 +- q4) R2 R3, the signs those of antiparallel axes
+    sense = [float(v) for v in task.sums[0][1:4] / task.sums[0][1]]
+    turned = soa.constant(link[2] @ link[3])
+
+    def pitch(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        total = (goal[3] - task.offsets[0]) / task.sums[0][1]
+        c, s = soa.cos_sin(total)
+        if n == 5:
+            q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
+            fifth = Pair(*soa.cos_sin(q5))
+            P = soa.times(soa.rotate(past, *fifth), soa.constant(link[5]))
+            tip = P[9:12]
+        else:
+            fifth = None
+            tip = past[9:12]
+        x, y, z = soa.turn(turned, tip)
+        offset = [soa.sub(soa.mul(c, x), soa.mul(s, y)), soa.add(soa.mul(s, x), soa.mul(c, y)), z]
+        pairs, doubt = elbow.solve(goal[:3], offset, prefer)
+        # joint 4 takes what is left of the sum
+        c4, s4 = c, s
+        for pair, g in zip(pairs[1:], sense[:2], strict=True):
+            c4, s4 = c4 * pair.c + g * s4 * pair.s, s4 * pair.c - g * c4 * pair.s
+        fourth = Pair(c4, sense[2] * s4)
+        return [*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt
+
+    return Geometry("elbow with pitch", why, True, pitch, labels=("shoulder", "elbow"))

@@ -15,14 +15,21 @@ Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
 from armkin.ik.elbow import any_branch
+from armkin.ik.geometry import Geometry
 from armkin.ik.subproblems import Pair, linear, quadratic, rotation_between, trig_quadratic
+from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
 
 
 class Position:
@@ -49,7 +56,7 @@ class Position:
         self.square = self._form(self.Y)  # |y|^2
         self.rows, self.rest, self.forms = self._equations(L1)
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
-        self._split()
+        self.why = self._split()
 
     def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
         """What joint 1 cannot change, as ``rows[k] . g + form_k(b) = known_k - rest[k]``."""
@@ -60,8 +67,8 @@ class Position:
         # height: R[2] . g + t_z; half the squared distance: (|y|^2 or |g|^2) / 2 + (R^T t) . g + |t|^2 / 2
         return np.array([R[2], R.T @ t]), np.array([t[2], t @ t / 2]), [none, self.square / 2]
 
-    def _split(self) -> None:
-        """Find the combination of the two equations without q2, if there is one."""
+    def _split(self) -> str:
+        """Find the combination of the two equations without q2, if there is one; say what was found."""
         weight = np.array([1.0, 1.0 if self.prismatic[0] else 1.0 / self.scale])
         scaled = self.A * weight[:, None]
         if self.prismatic[1]:
@@ -69,13 +76,14 @@ class Position:
             self.regular = abs(self.rows[0, 2]) > 1e-9 if not self.prismatic[0] else False
             if self.prismatic[0] and np.abs(self.A).max() < 1e-9:
                 raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
-            return
+            return "joint 2 slides: its value is eliminated, joint 3 follows"
         U, S, _ = np.linalg.svd(scaled)
         if S[0] < 1e-9:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
         self.regular = bool(S[1] > 1e-7 * S[0])
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
         self.main = U[:, 0] * weight  # the one that gives q2
+        return "general axes: a quartic in joint 3" if self.regular else "special axes: joint 3 alone, then joint 2"
 
     def _form(self, rows: Array) -> Array:
         """Quadratic form G with ``b^T G b = |rows b|^2`` (3 x 3); prismatic powers above two stay inside."""
@@ -280,3 +288,12 @@ def _square(six: Array) -> Array:
 def _expand(six: Array) -> list[Array]:
     """Six coefficients in (1, d, d^2) as b, to the powers d^0 ... d^4."""
     return [six[0], six[1], six[3] + six[2], six[4], six[5]]
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Any three joints that place a point."""
+    if task.name != "xyz" or arm.n != 3:
+        return None
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3])
+    kinds = "".join("P" if p else "R" for p in arm.prismatic)
+    return Geometry("three joints", f"{kinds}: {position.why}", True, position.solve)

@@ -1,0 +1,140 @@
+"""Targets on an edge: merging roots, singular postures, self-motions, boundaries.
+
+The closed forms say which targets are in doubt; these few are examined here, branch by
+branch, with the Jacobian: the general mechanism behind the words exact, boundary,
+singular and unreachable.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.ik import numeric
+from armkin.ik.solutions import Status
+from armkin.ik.tasks import Task
+from armkin.soa import Array
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+Bool = NDArray[np.bool_]
+
+SOLUTION = 1e-9  # of the reach: what counts as a solution
+WEAK = 1e-5  # smallest singular value below which a branch may be a double root or part of a self-motion
+STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
+
+
+class Examined(NamedTuple):
+    """q (K, B, n) corrected, valid (K, B), status (K,), free (K, n)."""
+
+    q: Array
+    valid: Bool
+    status: NDArray[np.int8]
+    free: Bool
+
+
+def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
+    """Correct, merge and classify candidate branches q (K, B, n), nan where there is none."""
+    K, B, n = q.shape
+    flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
+    rough = numeric.missing(arm, task, np.nan_to_num(flat), goals)
+    some = np.flatnonzero(~np.isnan(flat).any(axis=1) & (rough < 1e-3))
+    size = np.full(len(flat), np.inf)
+    if len(some):
+        flat[some], size[some] = numeric.correct(arm, task, flat[some], goals[some], steps=10)
+    # closer than the accuracy of the arithmetic to a double root: the residual is small, not zero
+    valid = (size <= SOLUTION).reshape(K, B)
+    q = flat.reshape(K, B, n)
+    sigma = np.ones((K, B))
+    nullity = np.zeros((K, B), dtype=np.int64)
+    V = np.zeros((K, B, n, n))
+    found = np.argwhere(valid)
+    if len(found):
+        k, b = found.T
+        sigma[k, b], V[k, b], nullity[k, b] = numeric.null_space(arm, task, q[k, b], target[k])
+    valid = _merge(arm, q, valid, sigma, size.reshape(K, B))
+    status = np.where(valid.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
+    free = np.zeros((K, n), bool)
+    weak = np.argwhere(valid & (sigma < WEAK))
+    if len(weak):
+        k, b = weak.T
+        moving, joints = _self_motion(arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k])
+        double = ~moving
+        status[k[double]] = Status.BOUNDARY
+        status[k[moving]] = Status.SINGULAR
+        for row, who in zip(k[moving], joints[moving], strict=True):
+            free[row] |= who
+        valid = _one_of_a_curve(arm, task, q, valid, k[moving], b[moving], free, target)
+    return Examined(q, valid, status, free)
+
+
+def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> Bool:
+    """Keep one of each cluster; the radius grows where the Jacobian is weak: rounding / sigma."""
+    valid = valid.copy()
+    radius = 1e-7 + np.minimum(1e-13 / np.maximum(sigma, 1e-300), 3e-4)
+    B = q.shape[1]
+    for i in range(B):
+        for j in range(i + 1, B):
+            both = valid[:, i] & valid[:, j]
+            if not both.any():
+                continue
+            near = numeric.wrapped_distance(arm, q[:, i], q[:, j]) < np.maximum(radius[:, i], radius[:, j])
+            same = both & near
+            worse_i = size[:, i] > size[:, j]
+            valid[same & worse_i, i] = False
+            valid[same & ~worse_i, j] = False
+    return valid
+
+
+def _self_motion(
+    arm: Arm, task: Task, q: Array, V: Array, nullity: NDArray[np.int64], target: Array
+) -> tuple[Bool, Bool]:
+    """Whether the joints can move while the target is kept, and which do.
+
+    A step along each null direction, both ways, pulled back onto the target: on a
+    self-motion it stays about as far from q as it went; from a double root it falls back.
+    """
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    moving = np.zeros(len(q), bool)
+    joints = np.zeros(q.shape, bool)
+    for index in range(int(nullity.max())):
+        who = np.flatnonzero(nullity > index)
+        for way in (1.0, -1.0):
+            step = way * STEP * V[who, arm.n - 1 - index] * unit
+            there, size = numeric.correct(arm, task, q[who] + step, target[who], steps=12)
+            moved = np.abs(there - q[who]) / unit
+            far = (moved.max(axis=1) > 0.3 * STEP * np.abs(V[who, arm.n - 1 - index]).max(axis=1)) & (size < 1e-11)
+            moving[who] |= far
+            joints[who] |= far[:, None] & (moved > 1e-3 * STEP)
+    return moving, joints
+
+
+def _one_of_a_curve(
+    arm: Arm,
+    task: Task,
+    q: Array,
+    valid: Bool,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    free: Bool,
+    target: Array,
+) -> Bool:
+    """A self-motion is reported by one of its points: drop singular branches that differ in free joints alone."""
+    valid = valid.copy()
+    for k in np.unique(rows):
+        mine = columns[rows == k]
+        kept: list[int] = []
+        held = ~free[k]
+        for b in mine:
+            if not valid[k, b]:
+                continue
+            d = q[k, kept] - q[k, b]
+            d = np.where(arm.prismatic, d / arm.reach, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+            if len(kept) and (np.abs(d[:, held]).max(axis=1, initial=0.0) < 1e-5).any():
+                valid[k, b] = False
+            else:
+                kept.append(int(b))
+    return valid

@@ -1,0 +1,85 @@
+"""Whole turns and limits: which copy of a joint value is legal and nearest."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.soa import Array, Entry
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+TURN = 2 * np.pi
+SLACK = 1e-9  # [rad | mm] a joint this far outside still counts as on its limit
+
+
+def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
+    """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
+
+    value: any shape, in (-pi, pi]; near: broadcastable [rad]. Returns the values and
+    whether they are within [lower, upper]; where no copy is, the one nearest to `near`.
+    """
+    if not (isinstance(near, float) and near == 0.0):
+        value = value + TURN * np.rint((near - value) / TURN)
+        low, high = float(np.min(near)) - np.pi, float(np.max(near)) + np.pi
+    else:
+        low, high = -np.pi, np.pi
+    if lower == -np.inf and upper == np.inf:
+        return value, True
+    below, above = value < lower - SLACK, value > upper + SLACK
+    # another copy can only help if the limits reach beyond the turn around `near`
+    if upper > high - SLACK and below.any():
+        moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
+        fits = below & (moved <= upper + SLACK)
+        value, below = np.where(fits, moved, value), below & ~fits
+    if lower < low + SLACK and above.any():
+        moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
+        fits = above & (moved >= lower - SLACK)
+        value, above = np.where(fits, moved, value), above & ~fits
+    return value, ~(below | above)
+
+
+def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
+    out = q.copy()
+    inside = np.ones(q.shape[:-1], bool)
+    for i in range(arm.n):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        if arm.prismatic[i]:
+            ok: Entry = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
+        else:
+            wrapped = q[..., i] - TURN * np.rint(q[..., i] / TURN)
+            out[..., i], ok = nearest_copy(wrapped, near[..., i], lower, upper)
+        inside &= ok
+    return out, inside
+
+
+def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+    """All copies of one branch within the limits, the one nearest to `near` first.
+
+    q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n). An unlimited revolute
+    joint has copies without end: it gives the one nearest to `near` alone.
+    """
+    row = np.asarray(q, dtype=float)
+    close = arm.home if near is None else np.asarray(near, dtype=float)
+    choices = []
+    for i in range(arm.n):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        if arm.prismatic[i]:
+            inside = lower - SLACK <= row[i] <= upper + SLACK
+            choices.append([float(row[i])] if inside else [])
+        elif not (np.isfinite(lower) and np.isfinite(upper)):
+            value, ok = nearest_copy(row[i : i + 1] % TURN, close[i], lower, upper)
+            choices.append([float(value[0])] if np.all(ok) else [])
+        else:
+            first = int(np.ceil((lower - SLACK - row[i]) / TURN))
+            last = int(np.floor((upper + SLACK - row[i]) / TURN))
+            choices.append([float(row[i] + TURN * k) for k in range(first, last + 1)])
+    rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
+    unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
+    motion = (np.abs(rows - close) * unit).sum(axis=1)
+    return rows[np.argsort(motion, kind="stable")]

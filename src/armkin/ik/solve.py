@@ -1,0 +1,229 @@
+"""`armkin.ik`: from targets to all branches within limits.
+
+The way of a target: task -> geometry -> candidate branches -> residual of each, through the
+forward kinematics -> whole turns and limits -> the few doubtful ones through `edges`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin import soa
+from armkin.errors import UsageError
+from armkin.ik import edges
+from armkin.ik.geometry import Geometry, solver
+from armkin.ik.limits import SLACK, nearest_copy, nearest_row
+from armkin.ik.names import branch_names
+from armkin.ik.solutions import Solutions, Status
+from armkin.ik.subproblems import Pair
+from armkin.ik.tasks import Task, read_targets
+from armkin.soa import Array, Entry
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+Bool = NDArray[np.bool_]
+
+ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad
+NEARBY = 1e-6  # residual up to which a candidate is worth correcting
+
+
+class _Out(NamedTuple):
+    """Results of a batch, filled chunk by chunk."""
+
+    q: Array
+    valid: Bool
+    within: Bool
+    branch: NDArray[np.int8]
+    status: NDArray[np.int8]
+    free: Bool
+
+    def part(self, rows: slice) -> _Out:
+        return _Out(*(a[rows] for a in self))
+
+
+def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Solutions:
+    """All real branches of inverse kinematics.
+
+    targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
+    arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home.
+    Raises UsageError if the task does not fit the arm or a target is malformed.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> s = armkin.ik(arm, [390, 80, 300])
+    >>> s.names[s.branch[s.best]], np.rad2deg(s.q[s.best]).round(4).tolist()
+    ('left, elbow up', [10.1529, 44.656, -46.5354])
+    """
+    definition, geometry = solver(arm, task)
+    target, lead = read_targets(definition, targets)
+    close = arm.home if near is None else np.asarray(near, dtype=float)
+    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
+        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
+    if not np.isfinite(close).all():
+        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    each = close.reshape(-1, arm.n) if close.ndim > 1 else np.broadcast_to(close, (len(target), arm.n))
+    one = close if close.ndim == 1 else None
+    out = _closed(arm, definition, geometry, target, each, one) if geometry.pairs else _rows(arm, definition, geometry, target, each)
+    names = branch_names(arm, definition, geometry, out.q.shape[1])
+    return Solutions(
+        arm=arm,
+        task=definition,
+        target=target.reshape(lead + target.shape[1:]),
+        near=np.broadcast_to(close, (*lead, arm.n)),
+        q=out.q.reshape(*lead, *out.q.shape[1:]),
+        valid=out.valid.reshape(*lead, -1),
+        within_limits=out.within.reshape(*lead, -1),
+        branch=out.branch.reshape(*lead, -1),
+        status=out.status.reshape(lead),
+        free=out.free.reshape(*lead, arm.n),
+        names=names,
+        method=geometry.name,
+        why=geometry.why,
+        complete=geometry.complete,
+    )
+
+
+def _empty(N: int, B: int, n: int) -> _Out:
+    return _Out(
+        np.empty((N, B, n)),
+        np.empty((N, B), bool),
+        np.empty((N, B), bool),
+        np.empty((N, B), np.int8),
+        np.zeros(N, np.int8),
+        np.zeros((N, n), bool),
+    )
+
+
+def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
+    """Closed forms: chunks of poses that stay in the cache, entry by entry."""
+    assert geometry.pairs is not None
+    link = [soa.constant(L) for L in arm.link]
+    out: _Out | None = None
+    for start in range(0, max(len(target), 1), soa.CHUNK):
+        rows = slice(start, start + soa.CHUNK)
+        goal = target[rows]
+        entries = soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+        close: list[Entry] = list(one) if one is not None else list(np.ascontiguousarray(near[rows].T))
+        prefer = [
+            Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(close, arm.prismatic, strict=True)
+        ]
+        pairs, doubt = geometry.pairs(entries, prefer)
+        miss = _miss(arm, task, link, pairs, entries)
+        values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
+        if len(task.sums):
+            miss = np.maximum(miss, _sum_miss(task, values, entries))
+        valid = miss <= ACCEPTED**2
+        shape = valid.shape
+        B, N = int(np.prod(shape[:-1])), len(goal)
+        if out is None:
+            out = _empty(len(target), B, arm.n)
+        part = out.part(rows)
+        if N == 0:
+            break
+        within = valid
+        for i in range(arm.n):
+            lower, upper = float(arm.lower[i]), float(arm.upper[i])
+            value, inside = values[i], True
+            if arm.prismatic[i]:
+                if np.isfinite([lower, upper]).any():
+                    inside = (value >= lower - SLACK) & (value <= upper + SLACK)
+            else:
+                v = float(close[i]) if one is not None else close[i]
+                value, inside = nearest_copy(value, v, lower, upper)
+            part.q[:, :, i] = np.broadcast_to(value, shape).reshape(B, N).T
+            if inside is not True:
+                within = within & inside
+        part.valid[...] = valid.reshape(B, N).T
+        part.within[...] = within.reshape(B, N).T
+        part.branch[...] = np.arange(B, dtype=np.int8)
+        count = part.valid.sum(axis=1)
+        part.status[count == 0] = Status.UNREACHABLE
+        worth = (miss <= NEARBY**2) & ~valid
+        doubt = doubt | worth.reshape(B, N).any(axis=0)
+        _tidy(arm, task, part, goal, near[rows], np.flatnonzero(doubt), count < B)
+    assert out is not None
+    return out
+
+
+def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
+    """Solvers that return joint values row by row."""
+    assert geometry.rows is not None
+    q, doubt = geometry.rows(target)
+    B = q.shape[1]
+    out = _empty(len(target), B, arm.n)
+    out.q[...], inside = nearest_row(arm, q, near[:, None, :])
+    out.valid[...] = ~np.isnan(q).any(axis=2)
+    out.within[...] = inside & out.valid
+    out.branch[...] = np.where(out.valid, np.arange(B), -1)
+    count = out.valid.sum(axis=1)
+    out.status[count == 0] = Status.UNREACHABLE
+    _tidy(arm, task, out, target, near, np.flatnonzero(doubt), count < B)
+    return out
+
+
+def _tidy(
+    arm: Arm, task: Task, part: _Out, goal: Array, near: Array, doubtful: NDArray[np.intp], partial: Bool
+) -> None:
+    """Examine the doubtful targets; then move every target's branches to the front, nan behind."""
+    if len(doubtful):
+        seen = edges.examine(arm, task, part.q[doubtful], goal[doubtful])
+        q, inside = nearest_row(arm, np.nan_to_num(seen.q), near[doubtful][:, None, :])
+        part.q[doubtful] = q
+        part.valid[doubtful] = seen.valid
+        part.within[doubtful] = inside & seen.valid
+        part.status[doubtful] = seen.status
+        part.free[doubtful] = seen.free
+        partial[doubtful] |= ~seen.valid.all(axis=1)
+    some = np.flatnonzero(partial)
+    if len(some):
+        order = np.argsort(~part.valid[some], axis=1, kind="stable")
+        valid = np.take_along_axis(part.valid[some], order, axis=1)
+        part.valid[some] = valid
+        part.within[some] = np.take_along_axis(part.within[some], order, axis=1)
+        branch = np.take_along_axis(part.branch[some], order, axis=1)
+        part.branch[some] = np.where(valid, branch, -1)
+        q = np.take_along_axis(part.q[some], order[:, :, None], axis=1)
+        q[~valid] = np.nan
+        part.q[some] = q
+
+
+def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Array:
+    """Squared residual of every branch, from its pairs: (b0, b1, b2, N), lengths in units of the reach."""
+    P = link[0]
+    for i, pair in enumerate(pairs):
+        P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, pair.c, pair.s)
+        P = soa.times(P, link[i + 1])
+    where = goal[9:12] if task.orientation == "full" else goal[: task.position]
+    total: Entry = 0.0
+    for k, wanted in enumerate(where):
+        d = P[9 + k] - wanted
+        total = soa.add(total, d * d)
+    total = total * (1.0 / arm.reach**2)
+    if task.orientation == "full":
+        # two columns of a rotation determine the third
+        compare = [(k, goal[k]) for k in (0, 1, 2, 6, 7, 8)]
+    elif task.orientation == "axis":
+        compare = [(6 + k, goal[3 + k]) for k in range(3)]
+    else:
+        compare = []
+    for k, wanted in compare:
+        d = P[k] - wanted
+        total = total + d * d
+    shape = np.broadcast_shapes(*(np.shape(x) for pair in pairs for x in pair if x is not None), np.shape(total), (1, 1, 1, 1))
+    return np.broadcast_to(total, shape)
+
+
+def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Array:
+    """Squared residual of the sums of joint values, modulo whole turns."""
+    total: Entry = 0.0
+    for k, weights in enumerate(task.sums):
+        angle = goal[task.position + k] - task.offsets[k]
+        for w, value in zip(weights, values, strict=True):
+            angle = soa.sub(angle, soa.mul(float(w), value))
+        angle = angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
+        total = soa.add(total, angle * angle)
+    return np.asarray(total)
