@@ -47,11 +47,13 @@ def problems(robot: RobotFile) -> Iterator[Problem]:
     if "\n" in robot.name or not robot.name.strip():
         yield ("name",), "must be one line of text"
     if "pitch_offset" in robot.model_fields_set and robot.task not in (None, *_PITCH_TASKS):
-        yield ("pitch_offset",), f"task {robot.task} has no pitch; it belongs to {' and '.join(_PITCH_TASKS)}"
+        yield ("pitch_offset",), f"task {robot.task} has no pitch; {' and '.join(_PITCH_TASKS)} have"
     if robot.convention == "screws" and robot.zero_pose is None:
-        yield ("convention",), "screws need zero_pose: {xyz: ..., rpy: ...}, the end frame when all joints are 0"
+        hint = "zero_pose: {xyz: [300, 0, 115]}, the end frame when all joints are 0"
+        yield ("convention",), f"screws needs {hint}"
     if robot.convention != "screws" and robot.zero_pose is not None:
-        yield ("zero_pose",), f"belongs to convention screws, not to {robot.convention}; use tool for a fixed frame"
+        message = f"belongs to convention screws, not to {robot.convention}; a fixed last frame is tool"
+        yield ("zero_pose",), message
     yield from _repeated("joint", [joint.name for joint in robot.joints], "joints")
     for i, joint in enumerate(robot.joints):
         for path, message in _joint(joint, robot.convention):
@@ -73,16 +75,16 @@ def _joint(joint: Joint, convention: str) -> Iterator[Problem]:
         yield ("sign",), "must be 1 or -1, not 0"
     if convention == "screws":
         if joint.dh is not None:
-            yield ("dh",), "convention screws takes no DH row; write screw: {w: ..., v: ...} or change convention"
+            yield ("dh",), "convention screws takes no DH row; write a screw, or change convention"
         if joint.screw is None:
-            yield (), "has no screw; convention screws needs screw: {w: [0, 0, 1], v: [0, 0, 0]} for each joint"
+            yield (), "has no screw; convention screws needs one: screw: {w: [0, 0, 1], v: [0, 0, 0]}"
         else:
             yield from _screw(joint)
     else:
         if joint.screw is not None:
-            yield ("screw",), f"convention {convention} takes no screw; write dh: {{...}} or change convention"
+            yield ("screw",), f"convention {convention} takes no screw; write dh, or change convention"
         if joint.dh is None:
-            yield (), f"has no dh; convention {convention} needs dh: {{alpha: 90, a: 0, d: 170}} for each joint"
+            yield (), f"has no dh; convention {convention} needs a row: dh: {{alpha: 90, a: 0, d: 170}}"
     yield from _range(joint)
     if joint.homing is not None:
         yield from _homing(joint)
@@ -95,7 +97,7 @@ def _range(joint: Joint) -> Iterator[Problem]:
     if lower > upper:
         yield ("limits",), f"lower {lower:g} is above upper {upper:g}; write [{upper:g}, {lower:g}]"
     elif lower == upper:
-        yield ("limits",), f"leave no room to move: {lower:g} to {upper:g}; a fixed joint belongs in base or tool"
+        yield ("limits",), f"{lower:g} to {upper:g} leave no room; a joint that never moves is no joint"
     elif not lower <= joint.home <= upper:
         if "home" in joint.model_fields_set:
             yield ("home",), f"{joint.home:g} is outside the limits {lower:g} to {upper:g}"
@@ -127,7 +129,7 @@ def _screw(joint: Joint) -> Iterator[Problem]:
     elif v is not None:
         pitch = dot(v, w) / length
         if abs(pitch) > _ROUNDING * max(1.0, math.hypot(*v)):
-            yield ("screw", "v"), f"v.w is {pitch:g} and must be 0: a revolute joint has no pitch (v = -w x q)"
+            yield ("screw", "v"), f"v.w is {pitch:g} and must be 0: a revolute joint has no pitch"
 
 
 def _unit(key: str, vector: Triple) -> Iterator[Problem]:
@@ -160,8 +162,8 @@ def _drive(drive: Drive) -> Iterator[Problem]:
     if drive.kind == "stepper":
         missing = [key for key in ("full_steps", "microsteps") if getattr(drive, key) is None]
         if missing and not any(key in given for key in _SERVO_KEYS):
-            example = "full_steps: 200, microsteps: 16"
-            yield (), f"a stepper needs {' and '.join(missing)}, for example {example} (an RC servo: kind: servo)"
+            example = "for example full_steps: 200, microsteps: 16 (an RC servo: kind: servo)"
+            yield (), f"a stepper needs {' and '.join(missing)}, {example}"
         elif not missing and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
             yield (), f"{drive.pulses_per_turn():g} pulses per turn; 0.001 to 1e9 can be right"
         return
@@ -186,7 +188,8 @@ def _servo_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
         angle = drive.zero + turn * value
         if not drive.travel[0] - 1e-9 <= angle <= drive.travel[1] + 1e-9:
             low, high = sorted(turn * (end - drive.zero) for end in drive.travel)
-            yield (at,), f"{value:g} needs servo angle {angle:g}; its travel allows joint values {low:g} to {high:g}"
+            message = f"{value:g} needs servo angle {angle:g}; its travel allows {low:g} to {high:g}"
+            yield (at,), message
             return
 
 
@@ -196,7 +199,7 @@ def _motors(robot: RobotFile) -> Iterator[Problem]:
         if drive is None:
             continue
         if robot.motors is not None:
-            yield ("joints", i, "drive"), "the file also has motors; put all of them there, or use drives only"
+            yield ("joints", i, "drive"), "the file also has motors; put all drives there, or use drives only"
         for path, message in _drive(drive):
             yield ("joints", i, "drive", *path), message
         if joint.type == "prismatic":
@@ -206,7 +209,7 @@ def _motors(robot: RobotFile) -> Iterator[Problem]:
             elif drive.lead is None:
                 yield ("joints", i, "drive"), "a prismatic joint's stepper needs lead, the mm per turn"
         elif drive.lead is not None:
-            yield ("joints", i, "drive", "lead"), "is for prismatic joints; use gear or pulley for a revolute one"
+            yield ("joints", i, "drive", "lead"), "is for prismatic joints; use gear or pulley"
         else:
             for path, message in _servo_reach(drive, joint):
                 yield ("joints", i, *path), message
@@ -241,7 +244,7 @@ def _determined(motors: tuple[Motor, ...]) -> Iterator[Problem]:
     for column, name in enumerate(names):
         pivot = max(rows, key=lambda row: abs(row[column]), default=None)
         if pivot is None or abs(pivot[column]) < 1e-9 * max(1.0, *(abs(x) for x in pivot)):
-            yield ("motors",), f"leave joint {name} undetermined: as many independent motors as joints are needed"
+            yield ("motors",), f"leave joint {name} undetermined; joints need as many independent motors"
             return
         rows = [
             [x - row[column] / pivot[column] * p for x, p in zip(row, pivot, strict=True)]
@@ -269,7 +272,9 @@ def _gripper(robot: RobotFile) -> Iterator[Problem]:
 def _axes(robot: RobotFile) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     drives: list[tuple[Path, Drive]] = [
-        (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
+        (("joints", i, "drive"), joint.drive)
+        for i, joint in enumerate(robot.joints)
+        if joint.drive is not None
     ]
     drives += [(("motors", i), motor) for i, motor in enumerate(robot.motors or ())]
     if robot.gripper is not None:

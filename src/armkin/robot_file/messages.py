@@ -7,12 +7,14 @@ becomes ``(path, text)``; the reader adds the file and the line.
 from collections.abc import Iterator
 from typing import Any
 
+from pydantic import BaseModel
+
 from armkin.robot_file import model
 
 Path = tuple[str | int, ...]
 
 # Which model the keys under a name belong to.
-_MODELS: dict[str, type[model.BaseModel]] = {
+_MODELS: dict[str, type[BaseModel]] = {
     "": model.RobotFile,
     "joints": model.Joint,
     "dh": model.DH,
@@ -234,7 +236,7 @@ def _nearest(word: str, choices: list[str]) -> str | None:
     return by_lower[near[0]] if near else None
 
 
-def _owner(path: Path) -> type[model.BaseModel]:
+def _owner(path: Path) -> type[BaseModel]:
     names = [part for part in path[:-1] if isinstance(part, str)]
     return _MODELS.get(names[-1] if names else "", model.RobotFile)
 
@@ -251,7 +253,7 @@ def _example(path: Path) -> str:
     return _EXAMPLES.get(key, "a mapping of keys")
 
 
-def _first_sentence(owner: type[model.BaseModel], key: str) -> str:
+def _first_sentence(owner: type[BaseModel], key: str) -> str:
     field = owner.model_fields.get(key)
     text = (field.description if field else None) or "see the schema"
     return text.split(". ")[0].split("; ")[0].rstrip(".")

@@ -43,10 +43,10 @@ def _ratio(value: Any) -> Any:
     """Teeth ``{motor: 16, joint: 80}`` to the reduction 5.0; a number stays what it is."""
     if not isinstance(value, dict):
         return value
-    motor, joint = value.get("motor"), value.get("joint")
-    if set(value) == {"motor", "joint"} and type(motor) is type(joint) is int:
-        if 1 <= motor <= 10_000 and 1 <= joint <= 10_000:
-            return joint / motor
+    motor, joint = value.get("motor", 0), value.get("joint", 0)
+    whole = type(motor) is type(joint) is int and len(value) == 2
+    if whole and 1 <= motor <= 10_000 and 1 <= joint <= 10_000:
+        return joint / motor
     raise PydanticCustomError("problem", "teeth are whole numbers from 1 to 10000: {motor: 16, joint: 80}")
 
 
@@ -73,9 +73,7 @@ Ratio = Annotated[
 
 class _Model(BaseModel):
     # defer_build: RobotFile's validator holds those of all the others, and is built by the reader.
-    model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class Pose(_Model):
@@ -90,10 +88,10 @@ class Pose(_Model):
 class DH(_Model):
     """One row of a Denavit-Hartenberg table."""
 
-    alpha: Angle = Field(description="Twist in degrees. With `convention: modified` it stands before the joint.")
-    a: Length = Field(description="Link length in mm. With `convention: modified` it stands before the joint.")
+    alpha: Angle = Field(description="Twist in degrees; with convention modified it stands before the joint.")
+    a: Length = Field(description="Link length in mm; with convention modified it stands before the joint.")
     d: Length = Field(description="Link offset in mm; a prismatic joint's value is added to it.")
-    theta: Angle = Field(0.0, description="Constant offset in degrees: DH angle = sign x joint value + theta.")
+    theta: Angle = Field(0.0, description="Offset in degrees: DH angle = sign x joint value + theta.")
 
 
 class Screw(_Model):
@@ -104,7 +102,7 @@ class Screw(_Model):
     )
     v: tuple[Length, Length, Length] | None = Field(
         None,
-        description="Linear part: -w x q for a point q on the axis; a prismatic joint's direction, of length 1.",
+        description="Linear part -w x q, q on the axis; a prismatic joint's direction, of length 1.",
     )
     q: tuple[Length, Length, Length] | None = Field(
         None, description="A point on the axis of a revolute joint, in mm, instead of `v`."
@@ -116,7 +114,8 @@ class Drive(_Model):
 
     kind: Literal["stepper", "servo"] = Field("stepper", description="A stepper (default) or an RC servo.")
     axis: Name | None = Field(
-        None, description="The board's output: X, Y, Z, A on a CNC shield; X, Y, Z, E0, E1 on RAMPS; S0... for servos."
+        None,
+        description="The board's output: X, Y, Z, A (CNC shield); X, Y, Z, E0, E1 (RAMPS); S0... (servos).",
     )
     invert: bool = Field(
         False, description="Wiring: the motor turns the other way. (A joint's `sign` is geometry.)"
@@ -130,7 +129,7 @@ class Drive(_Model):
     gear: Ratio = Field(
         1.0, description="Stepper: motor turns per joint turn, a number or teeth {motor: 16, joint: 80}."
     )
-    pulley: Ratio = Field(1.0, description="Stepper: a second reduction, like `gear`; the two are multiplied.")
+    pulley: Ratio = Field(1.0, description="Stepper: a second reduction, like gear; the two multiply.")
     lead: Annotated[float, Field(gt=0, le=1e4)] | None = Field(
         None, description="Stepper on a prismatic joint: mm per turn after gear and pulley."
     )
@@ -174,14 +173,14 @@ class Homing(_Model):
     """How a joint finds its limit switch."""
 
     switch: Name = Field(description="The board's limit input, for example X.")
-    direction: Sign = Field(description="1: the switch is at the upper end of the joint; -1: at the lower end.")
+    direction: Sign = Field(description="1: the switch is at the joint's upper end; -1: at the lower.")
     at: Value = Field(description="Joint value where the switch closes, in degrees or mm.")
     speed: Rate = Field(description="Approach speed in deg/s or mm/s; the second approach is slower.")
     backoff: Annotated[float, Field(gt=0, le=1e6)] = Field(
         description="How far to back off the switch, in degrees or mm."
     )
     order: Annotated[int, Field(ge=1, le=99)] | None = Field(
-        None, description="1 homes first; joints of the same order home together. Absent: in the file's order."
+        None, description="1 homes first, equal numbers together. Absent: in the file's order."
     )
     normally: Literal["open", "closed"] = Field(
         description="The switch when it is not pressed: `closed` also notices a cut wire."
@@ -212,8 +211,8 @@ class Joint(_Model):
     home: Value = Field(0.0, description="The pose from which pulses are counted, in degrees or mm.")
     max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2; needed to send motion.")
-    drive: Drive | None = Field(None, description="The joint's own motor. For coupled joints use `motors`.")
-    homing: Homing | None = Field(None, description="The limit switch. Absent: `armkin home` refuses the joint.")
+    drive: Drive | None = Field(None, description="The joint's own motor; coupled joints use motors.")
+    homing: Homing | None = Field(None, description="The limit switch; absent: `armkin home` refuses.")
 
     def twist(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Screw axis (w, v) without the rounding of printed tables.
@@ -244,7 +243,7 @@ class RobotFile(_Model):
     description: str = Field("", description="Free text.")
     source: str = Field("", description="Where the numbers come from.")
     convention: Convention = Field(
-        description="standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz) DH rows, or screws. Never guessed."
+        description="standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz) DH, or screws; never guessed."
     )
     task: Task | None = Field(
         None, description="What `armkin ik` solves for. Absent: by structure; `armkin info` shows it."
@@ -261,7 +260,9 @@ class RobotFile(_Model):
         description="The joints, from the base outwards.", min_length=1, max_length=checks.MAX_JOINTS
     )
     motors: tuple[Motor, ...] | None = Field(
-        None, description="Motors that are not one to one with joints, instead of the joints' `drive`.", min_length=1
+        None,
+        description="Motors that are not one to one with joints, instead of the joints' drives.",
+        min_length=1,
     )
     gripper: Gripper | None = Field(None, description="A servo or stepper with `open` and `closed`.")
     board: Board | None = Field(None, description="The controller, for `armkin send`.")

@@ -1,0 +1,97 @@
+"""JSON Schema of the robot file, for the help and the red underlines of editors.
+
+Made from the pydantic model, less what our YAML never holds (null), and with lists written the way that
+every schema version knows.
+"""
+
+from typing import Any, cast
+
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from armkin.robot_file.model import RobotFile
+
+# The smallest useful file of each convention.
+EXAMPLES: list[dict[str, Any]] = [
+    {
+        "name": "two_links",
+        "convention": "standard",
+        "task": "xy",
+        "joints": [
+            {"name": "q1", "dh": {"alpha": 0, "a": 200, "d": 0}, "limits": [-120, 120]},
+            {"name": "q2", "dh": {"alpha": 0, "a": 300, "d": 0}, "limits": [-150, 150]},
+        ],
+    },
+    {
+        "name": "pan_tilt",
+        "convention": "modified",
+        "tool": {"xyz": [1500, 0, 0]},
+        "joints": [
+            {"name": "q1", "dh": {"alpha": 0, "a": 0, "d": 0}},
+            {"name": "q2", "dh": {"alpha": -90, "a": 0, "d": 1000}},
+        ],
+    },
+    {
+        "name": "lift",
+        "convention": "screws",
+        "zero_pose": {"xyz": [300, 0, 115]},
+        "joints": [
+            {"name": "q1", "screw": {"w": [0, 0, 1], "v": [0, 0, 0]}},
+            {
+                "name": "q2",
+                "type": "prismatic",
+                "screw": {"w": [0, 0, 0], "v": [0, 0, 1]},
+                "limits": [0, 200],
+            },
+        ],
+    },
+]
+
+
+class _Generator(GenerateJsonSchema):
+    """An optional key is absent, not null; a homogeneous tuple is a list of so many items."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        made = super().default_schema(schema)
+        if made.get("default") is None:
+            made.pop("default", None)
+        return made
+
+    def tuple_schema(self, schema: core_schema.TupleSchema) -> JsonSchemaValue:
+        made = super().tuple_schema(schema)
+        items = made.pop("prefixItems", None)
+        if items:
+            made["items"] = items[0]  # all our tuples are of one kind
+        return made
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema as plain JSON data.
+
+    >>> json_schema()["required"]
+    ['name', 'convention', 'joints']
+    """
+    made = RobotFile.model_json_schema(schema_generator=_Generator)
+    made = cast(dict[str, Any], _without_titles(made))
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "armkin robot file",
+        "examples": EXAMPLES,
+        **made,
+    }
+
+
+def _without_titles(part: Any) -> Any:
+    """pydantic titles ("Max Speed") hide the descriptions in editors' hovers; the keys are titles enough."""
+    if isinstance(part, dict):
+        return {
+            key: _without_titles(value)
+            for key, value in part.items()
+            if not (key == "title" and isinstance(value, str))
+        }
+    if isinstance(part, list):
+        return [_without_titles(value) for value in part]
+    return part
