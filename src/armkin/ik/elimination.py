@@ -1,165 +1,226 @@
-"""General 6-joint inverse kinematics by numeric elimination."""
+"""General 6-joint inverse kinematics by numeric elimination: every isolated branch of any 6R, 5R1P, 4R2P.
+
+The method.  Closing the chain over the pose and cutting it at two joints gives fourteen equations that are
+linear in products of the joints' sines and cosines (Raghavan and Roth 1990, "Kinematic analysis of the 6R
+manipulator of general geometry"; here by the features of `armkin.ik.line_features`, in which rigid motions
+are matrices).  Two joints are eliminated by a null space, two by the dialytic step, and the last one is the
+eigenvalue of a matrix pencil (Manocha and Canny 1994, "Efficient inverse kinematics for general 6R
+manipulators") of size 12 to 24: `armkin.ik.pencil`.  Every candidate is then moved onto the true chain by
+Newton's method; what does not close the chain to 1e-10 is no answer.
+
+Why the answers are complete.
+(i) Every solution satisfies (2) = (3) of `armkin.ik.pencil`, for these are features of the same line.
+(ii) N left = 0, the dialytic products and the linearisation are consequences of that: they may add roots but
+lose none, so every solution is a real eigenvalue x with its v as eigenvector, whatever the offset psi, unless
+x is infinite.
+(iii) If the pencil is regular all its eigenvalues are computed, backward stably; each gives its joints if its
+eigenspace has dimension one.
+(iv) Regularity depends on the arm: a pair of parallel axes makes most roles identically singular.  `prepare`
+measures it on random poses, and only roles that give their generating joints back are used.
+(v) There remain poses on which (iii) fails: roots at infinity, equal roots, roots that rounding turned into
+complex pairs.  They show (entries above 1e6, roots closer than 1e-4 with rough vectors, candidates that
+stall), and such a pose is solved again with another offset and other hidden joints until a pass shows none of
+these or the passes are used up; all passes' answers count.
+Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
+the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
+self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
+
+Three prismatic joints leave the orientation to the three others: `armkin.ik.slides`, in closed form.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import pencil as pencils
-from .line_features import Array
-from .merge import merge
-from .pencil import Pencil
-from .polish import refine, shrink
+from armkin.ik import loop, roots, slides
+from armkin.ik.chain import inverse
+from armkin.ik.loop import Loop
+from armkin.ik.merge import Answers, concatenate, merge, pack
+from armkin.ik.pencil import Pencil, Role, build, roles
+from armkin.ik.polish import Polished, pose_error, refine, tip
+from armkin.soa import Array
 
 Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
-CHUNK = 256
+CHUNK = 256  # poses worked on at once: more of them leave the cache
 ACCEPTED = 1e-10  # residual of an answer, lengths scaled
-PSI = (0.7321, -1.1879)
-MOST = 16
+TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
+PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
+TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
+HEALTHY, USELESS = -8.0, -5.0  # log10 of a role's raw error from which on it is good enough, or unfit
+PASSES = 5
 
 
 @dataclass(frozen=True)
 class Elimination:
-    """A 6-joint chain prepared for `solve`: read-only, to be shared by threads.
+    """A 6-joint chain prepared for `solve`: read-only, so that threads may share it.
 
-    base, links, tool: the chain with lengths scaled and frames moved along their axes;
-    length: its unit [mm].  plans: the pencil of the main pass, then those of the retry passes.
+    loop: the scaled chain.  plans: the pencils of the main pass and of the passes for poses that it leaves
+    open; none if three joints are prismatic.  score: log10 of the main pencil's raw error.
     """
 
-    prismatic: Bool
-    base: Array
-    links: Array
-    tool: Array
-    length: float
+    loop: Loop
     plans: tuple[Pencil, ...]
     score: float
 
 
 def prepare(link: Array, prismatic: Bool) -> Elimination:
-    """Prepare a chain; see the module text."""
-    base, links, tool, length = _compact(link, prismatic)
-    closed = np.concatenate([links, np.eye(4)[None]])
-    chain = np.concatenate([np.eye(4)[None], links, np.eye(4)[None]])
+    """Choose how to walk a chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]``.
+
+    Args:
+        link: (7, 4, 4) [mm].
+        prismatic: (6,): Z is a shift along z instead of a turn about it.
+    """
+    closed = loop.close(link, prismatic)
+    if np.sum(prismatic) >= 3:
+        return Elimination(closed, (), -np.inf)
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (16, 6))
-    q[:, prismatic] = rng.uniform(-1, 1, (16, int(prismatic.sum())))
-    goal = _forward(chain, prismatic, q)
-    X = np.linalg.inv(goal)
-    ranked = _rank(closed, prismatic, pencils.roles(prismatic, (0, 1, 5), (0,)), X, q)
-    if not ranked or ranked[0][0] > -8:
-        more = [r for r in pencils.roles(prismatic, (0, 1, 5, 2, 3, 4), (0, 1, 2)) if r.slot in (2, 3, 4) or r.hidden]
-        ranked += _rank(closed, prismatic, more, X, q)
-        ranked.sort(key=lambda item: item[0])
-    first = ranked[0][1]
-    second = pencils.build(first.role, closed, prismatic, PSI[1])
-    plans = (first, second, *(item[1] for item in ranked[1:6]))
-    return Elimination(prismatic, base, links, tool, length, plans, ranked[0][0])
+    q[:, prismatic] = rng.uniform(-1, 1, (16, int(np.sum(prismatic))))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    goal = np.tile(np.eye(4), (16, 1, 1))
+    goal[:, :3] = np.moveaxis(frame, -1, 0)
+    rated: list[tuple[float, float, Pencil]] = []
+    # The first roles nearly always do; some arms with two prismatic joints need the others.
+    for slots, hidden in (((0, 1, 5), (0,)), ((0, 1, 5), (1, 2)), ((2, 3, 4), (0, 1, 2))):
+        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slots, hidden)]
+        rated.sort(key=lambda item: item[0])
+        if rated and rated[0][1] < HEALTHY:
+            break
+    best = rated[0][2]
+    others = [pencil for _, error, pencil in rated[1:] if error < USELESS]
+    # Equal roots of one joint are rarely equal in another: hide another joint early.
+    hidden_joint = best.hidden_joint
+    others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
+    again = build(best.role, closed.links, closed.prismatic, PSI[1])
+    return Elimination(closed, (best, again, *others)[:PASSES], rated[0][1])
 
 
-def _rank(closed: Array, prismatic: Bool, roles: list[pencils.Role], X: Array, q: Array) -> list[tuple[float, Pencil]]:
-    ranked = []
-    for role in roles:
-        plan = pencils.build(role, closed, prismatic, PSI[0])
-        ranked.append((_score(plan, X, q), plan))
-    ranked.sort(key=lambda item: item[0])
-    return ranked
+def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> tuple[float, float, Pencil]:
+    """A role's cost, its raw error (90th percentile of log10 over the poses) and its pencil."""
+    pencil = build(role, closed.links, closed.prismatic, PSI[0])
+    few = slice(0, 3)  # a role that the arm makes singular loses every pose: no need to try them all
+    if np.median(_raw_error(pencil, closed, q[few], goal[few])[0]) > 1e-2:
+        return 1.0 + 1e-3 * pencil.size, 0.0, pencil
+    nearest, spurious = _raw_error(pencil, closed, q, goal)
+    error = float(np.quantile(np.log10(nearest + 1e-16), 0.9))
+    # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
+    cost = max(error, -11.0) + 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
+    return cost - 20.0, error, pencil
 
 
-def _score(plan: Pencil, X: Array, q: Array) -> float:
-    found = pencils.seeds(plan, X)
-    error = np.abs(found.q - q[found.pose])
-    error = np.where(plan.sliding, error, np.abs(np.mod(error + np.pi, 2 * np.pi) - np.pi)).max(axis=1)
-    error[~np.isfinite(error)] = 1.0
-    nearest = np.full(X.shape[0], 1.0)
-    np.minimum.at(nearest, found.pose, error)
-    score = float(np.quantile(np.log10(nearest + 1e-16), 0.9))
-    return score - 0.5 * (plan.role.slot == 1)
-
-
-def _forward(chain: Array, prismatic: Bool, q: Array) -> Array:
-    T = np.broadcast_to(chain[0], (q.shape[0], 4, 4))
-    for i in range(6):
-        Z = np.stack([pencils.line_features.joint_motion(bool(prismatic[i]), value) for value in q[:, i]])
-        T = T @ Z @ chain[i + 1]
-    return T
-
-
-def _compact(link: Array, prismatic: Bool) -> tuple[Array, Array, Array, float]:
-    """Move frames along their axes."""
-    link = link.astype(float)
-    # shift_i: frame i moves by D_i (a translation that commutes with Z_i), link[i] -> D_i^-1 link[i] D_{i+1}
-    free = [np.eye(3) if p else np.eye(3)[:, 2:] for p in prismatic]
-    width = [f.shape[1] for f in free]
-    start = np.concatenate([[0], np.cumsum(width)])
-    M, t = np.zeros((15, start[-1])), np.zeros(15)
-    for i in range(5):  # links between joints i and i + 1: t + R d_{i+1} - d_i
-        rows = slice(3 * i, 3 * i + 3)
-        t[rows] = link[i + 1, :3, 3]
-        M[rows, start[i] : start[i + 1]] = -free[i]
-        M[rows, start[i + 1] : start[i + 2]] = link[i + 1, :3, :3] @ free[i + 1]
-    d = np.linalg.lstsq(M, -t, rcond=1e-9)[0]
-    out = link.copy()
-    for i in range(6):
-        shift = free[i] @ d[start[i] : start[i + 1]]
-        out[i, :3, 3] += out[i, :3, :3] @ shift
-        out[i + 1, :3, 3] -= shift
-    size = float(np.linalg.norm(out[1:6, :3, 3], axis=1).sum()) / 3
-    length = size if size > 1e-9 * (1 + np.abs(link[:, :3, 3]).max()) else 300.0
-    out = shrink(out, length)
-    return out[0], out[1:6], out[6], length
+def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
+    """Distance of the nearest candidate before any Newton step, and whether there are real roots that solve
+    nothing, both (N,)."""
+    found = roots.seeds(pencil, inverse(goal), TILT[0])
+    difference = np.abs(found.q - q[found.pose])
+    turned = np.abs(np.mod(difference + np.pi, 2 * np.pi) - np.pi)
+    distance = np.where(closed.prismatic, difference, turned).max(axis=1, initial=0.0)
+    nearest = np.ones(q.shape[0])
+    np.minimum.at(nearest, found.pose, distance)
+    target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
+    spurious = found.rough.copy()
+    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > 1e-3)]] = True
+    return nearest, spurious
 
 
 def solve(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
-    """All."""
-    count = T.shape[0]
-    scaled = shrink(T, elimination.length)
-    goal = np.linalg.inv(elimination.base) @ scaled @ np.linalg.inv(elimination.tool)
-    answers, doubt = _run(elimination, 0, goal, np.arange(count))
-    found = [answers]
-    doubtful = doubt.copy()
-    for stage in range(1, len(elimination.plans)):
-        again = np.flatnonzero(doubt)
-        if again.size == 0:
+    """All isolated branches of many targets.
+
+    Args:
+        elimination: from `prepare`.
+        T: (N, 4, 4) targets [mm].
+
+    Returns:
+        q: (N, B, 6) [rad in (-pi, pi] | mm], sorted by a fixed projection, NaN past a target's last branch;
+        B is the largest number of branches, at most 16.
+        doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
+        answers that were merged across more than rounding, or with two roots that just touch or just miss.
+    """
+    closed, count = elimination.loop, T.shape[0]
+    finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
+    goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
+    if not elimination.plans:
+        answers, touching = _slides(closed, goal)
+    else:
+        answers, touching = _passes(elimination, goal)
+    # A closest point stands in for answers only where there are none.
+    exact = answers.residual < ACCEPTED
+    answered = np.bincount(answers.pose[exact], minlength=count) > 0
+    answers = answers.take((exact | ~answered[answers.pose]) & finite[answers.pose])
+    answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
+    q, weak = pack(answers, count)
+    q *= np.where(closed.prismatic, closed.length, 1.0)
+    return q, (weak | merged | touching) & finite
+
+
+def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
+    """Answers of all passes, each over the poses that the last one left open; and touching pairs (N,)."""
+    found = []
+    touching = np.zeros(goal.shape[0], dtype=np.bool_)
+    open_poses = np.arange(goal.shape[0])
+    for number, pencil in enumerate(elimination.plans):
+        still = np.zeros(open_poses.size, dtype=np.bool_)
+        for begin in range(0, open_poses.size, CHUNK):
+            part = open_poses[begin : begin + CHUNK]
+            answers, unsettled, touch = _attempt(elimination.loop, pencil, goal[part], number > 0)
+            found.append(answers._replace(pose=part[answers.pose]))
+            still[begin : begin + CHUNK] = unsettled
+            touching[part] |= touch
+        open_poses = open_poses[still]
+        if open_poses.size == 0:
             break
-        answers, still = _run(elimination, stage, goal[again], again)
-        found.append(answers)
-        doubt[again] = still
-    pose = np.concatenate([f[0] for f in found])
-    q = np.concatenate([f[1] for f in found])
-    residual = np.concatenate([f[2] for f in found])
-    weakness = np.concatenate([f[3] for f in found])
-    out, merged = merge(elimination.prismatic, chain_of(elimination), goal, count, pose, q, residual, weakness)
-    return out * np.where(elimination.prismatic, elimination.length, 1.0), doubt | merged
+    return concatenate(found) if found else _none(), touching
 
 
-def chain_of(e: Elimination) -> Array:
-    return np.concatenate([np.eye(4)[None], e.links, np.eye(4)[None]])
+def _attempt(closed: Loop, pencil: Pencil, goal: Array, careful: bool) -> tuple[Answers, Bool, Bool]:
+    """One pencil's answers for goals (N, 4, 4), the poses it leaves open and those with touching roots."""
+    seed = roots.seeds(pencil, inverse(goal), TILT[careful])
+    target = goal[seed.pose]
+    if careful:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
+    else:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
+    good = done.residual < (TOUCHING if careful else ACCEPTED)
+    unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
+    missed = ~good & ((seed.tilt == 0) | (done.residual < 1e-3))
+    touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
+    unsettled[seed.pose[missed | touch]] = True
+    touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
+    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once.
+    pose, hidden, blurred = seed.pose[good], seed.hidden[good], done.guess[good] > 1e-5
+    order = np.lexsort((hidden, pose))
+    pose, hidden, blurred = pose[order], hidden[order], blurred[order]
+    close = (np.diff(pose) == 0) & (np.diff(hidden) < 1e-4) & (blurred[1:] | blurred[:-1])
+    unsettled[pose[1:][close]] = True
+    return _answers(closed, seed.pose, done, good), unsettled, touching
 
 
-def _run(e: Elimination, stage: int, goal: Array, index: Int):
-    plan = e.plans[stage]
-    chain = chain_of(e)
-    parts, doubt = [], np.zeros(goal.shape[0], bool)
+def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
+    """Both answers of a chain with three prismatic joints."""
+    found, touching = [_none()], np.zeros(goal.shape[0], dtype=np.bool_)
+    if np.sum(closed.prismatic) > 3:
+        return found[0], touching
     for begin in range(0, goal.shape[0], CHUNK):
         part = goal[begin : begin + CHUNK]
-        X = np.linalg.inv(part)
-        seed = pencils.seeds(plan, X, 0.02 if stage == 0 else 0.3)
-        if stage == 0:
-            done = refine(chain, e.prismatic, seed.q, part[seed.pose], 4)
-        else:
-            done = refine(chain, e.prismatic, seed.q, part[seed.pose], 12, damped=True)
-        good = done.residual < ACCEPTED
-        bad = seed.rough.copy()
-        bad[seed.pose[(~good) & ((seed.tilt == 0) | (done.residual < 1e-3))]] = True
-        bad[seed.pose[good & (seed.tilt > 0) & (seed.tilt < 1e-4)]] = True
-        pose, hidden = seed.pose[good], seed.hidden[good]
-        order = np.lexsort((hidden, pose))
-        close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
-        bad[pose[order][1:][close]] = True
-        doubt[begin : begin + CHUNK] = bad
-        q = done.q[good]
-        q = np.where(e.prismatic, q, np.pi - np.mod(np.pi - q, 2 * np.pi))
-        parts.append((index[begin + pose], q, done.residual[good], done.weakness[good]))
-    return tuple(np.concatenate([p[i] for p in parts]) for i in range(4)), doubt
+        q = slides.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
+        pose = np.repeat(np.arange(part.shape[0]), 2)
+        done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
+        good = done.residual < TOUCHING
+        touching[begin + pose[good & (done.residual > ACCEPTED)]] = True
+        found.append(_answers(closed, begin + pose, done, good))
+    return concatenate(found), touching
+
+
+def _answers(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
+    """The good ones, their revolute joints wrapped to (-pi, pi]."""
+    wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
+    return Answers(pose, wrapped, done.residual, done.weakness).take(good)
+
+
+def _none() -> Answers:
+    """No answers."""
+    return Answers(np.empty(0, dtype=np.int64), np.empty((0, 6)), np.empty(0), np.empty(0))

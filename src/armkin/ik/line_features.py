@@ -16,10 +16,11 @@ of two numbers ``(b1, b2)``: ``(cos q, sin q)`` if it is revolute, ``(q, q^2)`` 
     Rep(J(q)) = U0 + U1 b1(q) + U2 b2(q).
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from functools import cache
 
-Array = NDArray[np.float64]
+import numpy as np
+
+from armkin.soa import Array
 
 SIZE = 15
 _P, _L, _PP, _PL, _M, _W, _ONE = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11), slice(11, 14), 14
@@ -88,6 +89,7 @@ def joint_motion(prismatic: bool, q: float) -> Array:
     return out
 
 
+@cache
 def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
     """``[U0, U1, U2]`` (3, 15, 15) of a joint, or of its inverse motion.
 
@@ -95,10 +97,10 @@ def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
     """
     if prismatic:
         back, rest, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
-        U = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
-        return U * np.array([1.0, -1.0, 1.0])[:, None, None] if inverse else U
+        powers: Array = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
+        return powers * np.array([1.0, -1.0, 1.0])[:, None, None] if inverse else powers
     angles = 2 * np.pi / 3 * np.arange(3)
     samples = np.stack([rep(joint_motion(False, angle)) for angle in angles])
     weights = np.stack([np.full(3, 1 / 3), 2 / 3 * np.cos(angles), 2 / 3 * np.sin(angles)])
-    U = np.einsum("uk,kij->uij", weights, samples)
+    U: Array = np.einsum("uk,kij->uij", weights, samples)
     return U * np.array([1.0, 1.0, -1.0])[:, None, None] if inverse else U

@@ -18,9 +18,9 @@ M(q_h) v = 0 in twelve products v = (cos 3f, sin 3f, cos f, sin f)(1, b1, b2), f
 Raghavan and Roth in a basis that knows no preferred angle.  With q_h = psi + 2 atan x (psi + 1/x if h is
 prismatic) M is a quadratic M2 x^2 + M1 x + M0, whose eigenvalues and vectors are all the solutions.
 
-Deflation.  If the pose is carried by La, Lb or Le and h = m1, then M(i) has a null space K (12 x r) that depends
-on the arm alone, and M(x) K = (x - i)(N1 x + N0) with N1 = M2 K, N0 = (M1 + i M2) K.  With W a real basis of the
-complement of [Re K, Im K], M v = 0 for real x is the same as
+Deflation.  If the pose is carried by La, Lb or Le and h = m1, then M(i) has a null space K (12 x r) that
+depends on the arm alone, and M(x) K = (x - i)(N1 x + N0) with N1 = M2 K, N0 = (M1 + i M2) K.  With W a real
+basis of the complement of [Re K, Im K], M v = 0 for real x is the same as
 
     [Re N1, Im N1] x a + [Re N0, Im N0] a + (M2 x^2 + M1 x + M0) W w = 0,
     v = Re(K (a1 - i a2) / (x - i)) + W w,  a = [a1, a2],
@@ -29,22 +29,20 @@ a pencil of size 24 - 2 r: the spurious roots x = +-i of the classical 24 x 24 p
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import line_features
-from .line_features import Array
-from .polish import advance, turn
+from armkin.ik import line_features
+from armkin.ik.chain import inverse
+from armkin.soa import Array
 
 Bool = NDArray[np.bool_]
-Int = NDArray[np.int64]
 
 POSE_LINK = 5  # index of the link of the closed chain that carries the pose
-ROOT_TOLERANCE = 0.02  # imaginary part of q_h [rad] up to which a root is tried as a real one
 
-# Columns of (3): the unknowns that back substitution reads come last, see `_eliminate_ends`.
+# Columns of (3): the unknowns that back substitution reads come last, see `roots._eliminate_ends`.
 _ENDS = [(1, 1), (1, 2), (2, 1), (2, 2), (0, 0), (1, 0), (2, 0), (0, 1), (0, 2)]  # (b, a)
 
 # A few arbitrary poses, from turns about z, x and z: they show ranks that all poses share.
@@ -131,18 +129,22 @@ class Pencil:
     W: Array
 
     @property
-    def sliding(self) -> Bool:
-        """Which joints of the arm, in its own order, are prismatic."""
-        out = np.zeros(6, dtype=np.bool_)
-        out[list(self.role.order)] = self.prismatic
-        return out
+    def hidden_joint(self) -> int:
+        """The arm's joint (0..5) that is the eigenvalue."""
+        return self.role.order[2 + self.role.hidden]
+
+    @property
+    def size(self) -> int:
+        """Number of eigenvalues."""
+        return 2 * int(self.K_re.shape[1] + self.W.shape[1])
 
 
 def closed_chain(role: Role, links: Array) -> Array:
-    """Links by part (6, 4, 4) from the chain's five links W1..W5 and a place holder for the pose."""
+    """Links by part (6, 4, 4), a place holder where the pose goes, from the arm's five links (5, 4, 4)."""
+    around = np.concatenate([links, np.eye(4)[None]])
     if not role.backward:
-        return links[list(role.order)]
-    return np.linalg.inv(links[[(i - 1) % 6 for i in role.order]])
+        return around[list(role.order)]
+    return inverse(around[[(i - 1) % 6 for i in role.order]])
 
 
 def _middle(role: Role, prismatic: Bool, links: Array) -> tuple[list[Array], list[Array]]:
@@ -152,9 +154,9 @@ def _middle(role: Role, prismatic: Bool, links: Array) -> tuple[list[Array], lis
     ]
 
 
-def build(role: Role, chain: Array, prismatic: Bool, psi: float) -> Pencil:
-    """Prepare a role of the chain with links ``chain`` (6, 4, 4, the last one unused) for the offset psi."""
-    links = closed_chain(role, chain)
+def build(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
+    """Prepare a role of the arm with the links ``arm`` (5, 4, 4) between its joints for the offset psi."""
+    links = closed_chain(role, arm)
     part = prismatic[list(role.order)]
     reps, joints = _middle(role, part, links)
     # (2), from the right: f0 grows a factor 3 with every joint; it stops before a link with the pose.
@@ -174,17 +176,17 @@ def build(role: Role, chain: Array, prismatic: Bool, psi: float) -> Pencil:
     rank, left, recover, rows = 9, np.empty((0, 15)), np.empty((0, 15)), 6
     if role.slot in (0, 5):
         if role.slot == 5:
-            constant = np.einsum("bij,jk,akl->bail", U_b, line_features.rep(np.linalg.inv(links[0])), U_a)
+            constant = np.einsum("bij,jk,akl->bail", U_b, line_features.rep(inverse(links[0])), U_a)
             ends = (np.concatenate([constant[b, a] for b, a in _ENDS]),)
         else:
-            e_axis = line_features.rep(np.linalg.inv(links[5])) @ line_features.Z_AXIS
+            e_axis = line_features.rep(inverse(links[5])) @ line_features.Z_AXIS
             ends = (U_b.reshape(45, 15), np.einsum("aij,j->ia", U_a, e_axis))
-        size = np.linalg.svd(_end_monomials(role, ends, _SAMPLES), compute_uv=False)
+        size = np.linalg.svd(end_monomials(role, ends, _SAMPLES), compute_uv=False)
         rank = int(np.sum(size > 1e-9 * size[:, :1], axis=1).max())
         rows = 15 - rank
     else:
-        e_axis = line_features.rep(np.linalg.inv(links[5])) @ line_features.Z_AXIS
-        inner = line_features.rep(np.linalg.inv(links[0])) @ np.einsum("aij,j->ia", U_a, e_axis)
+        e_axis = line_features.rep(inverse(links[5])) @ line_features.Z_AXIS
+        inner = line_features.rep(inverse(links[0])) @ np.einsum("aij,j->ia", U_a, e_axis)
         product = np.einsum("bij,ja->iba", U_b, inner)
         Q = np.stack([product[:, b, a] for b, a in _ENDS], axis=1)
         basis, size, _ = np.linalg.svd(Q)
@@ -206,17 +208,23 @@ def build(role: Role, chain: Array, prismatic: Bool, psi: float) -> Pencil:
     return Pencil(role, psi, part, links, left, right, ends, rank, recover, columns, mix, K_re, K_im, W)
 
 
-def _dialytic(role: Role, part: Bool) -> Array:
-    """Monomials of (2) to M_0, M_1, M_2 (the coefficients of 1, b1, b2 of h): (3, 27, 2, 12)."""
-    multipliers = _POWERS if part[2 + role.dialytic] else _HALF_ANGLE
+@cache
+def _dialytic(hidden: int, dialytic: int, sliding: bool) -> Array:
+    """Monomials of (2) to M_0, M_1, M_2 (the coefficients of 1, b1, b2 of h): (3, 27, 2, 12).
+
+    sliding: the dialytic joint is prismatic.
+    """
+    multipliers = _POWERS if sliding else _HALF_ANGLE
     unit = np.eye(27).reshape(27, 3, 3, 3)
-    unit = np.moveaxis(unit, (1 + role.hidden, 1 + role.dialytic, 1 + role.third), (1, 2, 3))
-    return np.einsum("xhjk,sjp->hxspk", unit, multipliers).reshape(3, 27, 2, 12)
+    unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
+    products: Array = np.einsum("xhjk,sjp->hxspk", unit, multipliers).reshape(3, 27, 2, 12)
+    return products
 
 
 def _spurious(role: Role, part: Bool, monomials: Array) -> Array:
     """Null space of M(x = i) that no pose changes, (12, r) complex orthonormal, from (2) as (15, 27)."""
-    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, _dialytic(role, part)).reshape(3, 30, 12)
+    coefficients = _dialytic(role.hidden, role.dialytic, bool(part[2 + role.dialytic]))
+    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, 30, 12)
     _, size, vectors = np.linalg.svd(M_c + 1j * M_s)
     null: NDArray[np.complex128] = vectors[size < 1e-11 * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.
@@ -236,7 +244,7 @@ def _split(K: Array | None) -> tuple[Array, Array, Array]:
 
 def _columns(role: Role, part: Bool, psi: float, K_re: Array, K_im: Array, W: Array) -> Array:
     """Monomials of (2) to the columns [Re N1, Im N1, M2 W | Re N0, Im N0, M1 W, M0 W], (27, 2 c)."""
-    A, B, C = _dialytic(role, part)
+    A, B, C = _dialytic(role.hidden, role.dialytic, bool(part[2 + role.dialytic]))
     if part[2 + role.hidden]:
         M2, M1, M0 = A + B * psi + C * psi**2, B + 2 * psi * C, C
     else:
@@ -248,157 +256,12 @@ def _columns(role: Role, part: Bool, psi: float, K_re: Array, K_im: Array, W: Ar
     return np.concatenate(blocks, axis=2).reshape(27, -1)
 
 
-class Seeds(NamedTuple):
-    """Approximate real solutions of many poses, one row a candidate, poses ascending.
-
-    pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
-    tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
-    """
-
-    pose: Int
-    q: Array
-    hidden: Array
-    tilt: Array
-    rough: Bool
-
-
-def seeds(pencil: Pencil, X: Array, tolerance: float = ROOT_TOLERANCE) -> Seeds:
-    """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``."""
-    Y = np.linalg.inv(X) if pencil.role.backward else X
-    equations, recover = _equations(pencil, Y)
-    lead = pencil.W.shape[0]
-    G = _solve(equations[:, :, :lead], equations[:, :, lead:])
-    rough = np.abs(G).max(axis=(1, 2)) > 1e6
-    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
-    companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
-    companion[:, :12] = -G
-    companion[:, 12:, 2 * r : 12] = np.eye(w)
-    roots, vectors = np.linalg.eig(companion)
-    tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
-    pose, which = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
-    x = roots[pose, which].real
-    # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
-    # pair of roots that almost touch.
-    middle = _middle_joints(pencil, x, vectors.real[pose, :, which])
-    a, b, e = _other_joints(pencil, middle, Y, pose, recover)
-    q = np.empty((pose.size, 6))
-    for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
-        q[:, joint] = -value if pencil.role.backward else value
-    return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough)
-
-
-def _solve(left: Array, right: Array) -> Array:
-    """Batched solve; noise of rounding size is added if a member is exactly singular."""
-    try:
-        return np.linalg.solve(left, right)
-    except np.linalg.LinAlgError:
-        noise = np.random.default_rng(0).standard_normal(left.shape[1:])
-        return np.linalg.solve(left + 1e-13 * (1 + np.abs(left).max()) * noise, right)
-
-
-def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
-    """The pencil's twelve rows (N, 12, c) and the factors (N or 1, 5, 15) of back substitution."""
-    count, slot = Y.shape[0], pencil.role.slot
-    if slot in (0, 5):
-        N, recover = _eliminate_ends(pencil, Y)
-        rows = N @ pencil.columns
-    else:
-        recover = pencil.recover[None]
-        rows = pencil.left @ line_features.rep(Y)
-        if slot > 1:
-            rows = (rows @ pencil.right).reshape(count, -1, 27)
-        rows = rows @ pencil.columns
-    rows = rows.reshape(count, 2 * rows.shape[1], -1)
-    return (rows if pencil.mix is None else pencil.mix @ rows), recover
-
-
-def _eliminate_ends(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
-    """Left null space (N, m, 15) of (3) and the factors (N, 5, 15) from features to end monomials."""
-    Q = _end_monomials(pencil.role, pencil.ends, Y)
-    if pencil.rank < 9:
-        basis, size, vectors = np.linalg.svd(Q)
-        kept = np.maximum(size[:, : pencil.rank, None], 1e-300)
-        factors = np.swapaxes(vectors[:, : pencil.rank] / kept, 1, 2)
-        recover = factors @ np.swapaxes(basis[:, :, : pencil.rank], 1, 2)
-        return np.swapaxes(basis[:, :, pencil.rank :], 1, 2), recover[:, 4:]
-    basis, triangle = np.linalg.qr(Q, mode="complete")
-    transposed = np.swapaxes(basis, 1, 2)
-    return transposed[:, 9:], _solve(triangle[:, 4:9, 4:9], transposed[:, 4:9])
-
-
-def _end_monomials(role: Role, ends: tuple[Array, ...], Y: Array) -> Array:
+def end_monomials(role: Role, ends: tuple[Array, ...], Y: Array) -> Array:
     """The matrices (3), (N, 15, 9), if the pose is carried by La or Le."""
-    inverse = np.linalg.inv(Y)
+    back = inverse(Y)
     if role.slot == 5:
-        feature = line_features.features(inverse[:, :3, 3], inverse[:, :3, 2])
+        feature = line_features.features(back[:, :3, 3], back[:, :3, 2])
         return np.swapaxes((feature @ ends[0].T).reshape(-1, 9, 15), 1, 2)
     U_b, right = ends
-    product = (U_b @ (line_features.rep(inverse) @ right)).reshape(-1, 3, 15, 3)
+    product = (U_b @ (line_features.rep(back) @ right)).reshape(-1, 3, 15, 3)
     return np.stack([product[:, b, :, a] for b, a in _ENDS], axis=2)
-
-
-def _middle_joints(pencil: Pencil, x: Array, u: Array) -> list[Array]:
-    """Values of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size)."""
-    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
-    a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
-    x = x[:, None]
-    flat = np.where(np.abs(x) > 1, y / np.where(x == 0, 1.0, x), low)  # y = x w: take the safer one
-    v = flat @ pencil.W.T
-    if r:
-        square = x * x + 1
-        v += ((a1 * x + a2) / square) @ pencil.K_re.T - ((a1 - a2 * x) / square) @ pencil.K_im.T
-    v = v.reshape(-1, 4, 3)
-    row = np.arange(v.shape[0])
-    size = v * v
-    four = v[row, :, size.sum(axis=1).argmax(axis=1)]
-    three = v[row, size.sum(axis=2).argmax(axis=1)]
-    hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
-    value = [x[:, 0]] * 3
-    if pencil.prismatic[hidden]:
-        value[pencil.role.hidden] = pencil.psi + 1 / np.where(x[:, 0] == 0, 1e-300, x[:, 0])
-    else:
-        value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x[:, 0])
-    if pencil.prismatic[dialytic]:
-        value[pencil.role.dialytic] = _ratio(four)
-    else:
-        value[pencil.role.dialytic] = 2 * np.arctan2(four[:, 3], four[:, 2])
-    if pencil.prismatic[third]:
-        value[pencil.role.third] = _ratio(three)
-    else:
-        sign = np.sign(three[:, 0])
-        value[pencil.role.third] = np.arctan2(sign * three[:, 2], sign * three[:, 1])
-    return value
-
-
-def _ratio(powers: Array) -> Array:
-    """q from multiples of (1, q, q^2, ..) (M, k): the least-squares quotient of neighbours."""
-    below = powers[:, :-1]
-    return np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), 1e-300)
-
-
-def _other_joints(
-    pencil: Pencil, middle: list[Array], Y: Array, pose: Int, recover: Array
-) -> tuple[Array, Array, Array]:
-    """Values of a, b and e once the middle joints (3 x (M,)) are known."""
-    links: list[Array] = list(pencil.links)
-    links[pencil.role.slot] = np.ascontiguousarray(np.moveaxis(Y[pose], 0, -1))
-    is_a, is_b = bool(pencil.prismatic[0]), bool(pencil.prismatic[1])
-    start = np.repeat(np.eye(3, 4)[:, :, None], pose.size, axis=2)
-    A = advance(start, links[1])
-    for i in range(3):
-        A = advance(turn(A, middle[i], bool(pencil.prismatic[2 + i])), links[2 + i])
-    feature = line_features.features(A[:, 3].T, A[:, 2].T)
-    if recover.shape[0] == 1:
-        monomials = feature @ recover[0].T
-    else:
-        monomials = np.einsum("mij,mj->mi", recover[pose], feature)
-    one, b1, b2, a1, a2 = monomials.T
-    sign = np.where(one < 0, -1.0, 1.0)
-    safe = np.where(np.abs(one) < 1e-300, 1.0, one)
-    a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
-    b = b1 / safe if is_b else np.arctan2(sign * b2, sign * b1)
-    before = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)
-    # before @ A = Je^-1, a turn by -e about z
-    sine = np.sum(before[0, :3] * A[:, 1] - before[1, :3] * A[:, 0], axis=0)
-    cosine = np.sum(before[0, :3] * A[:, 0] + before[1, :3] * A[:, 1], axis=0)
-    return a, b, np.arctan2(sine, cosine)

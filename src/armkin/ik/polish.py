@@ -9,18 +9,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armkin.soa import Array
+
 Bool = NDArray[np.bool_]
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
-CONVERGED = 3e-15  # a residual that further steps cannot be expected to lower
+CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower
 
 
 class Polished(NamedTuple):
-    """What `refine` returns: ``q`` (M, 6), ``residual`` (M,) and ``weakness`` (M,) = |J^-1| there."""
+    """What `refine` returns.
+
+    q: (M, 6) best points met.  residual: (M,) there, guess: (M,) at the start.
+    weakness: (M,) Frobenius norm of the last inverse Jacobian, about 1 / its smallest singular value.
+    """
 
     q: Array
     residual: Array
+    guess: Array
     weakness: Array
 
 
@@ -41,53 +47,56 @@ def turn(frame: Array, q: Array, prismatic: bool) -> Array:
 
 def advance(frame: Array, link: Array) -> Array:
     """``frame @ link`` for blocks (3, 4, M) and one (4, 4) link, or one link a candidate (4, 4, M)."""
-    if link.ndim == 2:
-        return np.matmul(link.T, frame)
-    return np.einsum("ikm,kjm->ijm", frame, link)
+    out: Array = np.matmul(link.T, frame) if link.ndim == 2 else np.einsum("ikm,kjm->ijm", frame, link)
+    return out
 
 
-def pose_error(link: Array, prismatic: Bool, q: Array, goal: Array) -> tuple[Array, Array, Array]:
-    """How far ``T(q)`` is from the goals, and the Jacobian there.
-
-    Args:
-        link: (7, 4, 4), scaled to about unit length.
-        prismatic: (6,).
-        q: (6, M).
-        goal: (3, 4, M).
-
-    Returns:
-        error: (6, M), position and rotation vector that lead to the goal, linear rows first;
-        size: (M,), the Frobenius norm of the pose difference;
-        jacobian: (6, 6, M) in the base's axes.
-    """
-    n, count = q.shape
-    axis, origin = np.empty((3, n, count)), np.empty((3, n, count))
-    frame = np.repeat(link[0, :3, :, None], count, axis=2)
-    for i in range(n):
-        axis[:, i], origin[:, i] = frame[:, 2], frame[:, 3]
+def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, list[Array]]:
+    """The last frame (3, 4, M) for joint values (6, M), and every joint's frame before it turns."""
+    frame = np.repeat(link[0, :3, :, None], q.shape[1], axis=2)
+    joints = []
+    for i in range(q.shape[0]):
+        joints.append(frame)
         frame = advance(turn(frame, q[i], bool(prismatic[i])), link[i + 1])
+    return frame, joints
+
+
+def pose_error(frame: Array, goal: Array) -> tuple[Array, Array]:
+    """What leads from frames (3, 4, M) to goals: (6, M) linear rows first; and the Frobenius norm (M,).
+
+    The rotation vector is half the sum of the columns' cross products (Luh, Walker & Paul 1980).
+    """
     difference = goal - frame
-    size = np.sqrt(np.einsum("ijm,ijm->m", difference, difference))
-    error = np.empty((6, count))
+    error = np.empty((6, frame.shape[2]))
     error[:3] = difference[:, 3]
-    jacobian = np.empty((6, n, count))
-    arm = frame[:, 3][:, None] - origin
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        error[3 + i] = 0.5 * np.sum(frame[j, :3] * goal[k, :3] - frame[k, :3] * goal[j, :3], axis=0)
-        jacobian[i] = axis[j] * arm[k] - axis[k] * arm[j]
-    jacobian[3:] = axis
-    for i in np.flatnonzero(prismatic):
-        jacobian[:3, i], jacobian[3:, i] = axis[:, i], 0.0
-    return error, size, jacobian
+        error[3 + i] = 0.5 * (frame[j, :3] * goal[k, :3] - frame[k, :3] * goal[j, :3]).sum(axis=0)
+    return error, np.sqrt(np.einsum("ijm,ijm->m", difference, difference))
+
+
+def jacobian(frame: Array, joints: list[Array], prismatic: Bool) -> Array:
+    """Jacobians (M, 6, 6) in the base's axes, from the frames that `tip` returns."""
+    out = np.empty((frame.shape[2], 6, len(joints)))
+    for i, joint in enumerate(joints):
+        axis = joint[:, 2]
+        if prismatic[i]:
+            out[:, :3, i], out[:, 3:, i] = axis.T, 0.0
+            continue
+        arm = frame[:, 3] - joint[:, 3]
+        out[:, 3:, i] = axis.T
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            out[:, x, i] = axis[y] * arm[z] - axis[z] * arm[y]
+    return out
 
 
 def _inverse(matrix: Array) -> Array:
     """Inverses of (M, k, k); exactly singular members are moved off by rounding-sized noise."""
     try:
-        return np.linalg.inv(matrix)
+        out: Array = np.asarray(np.linalg.inv(matrix))
     except np.linalg.LinAlgError:
         noise = np.random.default_rng(0).standard_normal(matrix.shape[1:])
-        return np.linalg.inv(matrix + 1e-13 * (1 + np.abs(matrix).max()) * noise)
+        out = np.asarray(np.linalg.inv(matrix + 1e-13 * (1 + np.abs(matrix).max()) * noise))
+    return out
 
 
 def refine(
@@ -102,33 +111,45 @@ def refine(
         steps: at most so many steps; candidates that have converged drop out.
         damped: damp all but the last two steps by the residual, for poor guesses and weak Jacobians.
     """
+    count = q.shape[0]
     value = np.ascontiguousarray(q.T)
     target = np.ascontiguousarray(np.moveaxis(goal[:, :3], 0, -1))
-    best, residual = value.copy(), np.full(q.shape[0], np.inf)
-    weakness = np.full(q.shape[0], np.inf)
-    active = np.arange(q.shape[0])
+    best, residual = value.copy(), np.full(count, np.inf)
+    weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
+    active, last = np.arange(count), np.zeros(count)
     for step in range(steps + 1):
-        error, size, jacobian = pose_error(link, prismatic, value, target)
-        square = np.ascontiguousarray(np.moveaxis(jacobian, -1, 0))
-        inverse = _inverse(square)
+        frame, joints = tip(link, prismatic, value)
+        error, size = pose_error(frame, target)
+        if step == 0:
+            guess = size
         better = size < residual[active]
         index = active[better]
         best[:, index], residual[index] = value[:, better], size[better]
-        weakness[index] = np.sqrt(np.einsum("mij,mij->m", inverse, inverse))[better]
+        # While the residual falls steeply the last inverse Jacobian is good for one more step.
+        stale = np.flatnonzero(size > 1e-3 * last)
+        last = size
+        if stale.size:
+            chosen = slice(None) if stale.size == active.size else stale
+            square = jacobian(frame[..., chosen], [joint[..., chosen] for joint in joints], prismatic)
+            fresh = _inverse(square)
+            index = active[chosen]
+            weakness[index] = np.sqrt(np.einsum("mij,mij->m", fresh, fresh))
+            if damped and step < steps - 2:
+                transposed = np.swapaxes(square, 1, 2)
+                damping = size[chosen] * np.minimum(size[chosen], 1.0)
+                normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
+                fresh = np.matmul(_inverse(normal), transposed)
+            inverse[index] = fresh
         going = np.flatnonzero(size > CONVERGED)
         if step == steps or going.size == 0:
             break
-        if going.size < 0.7 * active.size:
+        if going.size < active.size:
             active, value, target = active[going], value[:, going], target[..., going]
-            error, size, square, inverse = error[:, going], size[going], square[going], inverse[going]
-        if damped and step < steps - 2:
-            transposed = np.swapaxes(square, 1, 2)
-            normal = np.matmul(transposed, square) + (size * np.minimum(size, 1.0))[:, None, None] * np.eye(6)
-            inverse = np.matmul(_inverse(normal), transposed)
-        move = np.matmul(inverse, error.T[:, :, None])[:, :, 0].T
+            error, last = error[:, going], last[going]
+        move = np.matmul(inverse[active], error.T[:, :, None])[:, :, 0].T
         longest = np.abs(move).max(axis=0)
         value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, 1e-300))
-    return Polished(best.T, residual, weakness)
+    return Polished(best.T, residual, guess, weakness)
 
 
 def polish(
