@@ -21,16 +21,16 @@ const board boards[] = {
             {"A", "D12", "D13", "D8", NULL},
             {0},
         },
-        .servo = {"A3", "D11", NULL},       /* D11 only where the Z limit is given up */
+        .servo = {"A3", NULL},
     },
     {
-        .name = "mega_ramps14", MEGA,       /* RAMPS 1.4; five sockets, MIN end stops, then X_MAX and Y_MAX */
+        .name = "mega_ramps14", MEGA,       /* RAMPS 1.4, its five sockets and MIN end stops */
         .axis = {
             {"X", "D54", "D55", "D38", "D3"},
             {"Y", "D60", "D61", "D56", "D14"},
             {"Z", "D46", "D48", "D62", "D18"},
-            {"E0", "D26", "D28", "D24", "D2"},
-            {"E1", "D36", "D34", "D30", "D15"},
+            {"E0", "D26", "D28", "D24", NULL},
+            {"E1", "D36", "D34", "D30", NULL},
             {0},
         },
         .servo = {"D11", "D6", "D5", "D4", NULL},

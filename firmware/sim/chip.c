@@ -108,9 +108,13 @@ static void on_sleep(avr_t *avr, avr_cycle_count_t cycles) {
 }
 
 static void on_log(avr_t *avr, const int wanted, const char *format, va_list values) {
-    (void)avr;
-    if (wanted <= LOG_ERROR)
-        vfprintf(stderr, format, values);
+    if (wanted > LOG_ERROR || (avr && avr->state == cpu_Crashed))
+        return;
+    fputs("simboard: ", stderr);
+    vfprintf(stderr, format, values);
+    /* libsimavr runs on over what it cannot decode */
+    if (avr && strstr(format, "CORE:"))
+        avr->state = cpu_Crashed;
 }
 
 static bool in_sram(long address, int n) { return address > 0 && n > 0 && address + n - 1 <= chip->ramend; }

@@ -414,6 +414,19 @@ void control_execute(char *line, FILE *reply) {
         fail(reply, "no command '%s'; see help", c);
 }
 
+bool control_do(char *command) {
+    char *text = NULL;
+    size_t size;
+    FILE *reply = open_memstream(&text, &size);
+    control_execute(command, reply);
+    fclose(reply);
+    bool good = !strstr(text, "\"error\"");
+    if (!good)
+        fprintf(stderr, "simboard: %s", text);
+    free(text);
+    return good;
+}
+
 void control_run_until(uint64_t cycle) {
     do {
         int next = -1;
@@ -429,14 +442,7 @@ void control_run_until(uint64_t cycle) {
             return;
         char *command = later[next].command;
         later[next] = later[--later_count];
-        char *text = NULL;
-        size_t size;
-        FILE *reply = open_memstream(&text, &size);
-        control_execute(command, reply);
-        fclose(reply);
-        if (strstr(text, "\"error\""))
-            fprintf(stderr, "simboard: after: %s", text);
-        free(text);
+        control_do(command);
         free(command);
     } while (!control_quit);
 }

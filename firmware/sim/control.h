@@ -21,6 +21,9 @@ enum { CONTROL_FDS = 10 };
 /* Run the chip and what `after` has put off until then. */
 void control_run_until(uint64_t cycle);
 
+/* Carry out one command without an answer; errors go to standard error. */
+bool control_do(char *command);
+
 /* Carry out one command, write the reply with its newline. */
 void control_execute(char *line, FILE *reply);
 void control_stats(FILE *out);

@@ -26,7 +26,7 @@ static const char USAGE[] =
     "  --bootloader MS      a bootloader that hides MCUSR and, after an external reset, takes MS\n"
     "  --no-reset-on-open   opening the port does not reset the board\n"
     "  --driver NAME        timing to hold: a4988 (default), drv8825, tmc2209\n"
-    "  --pin NAME=0|1|z     drive an input from the start; repeatable\n"
+    "  --do COMMAND         carry out a command of the control channel at the start; repeatable\n"
     "  --baud N             the host's true baud rate (default: the standard rate nearest to the board's)\n"
     "  --trace FILE         record every edge (format: README.md)\n"
     "  --stats FILE         write the figures there at the end\n"
@@ -88,19 +88,19 @@ static void loop(void) {
 }
 
 int main(int argc, char **argv) {
-    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, BOOT, NO_RESET, DRIVER, PIN, BAUD, TRACE, STATS, SEED, QUIET, HELP };
+    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, BOOT, NO_RESET, DRIVER, DO, BAUD, TRACE, STATS, SEED, QUIET, HELP };
     static const struct option options[] = {
         {"board", 1, 0, BOARD}, {"elf", 1, 0, ELF}, {"link", 1, 0, LINK}, {"control", 1, 0, CONTROL},
         {"stdin", 0, 0, STDIN}, {"speed", 1, 0, SPEED}, {"ahead", 1, 0, AHEAD}, {"bootloader", 1, 0, BOOT},
-        {"no-reset-on-open", 0, 0, NO_RESET}, {"driver", 1, 0, DRIVER}, {"pin", 1, 0, PIN}, {"baud", 1, 0, BAUD},
+        {"no-reset-on-open", 0, 0, NO_RESET}, {"driver", 1, 0, DRIVER}, {"do", 1, 0, DO}, {"baud", 1, 0, BAUD},
         {"trace", 1, 0, TRACE}, {"stats", 1, 0, STATS}, {"seed", 1, 0, SEED}, {"quiet", 0, 0, QUIET},
         {"help", 0, 0, HELP}, {0},
     };
     const board *b = NULL;
     const driver *d = drivers;
     const char *elf = NULL, *link = NULL, *control = NULL, *trace = NULL, *stats = NULL;
-    const char *pins[64];
-    int pin_count = 0;
+    char *commands[64];
+    int command_count = 0;
     bool from_stdin = false, quiet = false;
     uint64_t seed = 1;
     for (int o; (o = getopt_long(argc, argv, "h", options, NULL)) != -1;) {
@@ -126,10 +126,10 @@ int main(int argc, char **argv) {
             if (!d->name)
                 die(optarg, "no such driver; there are a4988, drv8825, tmc2209");
             break;
-        case PIN:
-            if (pin_count == 64)
-                die("--pin", "too many");
-            pins[pin_count++] = optarg;
+        case DO:
+            if (command_count == 64)
+                die("--do", "too many");
+            commands[command_count++] = optarg;
             break;
         case BAUD: line_host_baud = positive("--baud", optarg); break;
         case TRACE: trace = optarg; break;
@@ -152,12 +152,9 @@ int main(int argc, char **argv) {
     if (trace && !pins_trace_open(trace))
         die(trace, strerror(errno));
     chip_reset(RESET_POWER);
-    for (int i = 0; i < pin_count; i++) {
-        char name[16] = "", level[2] = "";
-        if (sscanf(pins[i], "%15[^=]=%1[01z]", name, level) != 2 ||
-            !inputs_drive(name, *level == 'z' ? INPUT_RELEASED : *level - '0'))
-            die(pins[i], "--pin NAME=0, 1 or z");
-    }
+    for (int i = 0; i < command_count; i++)
+        if (!control_do(commands[i]))
+            return 2;
     if (!port_start(link))
         die("serial port", strerror(errno));
     if (control && !control_listen(control))
@@ -168,10 +165,13 @@ int main(int argc, char **argv) {
     sigaction(SIGINT, &act, NULL);
     sigaction(SIGTERM, &act, NULL);
     signal(SIGPIPE, SIG_IGN);
-    if (!quiet) {
+    if (from_stdin)
         printf("{\"board\": \"%s\", \"port\": \"%s\"}\n", b->name, port_path());
-        fflush(stdout);
-    }
+    else if (!quiet)
+        printf("%s runs behind %s (Ctrl-C ends it; type help for what it can do to the board). Try:\n\n"
+               "    armkin send robots/three_dof.yaml -30 5 -5 --port %s\n\n",
+               b->name, port_path(), port_path());
+    fflush(stdout);
     loop();
     pins_trace_close();
     port_end();

@@ -20,7 +20,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -62,8 +62,12 @@ def build_firmware(board: str) -> Path:
 def compile_program(source: Path, board: str, into: Path, *options: str) -> Path:
     """A single C file to an ELF for the board's chip."""
     elf = into / f"{source.stem}.{board}.elf"
-    command = ["avr-gcc", f"-mmcu={MCU[board]}", f"-DF_CPU={CLOCK_HZ}UL", "-Os", "-Wall", "-Wextra", "-Werror"]
-    subprocess.run([*command, *options, "-o", str(elf), str(source)], check=True)
+    chip = [f"-mmcu={MCU[board]}", f"-DF_CPU={CLOCK_HZ}UL"]
+    warnings = ["-Wall", "-Wextra", "-Werror"]
+    subprocess.run(
+        ["avr-gcc", *chip, "-Os", *warnings, *options, "-o", str(elf), str(source)],
+        check=True,
+    )
     return elf
 
 
@@ -103,7 +107,8 @@ class Trace:
 
     def rises(self, name: str) -> NDArray[np.int64]:
         cycle, level = self.edges(name)
-        return cycle[level == 1]
+        rising: NDArray[np.int64] = cycle[level == 1]
+        return rising
 
     def steps(self, axis: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Cycle and direction (+1: DIR low, -1: DIR high) of every step of an axis."""
@@ -125,7 +130,7 @@ class EmulatedBoard:
     `speed`: simulated seconds per second; "max": free-running until `ahead_ms` after the host's last byte,
     then 1; "step": only in `run`.
     `bootloader`: milliseconds that a bootloader takes after an external reset; it hides the reset's cause.
-    `pins`: inputs driven from the start, {"A0": 0}.
+    `commands`: of the control channel, carried out before the program starts: ("pin A0 0",).
     `baud`: the host's true rate, if it shall differ from what the board has set.
     """
 
@@ -139,7 +144,7 @@ class EmulatedBoard:
         bootloader: float | None = None,
         reset_on_open: bool = True,
         driver: str = "a4988",
-        pins: Mapping[str, int] | None = None,
+        commands: Sequence[str] = (),
         baud: int | None = None,
         trace: bool = False,
         seed: int = 1,
@@ -147,15 +152,16 @@ class EmulatedBoard:
         self.board = board
         self.port = ""
         self._elf = elf
-        self._options = ["--speed", str(speed), "--ahead", str(ahead_ms), "--driver", driver, "--seed", str(seed)]
+        self._options = ["--speed", str(speed), "--ahead", str(ahead_ms)]
+        self._options += ["--driver", driver, "--seed", str(seed)]
         if bootloader is not None:
             self._options += ["--bootloader", str(bootloader)]
         if not reset_on_open:
             self._options.append("--no-reset-on-open")
         if baud is not None:
             self._options += ["--baud", str(baud)]
-        for pin, level in (pins or {}).items():
-            self._options += ["--pin", f"{pin}={level}"]
+        for command in commands:
+            self._options += ["--do", command]
         self._traced = trace
         self._folder = Path()
         self._process: subprocess.Popen[bytes] | None = None
@@ -186,7 +192,8 @@ class EmulatedBoard:
         """End the emulator, by force if it must be; its files go."""
         process, self._process = self._process, None
         if process is not None:
-            assert process.stdin is not None and process.stdout is not None
+            assert process.stdin is not None
+            assert process.stdout is not None
             process.stdin.close()  # the emulator ends with its standard input
             try:
                 process.wait(5)
@@ -219,8 +226,11 @@ class EmulatedBoard:
         """Give one command, return its answer; raises BoardError if it was refused."""
         if self._process is None or self._process.stdin is None:
             raise BoardError("the board is not running: use it in a with block")
-        self._process.stdin.write(command.encode() + b"\n")
-        self._process.stdin.flush()
+        try:
+            self._process.stdin.write(command.encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise BoardError(f"the emulator ended with exit code {self._process.wait()}") from None
         answer = self._answer(timeout)
         if "error" in answer:
             raise BoardError(f"{command!r}: {answer['error']}")
