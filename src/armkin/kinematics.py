@@ -44,6 +44,32 @@ def fk(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, q, (4, 4), tip)
 
 
+def position(arm: Arm, q: ArrayLike) -> Array:
+    """Position of the tool alone, at about half the cost of `fk`.
+
+    q: (..., n) [rad | mm]. Returns (..., 3) [mm].
+    """
+
+    def point(q: list[Entry], out: Array) -> None:
+        p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
+        for i in reversed(range(arm.n)):
+            if arm.prismatic[i]:
+                p = [p[0], p[1], soa.add(p[2], q[i])]
+            else:
+                c, s = soa.cos_sin(q[i])
+                x, y = p[0], p[1]
+                p = [
+                    soa.sub(soa.mul(c, x), soa.mul(s, y)),
+                    soa.add(soa.mul(s, x), soa.mul(c, y)),
+                    p[2],
+                ]
+            p = soa.apply(soa.constant(arm.link[i]), p)
+        for row, entry in enumerate(p):
+            out[..., row] = entry
+
+    return _batched(arm, q, (3,), point)
+
+
 def frames(arm: Arm, q: ArrayLike) -> Array:
     """Pose of the base, of every joint's frame and of the tool.
 
