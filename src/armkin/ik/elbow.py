@@ -31,14 +31,15 @@ class Elbow:
     def __init__(self, chain: Chain, tip: Array) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
         L2 = chain.link[2]
-        self.sense3 = 1.0 if L2[2, 2] > 0 else -1.0
-        if self.sense3 < 0:
+        sense3 = 1.0 if L2[2, 2] > 0 else -1.0
+        if sense3 < 0:
             L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
         self.prismatic1 = bool(chain.prismatic[0])
         self.from_base = soa.constant(inverse(chain.link[0]))
         self.shoulder = soa.constant(chain.link[1])  # frame of joint 2 seen from joint 1
-        self.upper = [float(v) for v in L2[:3, 3]]  # upper arm, frame of joint 2
-        self.fore = [float(v) for v in L2[:3, :3] @ tip]  # forearm at q3 = 0, frame of joint 2
+        upper, fore = L2[:3, 3], L2[:3, :3] @ tip  # upper arm, forearm at q3 = 0
+        self.along = float(upper[2] + fore[2])
+        self.two_link = TwoLink(upper[:2], fore[:2], sense3)
         self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
 
     def solve(
@@ -53,7 +54,7 @@ class Elbow:
         """
         x, y, z = soa.apply(self.from_base, p)
         n, o = self.shoulder[6:9], self.shoulder[9:12]
-        along = soa.add(self.upper[2] + self.fore[2], past[2])
+        along = soa.add(self.along, past[2])
         if self.prismatic1:
             ahead = soa.sub(soa.dot(n, [x, y, z]), along + soa.dot(n, o))
             first, doubt1 = Pair(ahead / n[2], None), np.zeros(1, bool)
@@ -68,8 +69,22 @@ class Elbow:
         lever = [soa.sub(x, o[0]), soa.sub(y, o[1]), soa.sub(z, o[2])]
         rx = soa.sub(soa.dot(self.shoulder[0:3], lever), past[0])
         ry = soa.sub(soa.dot(self.shoulder[3:6], lever), past[1])
-        lx, ly, _ = self.upper
-        mx, my, _ = self.fore
+        second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2])
+        return [first, second, third], any_branch(doubt1) | doubt23
+
+
+class TwoLink:
+    """``Rz(q2) (l + Rz(q3) m) = r`` in a plane: the elbow of two parallel joints."""
+
+    def __init__(self, upper: Array, fore: Array, sense: float) -> None:
+        """upper, fore: l and m, (2,) [mm]; sense: -1 if joint 3 turns against joint 2."""
+        (self.lx, self.ly), (self.mx, self.my) = upper.tolist(), fore.tolist()
+        self.sense = sense
+        self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
+
+    def solve(self, rx: Entry, ry: Entry, prefer2: Pair, prefer3: Pair) -> tuple[Pair, Pair, Array]:
+        """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,)."""
+        lx, ly, mx, my = self.lx, self.ly, self.mx, self.my
         # |r|^2 = |l + Rz(q3) m|^2
         third, doubt3 = linear(
             2.0 * (lx * mx + ly * my),
@@ -77,16 +92,14 @@ class Elbow:
             rx * rx + ry * ry - (lx * lx + ly * ly + mx * mx + my * my),
             1,
             self.scale**2,
-            prefer[2],
+            prefer3,
         )
         c3, s3 = third
         ux = lx + soa.sub(soa.mul(c3, mx), soa.mul(s3, my))
         uy = ly + soa.add(soa.mul(s3, mx), soa.mul(c3, my))
-        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer[1])
-        doubt = any_branch(doubt1) | any_branch(doubt2) | any_branch(doubt3)
-        if self.sense3 < 0:
-            third = Pair(c3, -s3)
-        return [first, second, third], doubt
+        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
+        doubt = any_branch(doubt2) | any_branch(doubt3)
+        return second, third if self.sense > 0 else Pair(c3, -s3), doubt
 
 
 def any_branch(doubt: Array) -> Array:

@@ -36,19 +36,22 @@ def signs(axis: int) -> Array:
     return np.array([1.0, -1.0]).reshape(shape)
 
 
-def linear(a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair) -> tuple[Pair, Array]:
+def linear(
+    a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair, disc: Entry | None = None
+) -> tuple[Pair, Array]:
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
     a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
     length that makes a and b dimensionless; prefer: the angle to give where the equation
-    leaves it free. Returns the pair and doubt, a boolean array: True where the roots are
+    leaves it free; disc: ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a boolean array: True where the roots are
     about to merge or the angle is free. Without a real root the pair is that of the closest
     angle, not normalised; the caller finds by its residual that it is no solution.
     """
     sign = signs(axis)
     h2 = soa.add(soa.mul(a, a), soa.mul(b, b))
     free = h2 < FREE * scale * scale
-    disc = h2 - c * c
+    if disc is None:
+        disc = h2 - c * c
     doubt = (np.abs(disc) < TANGENT * h2) | free
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
     if isinstance(h2, float):

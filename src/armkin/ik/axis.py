@@ -1,0 +1,61 @@
+"""Position and direction of the tool's z axis with five joints: xyz_axis.
+
+A sixth, virtual joint about the tool's z axis makes it a full pose whose turn about z is
+anything: any orientation with the wanted axis will do, and the virtual joint is dropped.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin import soa
+from armkin.arm import from_links
+from armkin.ik.geometry import Geometry
+from armkin.ik.subproblems import Pair
+from armkin.ik.tasks import Task, task_for
+from armkin.soa import Array, Entry
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Five joints of any geometry."""
+    from armkin.ik import general, spherical, three_parallel
+
+    if task.name != "xyz_axis" or arm.n != 5:
+        return None
+    six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
+    pose = task_for(six, "pose")
+    inner = spherical.recognise(six, pose) or three_parallel.recognise(six, pose) or general.recognise(six, pose)
+    assert inner is not None
+    why = f"with a virtual joint about the tool's axis: {inner.why}"
+    if inner.pairs is not None:
+        solve = inner.pairs
+
+        def pairs(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+            found, doubt = solve(_pose(goal), [*prefer, Pair(1.0, 0.0)])
+            return found[:5], doubt
+
+        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels)
+    solve_rows = inner.rows
+    assert solve_rows is not None
+
+    def rows(goal: Array) -> tuple[Array, Array]:
+        T = np.empty((len(goal), 4, 4))
+        soa.write(_pose(list(goal.T)), T)
+        q, doubt = solve_rows(T)
+        return q[:, :, :5], doubt
+
+    return Geometry(inner.name, why, inner.complete, rows=rows)
+
+
+def _pose(goal: list[Entry]) -> soa.Pose:
+    """A pose at x y z whose z axis is ax ay az; x is across, without a jump near the poles' axis (Duff et al. 2017)."""
+    x, y, z = goal[3:6]
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return [1.0 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y, x, y, z, *goal[:3]]

@@ -1,0 +1,115 @@
+"""Spherical wrists and shoulders: three joint axes that meet in one point at an end of the arm.
+
+The point does not feel the three joints: the other three place it (`Elbow` or `Position`),
+and the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose
+first three axes meet is the same arm walked from the tool to the base.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin import soa
+from armkin.ik.chain import Chain, inverse, is_parallel, reverse
+from armkin.ik.elbow import Elbow, any_branch
+from armkin.ik.geometry import EXACT, Geometry
+from armkin.ik.position import Position
+from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.tasks import Task
+from armkin.soa import Array, Pose
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Six joints and a full pose, axes 4, 5, 6 or 1, 2, 3 meeting in a point."""
+    if task.name != "pose" or arm.n != 6:
+        return None
+    chain = Chain(arm.link, arm.prismatic)
+    centre = wrist_centre(chain, EXACT * arm.reach)
+    if centre is not None:
+        wrist = SphericalWrist(chain, *centre)
+        why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
+        return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels)
+    chain = reverse(chain)
+    centre = wrist_centre(chain, EXACT * arm.reach)
+    if centre is None:
+        return None
+    shoulder = SphericalWrist(chain, *centre)
+
+    def solve(goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        pairs, doubt = shoulder.solve(soa.inverse(goal), prefer[::-1])
+        return pairs[::-1], doubt
+
+    return Geometry("spherical shoulder", f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}", True, solve)
+
+
+def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
+    """Where axes 4, 5 and 6 meet: seen after joint 3 and after joint 6, (3,) each, or None."""
+    if chain.prismatic[3:].any() or is_parallel(chain.link[4], 1e-6) or is_parallel(chain.link[5], 1e-6):
+        return None
+    # axis 4 is the z axis, axis 5 the line t + s w: the foot of their common perpendicular on axis 4
+    t, w = chain.link[4][:3, 3], chain.link[4][:3, 2]
+    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])
+    at4 = np.array([0.0, 0.0, height])
+    at5 = (inverse(chain.link[4]) @ [*at4, 1.0])[:3]
+    at6 = (inverse(chain.link[5]) @ [*at5, 1.0])[:3]
+    if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:
+        return None
+    L3 = chain.link[3]
+    return L3[:3, :3] @ at4 + L3[:3, 3], at6
+
+
+class SphericalWrist:
+    """Three joints that place the wrist's centre, then three that turn the tool about it."""
+
+    def __init__(self, chain: Chain, after3: Array, after6: Array) -> None:
+        """after3, after6: (3,) the centre seen after joint 3 and after joint 6 [mm]."""
+        self.chain = chain
+        self.labels: tuple[str, ...] = ()
+        if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], EXACT) and not chain.prismatic[0]:
+            elbow = Elbow(chain, after3)
+            self.place = lambda p, prefer: elbow.solve(p, [0.0, 0.0, 0.0], prefer)
+            self.why = "axes 2 and 3 are parallel"
+            self.labels = ("shoulder", "elbow", "wrist")
+        else:
+            position = Position(chain, after3)
+            self.place = position.solve
+            self.why = f"joints 1, 2 and 3: {position.why}"
+        self.links = [soa.constant(L) for L in chain.link[:4]]
+        end = inverse(chain.link[6])
+        self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # in the tool's frame
+        self.end = soa.constant(end)
+        self.A = soa.constant(chain.link[4])
+        self.B = soa.constant(chain.link[5])
+        A, b = chain.link[4][:3, :3], chain.link[5][:3, 2]
+        # z . A Rz(q5) b = c5 (A20 b0 + A21 b1) + s5 (A21 b0 - A20 b1) + A22 b2
+        self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
+        self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
+        self.rest5 = float(A[2, 2] * b[2])
+        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+
+    def solve(self, goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        """All joints for a pose: six pairs on branch axes (b0, b1, 2, N), and doubt (N,)."""
+        pairs, doubt = self.place(soa.apply(goal, self.centre), prefer[:3])
+        P = self.links[0]
+        for i, pair in enumerate(pairs):
+            P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, *pair)
+            P = soa.times(P, self.links[i + 1])
+        # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
+        x = soa.turn_back(P, soa.turn(goal, self.end[0:3]))
+        z = soa.turn_back(P, soa.turn(goal, self.end[6:9]))
+        disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        turn5 = soa.rotate(self.A, *fifth)
+        u = soa.turn(turn5, self.B[6:9])
+        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3])
+        c4, s4 = fourth
+        # what is left is Rz(q6): its first column
+        back = soa.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
+        c6, s6, _ = soa.turn_back(self.B, back)
+        doubt = doubt | any_branch(doubt5) | any_branch(doubt4)
+        return [*pairs, fourth, fifth, Pair(c6, s6)], doubt

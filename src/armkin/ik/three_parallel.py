@@ -1,0 +1,138 @@
+"""Six revolute joints, axes 2, 3 and 4 parallel, axes 5 and 6 meeting: the UR arms and their kin.
+
+Joints 2, 3 and 4 keep the distance along their common direction n, and the angle between n
+and axis 6. The first gives joint 1, the second joint 5; joint 6 follows from n seen from
+the tool, and a planar arm of three joints with a known direction is left (Hawkins, Analytic
+Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, in coordinates of any
+convention). The chain walked from the tool to the base covers axes 3, 4 and 5.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin import soa
+from armkin.ik.chain import Chain, inverse, is_parallel, reverse
+from armkin.ik.elbow import TwoLink, any_branch
+from armkin.ik.geometry import EXACT, Geometry
+from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.tasks import Task
+from armkin.soa import Array, Pose
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Six revolute joints and a full pose."""
+    if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
+        return None
+    chain = Chain(arm.link, arm.prismatic)
+    if fits(chain, EXACT * arm.reach):
+        why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
+        return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=("shoulder", "elbow", "wrist"))
+    chain = reverse(chain)
+    if not fits(chain, EXACT * arm.reach):
+        return None
+    solver = ThreeParallel(chain)
+
+    def solve(goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        pairs, doubt = solver.solve(soa.inverse(goal), prefer[::-1])
+        return pairs[::-1], doubt
+
+    return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
+
+
+def fits(chain: Chain, tolerance: float) -> bool:
+    """Whether axes 2, 3 and 4 are parallel, axes 1 and 5 are not, and axes 5 and 6 meet."""
+    L1, L2, L3, L4, L5 = chain.link[1:6]
+    if not (is_parallel(L2, EXACT) and is_parallel(L3, EXACT)):
+        return False
+    if is_parallel(L1, 1e-6) or is_parallel(L4, 1e-6) or is_parallel(L5, 1e-6):
+        return False
+    return float(np.hypot(*_meeting(L5)[1])) <= tolerance
+
+
+def _meeting(L5: Array) -> tuple[float, Array]:
+    """Height on axis 6 of its point nearest to axis 5, and that point's distance from axis 5 (2,)."""
+    t, b = L5[:2, 3], L5[:2, 2]
+    height = -float(t @ b) / float(b @ b)
+    return height, t + height * b
+
+
+class ThreeParallel:
+    """``link[0] Z1 ... Z6 link[6]`` with axes 2, 3, 4 parallel and axes 5, 6 meeting."""
+
+    def __init__(self, chain: Chain) -> None:
+        L1, L2, L3, L4, L5 = chain.link[1:6]
+        self.from_base = soa.constant(inverse(chain.link[0]))
+        self.from_tool = soa.constant(inverse(chain.link[6]))
+        self.shoulder = soa.constant(L1)
+        self.to_joint2 = soa.constant(inverse(L1))
+        self.back5, self.back4 = soa.constant(inverse(L5)), soa.constant(inverse(L4))
+        self.height6, _ = _meeting(L5)
+        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), 1e-9)
+        # common direction of the parallel axes, along joint 2's, seen from joint 5
+        self.sense3 = 1.0 if L2[2, 2] > 0 else -1.0
+        self.sense4 = self.sense3 * (1.0 if L3[2, 2] > 0 else -1.0)
+        m = self.sense4 * L4[2, :3]
+        b = L5[:3, 2]
+        # m . Rz(q5) b
+        self.cos5, self.sin5 = float(m[0] * b[0] + m[1] * b[1]), float(m[1] * b[0] - m[0] * b[1])
+        self.rest5 = float(m[2] * b[2])
+        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.m = [float(v) for v in m]
+        self.B = soa.constant(L5)
+        # distance along the common direction from joint 2 to the point where axes 5 and 6 meet
+        meeting = L5[:3, 3] + self.height6 * b
+        past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
+        R23 = L2[:3, :3] @ L3[:3, :3]
+        self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
+        self.turned = [float(R23[0, 0]), float(R23[1, 0])]
+        self.flipped = self.sense4
+        fore = L2[:3, :3] @ L3[:3, 3]
+        self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
+
+    def solve(self, goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        """All joints for a pose: six pairs on branch axes (shoulder, elbow, wrist, N), and doubt (N,)."""
+        D = soa.times(soa.times(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
+        n, o = self.shoulder[6:9], self.shoulder[9:12]
+        g = soa.combine(1.0, D[9:12], self.height6, D[6:9])
+        a = soa.add(soa.mul(n[0], g[0]), soa.mul(n[1], g[1]))
+        b = soa.sub(soa.mul(n[0], g[1]), soa.mul(n[1], g[0]))
+        rest = soa.sub(self.along + soa.dot(n, o), soa.mul(n[2], g[2]))
+        first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+        c1, s1 = first
+        # n seen from joint 6
+        turned = [soa.sub(soa.mul(c1, n[0]), soa.mul(s1, n[1])), soa.add(soa.mul(s1, n[0]), soa.mul(c1, n[1])), n[2]]
+        w = soa.turn_back(D, turned)
+        disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
+        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        c5, s5 = fifth
+        mx, my, mz = self.m
+        v = soa.turn_back(
+            self.B, [soa.add(soa.mul(c5, mx), soa.mul(s5, my)), soa.sub(soa.mul(c5, my), soa.mul(s5, mx)), mz]
+        )
+        # Rz(-q6) v = w
+        sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5])
+        # joint 4's frame seen from joint 2
+        X = soa.times(soa.rotate(D, sixth.c, -sixth.s), self.back5)
+        X = soa.times(soa.rotate(X, c5, -s5), self.back4)
+        p = soa.apply(self.to_joint2, _unrotate(c1, s1, X[9:12]))
+        x = soa.turn(self.to_joint2, _unrotate(c1, s1, X[0:3]))
+        second, third, doubt23 = self.two_link.solve(p[0], p[1], prefer[1], prefer[2])
+        # x = Rz(q2 +- q3 +- q4) turned
+        tx, ty = self.turned
+        c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
+        for pair, sense in ((second, 1.0), (third, self.sense3)):
+            c, s = c * pair.c + sense * s * pair.s, s * pair.c - sense * c * pair.s
+        fourth = Pair(c, self.sense4 * s)
+        doubt = any_branch(doubt1) | any_branch(doubt5) | any_branch(doubt6) | doubt23
+        return [first, second, third, fourth, fifth, sixth], doubt
+
+
+def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
+    """``Rz(-q) v``."""
+    return [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]
