@@ -10,6 +10,7 @@
 #include <sim_core.h>
 
 #include "inputs.h"
+#include "interrupts.h"
 #include "line.h"
 #include "pins.h"
 #include "program.h"
@@ -34,10 +35,6 @@ static uint64_t lost_in_boot;
 /* The SRAM between the last variable and the top is filled with a pattern; what differs later was touched. */
 static uint8_t *pattern;
 static long stack_floor, lowest_touched;
-
-static struct {
-    uint64_t raised, entered, accepted, count, total, longest, longest_wait;
-} interrupt[64];
 
 static uint64_t random_bits(void) {
     random_state ^= random_state >> 12;
@@ -69,38 +66,6 @@ avr_int_vector_t *chip_vector(int number) {
             return chip->interrupts.vector[i];
     fprintf(stderr, "simboard: libsimavr knows no vector %d of %s\n", number, chip_board->mcu);
     exit(1);
-}
-
-uint64_t chip_interrupt_raised(void) {
-    const avr_int_table_t *t = &chip->interrupts;
-    return t->running_ptr ? interrupt[t->running[t->running_ptr - 1]->vector & 63].accepted : 0;
-}
-
-static void on_pending(struct avr_irq_t *irq, uint32_t value, void *param) {
-    (void)irq;
-    if (value)
-        interrupt[(intptr_t)param].raised = chip_now();
-}
-
-static void on_running(struct avr_irq_t *irq, uint32_t value, void *param) {
-    (void)irq;
-    intptr_t v = (intptr_t)param;
-    if (value) {
-        /* libsimavr enters an interrupt in no time; the chip takes these cycles to push the PC */
-        unsigned entry = (unsigned)chip_board->entry_cycles;
-        interrupt[v].accepted = interrupt[v].raised;
-        if (chip_now() - interrupt[v].raised > interrupt[v].longest_wait)
-            interrupt[v].longest_wait = chip_now() - interrupt[v].raised;
-        interrupt[v].entered = chip_now();
-        chip->cycle += entry;
-        chip->run_cycle_count = chip->run_cycle_count > entry ? chip->run_cycle_count - entry : 1;
-    } else {
-        uint64_t took = chip_now() - interrupt[v].entered;
-        interrupt[v].count++;
-        interrupt[v].total += took;
-        if (took > interrupt[v].longest)
-            interrupt[v].longest = took;
-    }
 }
 
 static void on_sleep(avr_t *avr, avr_cycle_count_t cycles) {
@@ -226,11 +191,7 @@ void chip_reset(reset_kind kind) {
     resets++;
     last_reset = kind;
 
-    for (int i = 0; i < avr->interrupts.vector_count; i++) {
-        avr_int_vector_t *v = avr->interrupts.vector[i];
-        avr_irq_register_notify(v->irq + AVR_INT_IRQ_PENDING, on_pending, (void *)(intptr_t)(v->vector & 63));
-        avr_irq_register_notify(v->irq + AVR_INT_IRQ_RUNNING, on_running, (void *)(intptr_t)(v->vector & 63));
-    }
+    interrupts_attach(avr);
     uart_attach(avr);
     pins_attach(avr);
     inputs_attach(avr);
@@ -270,21 +231,6 @@ void chip_run_until(uint64_t end) {
     avr_cycle_timer_cancel(chip, on_slice_end, NULL);
 }
 
-void chip_clear(void) {
-    uint64_t keep_raised[64], keep_entered[64], keep_accepted[64];
-    for (int v = 0; v < 64; v++) {
-        keep_raised[v] = interrupt[v].raised;
-        keep_entered[v] = interrupt[v].entered;
-        keep_accepted[v] = interrupt[v].accepted;
-    }
-    memset(interrupt, 0, sizeof interrupt);
-    for (int v = 0; v < 64; v++) {
-        interrupt[v].raised = keep_raised[v];
-        interrupt[v].entered = keep_entered[v];
-        interrupt[v].accepted = keep_accepted[v];
-    }
-}
-
 void chip_json(FILE *out) {
     static const char *kinds[] = {"power", "brownout", "external", "watchdog"};
     look_at_stack();
@@ -293,15 +239,5 @@ void chip_json(FILE *out) {
     fprintf(out, "\"lost_in_bootloader\": %llu, ", (unsigned long long)lost_in_boot);
     fprintf(out, "\"memory\": {\"flash\": %u, \"ram\": %d, \"variables\": %ld, \"stack_never_touched\": %ld}, ",
             program.flashsize, chip->ramend - chip->ioend, stack_floor - chip->ioend - 1, lowest_touched - stack_floor);
-    fprintf(out, "\"interrupts\": {");
-    const char *comma = "";
-    for (int v = 0; v < 64; v++) {
-        if (!interrupt[v].count)
-            continue;
-        fprintf(out, "%s\"%d\": {\"count\": %llu, \"mean_cycles\": %.1f, \"max_cycles\": %llu, \"max_wait_cycles\": %llu}",
-                comma, v, (unsigned long long)interrupt[v].count, (double)interrupt[v].total / (double)interrupt[v].count,
-                (unsigned long long)interrupt[v].longest, (unsigned long long)interrupt[v].longest_wait);
-        comma = ", ";
-    }
-    fprintf(out, "}");
+    interrupts_json(out);
 }

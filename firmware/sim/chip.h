@@ -1,4 +1,4 @@
-/* The chip: libsimavr's core with the board's program, resets, memory and interrupt figures.
+/* The chip: libsimavr's core with the board's program, resets and memory.
  *
  * One process emulates one board, so the modules keep their state to themselves. Time is counted in
  * cycles of the 16 MHz crystal since power was first applied; resets do not turn it back. */
@@ -34,14 +34,10 @@ const char *chip_state(void);             /* "running", "bootloader", "stopped",
 
 struct avr_int_vector_t *chip_vector(int number);
 
-/* When the interrupt that is being served was raised; 0 outside of interrupts. */
-uint64_t chip_interrupt_raised(void);
-
 /* The chip's data space. */
 bool chip_peek(long address, uint8_t *bytes, int n);
 bool chip_poke(long address, const uint8_t *bytes, int n);
 
-void chip_clear(void);                    /* zero the interrupt figures */
 void chip_json(FILE *out);                /* members, without braces */
 
 #endif

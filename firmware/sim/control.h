@@ -1,4 +1,4 @@
-/* The control channel: one command a line, one line of JSON back. `help` lists the commands. */
+/* The control channel: one command a line, one line of JSON back. commands.h knows the commands. */
 #ifndef SIM_CONTROL_H
 #define SIM_CONTROL_H
 
@@ -6,6 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
+
+enum { CONTROL_FDS = 10, CONTROL_LONGEST = 1 << 20 };   /* descriptors at most; bytes of a line at most */
 
 extern bool control_quit;
 extern bool control_stepped;              /* time moves by `run` only */
@@ -16,19 +18,13 @@ void control_end(void);
 int control_wait_for(struct pollfd *fds); /* at most CONTROL_FDS */
 void control_service(void);
 
-enum { CONTROL_FDS = 10 };
-
 /* Run the chip and what `after` has put off until then. */
 void control_run_until(uint64_t cycle);
 
 /* Carry out one command without an answer; errors go to standard error. */
 bool control_do(char *command);
 
-/* Carry out one command, write the reply with its newline. */
-void control_execute(char *line, FILE *reply);
-void control_stats(FILE *out);
-
-/* "3ms", "250us", "2s", "800cycles", "800" (cycles) to cycles; false: no such time. */
-bool control_time(const char *text, uint64_t *cycles);
+/* Carry out a command at that cycle; false: too many wait. */
+bool control_later(uint64_t cycle, const char *command);
 
 #endif

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "chip.h"
+#include "commands.h"
 #include "control.h"
 #include "inputs.h"
 #include "line.h"
@@ -173,14 +174,14 @@ int main(int argc, char **argv) {
                b->name, port_path(), port_path());
     fflush(stdout);
     loop();
-    pins_trace_close();
+    pins_trace_flush();
     port_end();
     control_end();
     if (stats) {
         FILE *out = fopen(stats, "w");
         if (!out)
             die(stats, strerror(errno));
-        control_stats(out);
+        commands_stats(out);
         fclose(out);
     }
     return !strcmp(chip_state(), "crashed");

@@ -9,6 +9,7 @@
 
 #include "chip.h"
 #include "inputs.h"
+#include "interrupts.h"
 
 /* Signals are ordered so that of two edges in one port write DIR and ENABLE count before STEP. */
 typedef enum { DIR, ENABLE, STEP, SERVO } signal_kind;
@@ -183,7 +184,7 @@ static void on_step(int index, bool level, uint64_t now) {
         a->disabled += e->level;
         a->waking += !e->level && e->changed && now - e->changed < (uint64_t)limits.wake_us;
     }
-    uint64_t raised = chip_interrupt_raised();
+    uint64_t raised = interrupts_raised();
     if (raised)
         widen(&a->latency, now - raised);
     a->position += dir->level ? -1 : 1;
@@ -292,7 +293,7 @@ bool pins_trace_open(const char *path) {
     return true;
 }
 
-void pins_trace_close(void) {
+void pins_trace_flush(void) {
     if (trace)
         fflush(trace);
 }

@@ -20,7 +20,7 @@ extern const driver drivers[];            /* ends with a NULL name */
 
 void pins_init(const board *b, const driver *d);
 bool pins_trace_open(const char *path);
-void pins_trace_close(void);
+void pins_trace_flush(void);
 
 void pins_attach(struct avr_t *avr);      /* watch the ports of a chip that was just made */
 void pins_clear(void);                    /* zero all figures but the positions */

@@ -9,6 +9,7 @@
  *   l      levels of the limit pins X Y Z and of the abort pin, as four digits
  *   w      turns the watchdog on and hangs
  *   t<n>   n pulses on Y, one each timer1 compare interrupt, 640 cycles apart
+ *   f      waits for timer1's compare flag, puts X DIR high, enables the interrupt: one pulse on Y
  *   g      one 1500 us pulse on A3 (RAMPS: D11), as a servo's
  *   d      uses 300 bytes of stack */
 #include <avr/interrupt.h>
@@ -174,6 +175,14 @@ int main(void) {
             left = get();
             TCNT1 = 0;
             TIFR1 = 1 << OCF1A;
+            TIMSK1 = 1 << OCIE1A;
+            while (TIMSK1) {}
+            break;
+        case 'f':
+            left = 1;
+            TIFR1 = 1 << OCF1A;
+            while (!(TIFR1 & 1 << OCF1A)) {}
+            PORT_STEP |= 1 << X_DIR;
             TIMSK1 = 1 << OCIE1A;
             while (TIMSK1) {}
             break;

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import serial
-from emulator import CLOCK_HZ, BoardError, EmulatedBoard, compile_program
+from emulator import CLOCK_HZ, BoardError, EmulatedBoard, build_simulator, compile_program
 
 PROBE = Path(__file__).with_name("probe.c")
 MS = 1e-3
@@ -77,6 +83,14 @@ def test_timer_interrupts_come_on_time_and_pay_their_entry(probe: Path) -> None:
         assert stats["interrupts"] == {}
         assert stats["axes"]["Y"]["latency_min_us"] is None
         assert stats["axes"]["Y"]["net"] == 200
+
+
+def test_an_old_flag_fires_when_its_interrupt_is_enabled(probe: Path) -> None:
+    with stepped(probe) as board:
+        started(board).run(10 * MS, b"f")
+        (step,) = board.trace().rises("Y.STEP")
+        (marked,) = board.trace().rises("X.DIR")
+        assert 5 < step - marked < 30  # not at the next compare, 640 cycles on
 
 
 def test_timing_that_a_driver_would_miss_is_counted(probe: Path) -> None:
@@ -440,3 +454,38 @@ def test_nothing_is_left_behind_when_a_test_fails(probe: Path) -> None:
     with pytest.raises(BoardError, match="not running"):
         board.control("cycles")
     board.close()  # again does no harm
+
+
+def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
+    """Without Python: a link, a control socket, Ctrl-C, the figures in a file."""
+    folder = Path(tempfile.mkdtemp(prefix="armkin-"))  # socket paths must be short
+    link, control, figures = folder / "board", folder / "control", tmp_path / "figures.json"
+    link.symlink_to("/nowhere")  # left by an emulator that was killed
+    command = [str(build_simulator()), "--board", "uno_cnc_shield", "--elf", str(probe)]
+    command += ["--link", str(link), "--control", str(control), "--stats", str(figures), "--do", "pin A0 0"]
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    with process:
+        assert process.stdout is not None
+        assert f"--port {link}" in "".join(process.stdout.readline() for _ in range(4))
+        with serial.Serial(str(link), 250000, timeout=5) as port:
+            time.sleep(0.02)
+            assert ask(port, b"l") == b"1110\n"
+        with socket.socket(socket.AF_UNIX) as client, client.makefile("rw") as lines:
+            client.connect(str(control))
+            for sent, answer in (("pin A0 z", "true"), ("pin A0 2", "false")):
+                lines.write(sent + "\n")
+                lines.flush()
+                assert ("ok" in json.loads(lines.readline())) is (answer == "true")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(5) == 0
+    assert json.loads(figures.read_text())["uart"]["received"] == 1
+    assert list(folder.iterdir()) == []
+    folder.rmdir()
+
+    link.parent.mkdir()
+    link.write_text("somebody's file")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "no symbolic link" in done.stderr
+    assert link.read_text() == "somebody's file"
+    shutil.rmtree(folder)
