@@ -122,12 +122,12 @@ def _parse(text: str) -> Iterator[Any]:
             raise StrictYamlError(0, f"not YAML: {error.problem}") from None
         source = text.splitlines() or [""]
         line = min(mark.line + 1, len(source))  # an end that came too early is on the last line
-        shown = source[line - 1]
-        if "\t" in shown[: len(shown) - len(shown.lstrip())] or shown[mark.column : mark.column + 1] == "\t":
+        faulty = source[line - 1]
+        character = faulty[mark.column : mark.column + 1]
+        if character == "\t" or "\t" in faulty[: len(faulty) - len(faulty.lstrip())]:
             raise StrictYamlError(line, "a tab is not allowed in YAML's indentation; use spaces") from None
-        if shown[mark.column : mark.column + 1] in ("%", "@", "`"):
-            what = f"text cannot begin with {shown[mark.column]}; put it in quotes"
-            raise StrictYamlError(line, what) from None
+        if character and character in "%@`":
+            raise StrictYamlError(line, f"text cannot begin with {character}; put it in quotes") from None
         problem = str(error.problem)
         begin = error.context_mark.line + 1 if error.context_mark else line
         where = f" ({error.context} that begins on line {begin})" if begin < line else ""
@@ -169,10 +169,11 @@ def _build(events: Iterator[Any]) -> Document:
             continue
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
             mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
-            what = f"{mark}{event.anchor}: anchors and aliases are refused, as they can unfold without bound"
-            raise StrictYamlError(line, f"{what}; write the value out, or quote text that begins with {mark}")
+            what = f"{mark}{shown(event.anchor)}: anchors and aliases are refused, as they can unfold"
+            hint = f"write the value out, or quote text that begins with {mark}"
+            raise StrictYamlError(line, f"{what} without bound; {hint}")
         if getattr(event, "tag", None) is not None:
-            what = f"tag {event.tag} is refused: values are plain numbers, text, lists and mappings"
+            what = f"tag {shown(event.tag)} is refused: values are plain numbers, text, lists and mappings"
             raise StrictYamlError(line, f"{what}; remove the tag")
         parent = stack[-1] if stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
@@ -203,7 +204,7 @@ def _build(events: Iterator[Any]) -> Document:
         if not stack:
             root = value
             if not isinstance(root, dict):
-                found = "a list" if isinstance(root, tuple) else f"only the text {_shown(str(root))}"
+                found = "a list" if isinstance(root, tuple) else f"only the text {shown(str(root))}"
                 what = f"{found}; a robot file is a mapping: name, convention, joints, ..."
                 raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
         elif stack[-1].mapping:
@@ -224,12 +225,12 @@ def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
         if not text:
             raise StrictYamlError(line, "a value without a key; write key: value")
         if not isinstance(_resolve(text, line), str):
-            raise StrictYamlError(line, f"key {_shown(text)} is not a word; names need a letter, or quotes")
+            raise StrictYamlError(line, f"key {shown(text)} is not a word; names need a letter, or quotes")
     _check_text(text, line)
     path = (*parent.path, text)
     if text in parent.items:
         first = lines[path]
-        raise StrictYamlError(line, f"key {_shown(text)} stands twice, first on line {first}; keep one")
+        raise StrictYamlError(line, f"key {shown(text)} stands twice, first on line {first}; keep one")
     lines[path] = line
     return text
 
@@ -242,8 +243,11 @@ def _scalar(event: Any, parent: _Node | None, line: int) -> Any:
     if text in ("", "~", "null", "Null", "NULL"):
         if parent is None:
             raise StrictYamlError(0, _EMPTY)
-        name = parent.key if parent.mapping else f"item {len(parent.items) + 1}"
-        raise StrictYamlError(line, f"{name} has no value; give one, or leave the key out")
+        if parent.mapping:
+            raise StrictYamlError(
+                line, f"{shown(parent.key or '')} has no value; give one, or leave the key out"
+            )
+        raise StrictYamlError(line, f"item {len(parent.items) + 1} of a list has no value; give one")
     value = _resolve(text, line)
     if isinstance(value, str):
         _check_text(text, line)
@@ -268,12 +272,12 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
 def _number(text: str, line: int) -> str | int | float:
     if re.fullmatch(_INT, text):
         if len(text) > MAX_DIGITS:
-            raise StrictYamlError(line, f"{_shown(text)} has more than {MAX_DIGITS} digits; is it a number?")
+            raise StrictYamlError(line, f"{shown(text)} has more than {MAX_DIGITS} digits; is it a number?")
         return int(text)
     if re.fullmatch(_FLOAT, text):
         value = float(text)
         if not math.isfinite(value):
-            raise StrictYamlError(line, f"{_shown(text)} is too large for a number")
+            raise StrictYamlError(line, f"{shown(text)} is too large for a number")
         return value
     if re.fullmatch(_NOT_FINITE, text):
         raise StrictYamlError(line, f"{text} is not a finite number; leave the key out if there is no bound")
@@ -281,22 +285,22 @@ def _number(text: str, line: int) -> str | int | float:
         raise StrictYamlError(line, _sexagesimal(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
         plain = zeros[1] + (zeros[2].lstrip("0") or "0") if "." not in zeros[2] else zeros[1] + zeros[2]
-        what = f"{_shown(text)} begins with 0, which YAML may read as octal"
-        raise StrictYamlError(line, f"{what}; write {_shown(plain)}, or quotes for text")
+        what = f"{shown(text)} begins with 0, which YAML may read as octal"
+        raise StrictYamlError(line, f"{what}; write {shown(plain)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):
-        raise StrictYamlError(line, f"{_shown(text)} is not decimal; write it in decimal, or in quotes")
+        raise StrictYamlError(line, f"{shown(text)} is not decimal; write it in decimal, or in quotes")
     if re.fullmatch(_UNDERSCORE, text):
         plain = text.replace("_", "")
-        raise StrictYamlError(line, f"{_shown(text)} has underscores; write {_shown(plain)}")
+        raise StrictYamlError(line, f"{shown(text)} has underscores; write {shown(plain)}")
     if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
         sign, whole, part, exponent_sign, exponent = near.groups()
         better = f"{sign.replace('+', '')}{whole or '0'}.{part or '0'}"
         if exponent:
             better += f"e{exponent_sign or '+'}{exponent}"
-        what = f"{_shown(text)} is text to YAML, not a number"
-        raise StrictYamlError(line, f"{what}; write {_shown(better)}, or quotes for text")
+        what = f"{shown(text)} is text to YAML, not a number"
+        raise StrictYamlError(line, f"{what}; write {shown(better)}, or quotes for text")
     if re.fullmatch(_TIMESTAMP, text):
-        raise StrictYamlError(line, f'{_shown(text)} is a date to YAML; write "{text}" for text')
+        raise StrictYamlError(line, f'{shown(text)} is a date to YAML; write "{text}" for text')
     return text
 
 
@@ -307,7 +311,7 @@ def _sexagesimal(text: str) -> str:
         value = str(60 * large + small) if small < 60 else "text"
         motor, joint = sorted((large, small))  # a reduction, most likely
         return f"{text} is {value} to YAML; write teeth as {{motor: {motor}, joint: {joint}}}"
-    return f"{_shown(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
+    return f"{shown(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
 
 
 def _check_text(text: str, line: int) -> None:
@@ -320,6 +324,7 @@ def _check_text(text: str, line: int) -> None:
             raise StrictYamlError(line, f"{what}; remove it")
 
 
-def _shown(text: str) -> str:
+def shown(text: str) -> str:
     """The text as it goes into a message: one short line."""
+    text = " ".join(text.split())
     return text if len(text) <= 40 else f"{text[:37]}..."

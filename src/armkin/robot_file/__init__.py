@@ -58,7 +58,8 @@ def read(path: str | os.PathLike[str]) -> RobotFile:
             raw = file.read(strict_yaml.MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        hint = "; name a file, for example robots/three_dof.yaml" if Path(name).is_dir() else ""
+        is_folder = isinstance(error, IsADirectoryError)
+        hint = "; name a file, for example robots/three_dof.yaml" if is_folder else ""
         raise FileError(f"{name}: cannot read the robot file: {reason}{hint}") from None
     return parse(raw, name)
 
@@ -76,10 +77,11 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     except ValidationError as error:
         from armkin.robot_file import messages  # for invalid files only
 
-        problems = sorted(
+        problems = [
             (document.line(path), f"{_where(path, document.data)}{text}")
             for path, text in messages.told(error.errors(include_url=False))
-        )
+        ]
+        problems.sort(key=lambda problem: problem[0])
         raise RobotFileError(_message(name, problems)) from None
     robot._path = name
     robot._sha256 = hashlib.sha256(raw).hexdigest()
@@ -132,10 +134,11 @@ def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:
         item = data[path[0]][path[1]]
         name = item.get("name") if isinstance(item, dict) else None
         what = str(path[0])[:-1]
-        words.append(f"{what} {name}" if isinstance(name, str) and name else f"{what} number {path[1] + 1}")
+        named = isinstance(name, str) and 0 < len(name) <= 40 and name.isprintable()
+        words.append(f"{what} {name}" if named else f"{what} number {path[1] + 1}")
         path = path[2:]
     while path and isinstance(path[-1], int):  # the line is the item's; its number says nothing
         path = path[:-1]
     if path:
-        words.append(".".join(str(part) for part in path))
+        words.append(".".join(strict_yaml.shown(str(part)) for part in path))
     return "".join(f"{word}: " for word in words)

@@ -76,15 +76,14 @@ def _joint(joint: Joint, convention: str) -> Iterator[Problem]:
     if convention == "screws":
         if joint.dh is not None:
             yield ("dh",), "convention screws takes no DH row; write a screw, or change convention"
-        if joint.screw is None:
+        elif joint.screw is None:
             yield (), "has no screw; convention screws needs one: screw: {w: [0, 0, 1], v: [0, 0, 0]}"
         else:
             yield from _screw(joint)
-    else:
-        if joint.screw is not None:
-            yield ("screw",), f"convention {convention} takes no screw; write dh, or change convention"
-        if joint.dh is None:
-            yield (), f"has no dh; convention {convention} needs a row: dh: {{alpha: 90, a: 0, d: 170}}"
+    elif joint.screw is not None:
+        yield ("screw",), f"convention {convention} takes no screw; write dh, or change convention"
+    elif joint.dh is None:
+        yield (), f"has no dh; convention {convention} needs a row: dh: {{alpha: 90, a: 0, d: 170}}"
     yield from _range(joint)
     if joint.homing is not None:
         yield from _homing(joint)
@@ -244,7 +243,7 @@ def _determined(motors: tuple[Motor, ...]) -> Iterator[Problem]:
     for column, name in enumerate(names):
         pivot = max(rows, key=lambda row: abs(row[column]), default=None)
         if pivot is None or abs(pivot[column]) < 1e-9 * max(1.0, *(abs(x) for x in pivot)):
-            yield ("motors",), f"leave joint {name} undetermined; joints need as many independent motors"
+            yield ("motors",), f"leave joint {name} undetermined; as many independent motors as joints"
             return
         rows = [
             [x - row[column] / pivot[column] * p for x, p in zip(row, pivot, strict=True)]

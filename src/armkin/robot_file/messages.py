@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from armkin import strict_yaml
 from armkin.robot_file import model
 
 Path = tuple[str | int, ...]
@@ -113,6 +114,8 @@ def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
         path: Path = error["loc"]
         if error["type"] == "problems":
             yield from error["ctx"]["problems"]
+        elif error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
+            continue  # pydantic counts valid items only, and the invalid ones are told already
         elif error["type"] == "missing" and path and isinstance(path[-1], int):
             if path[:-1] not in wrong_lengths:  # [1] for a triple misses two numbers: one message
                 wrong_lengths.add(path[:-1])
@@ -130,8 +133,9 @@ def _text(error: Any) -> str:
         return _unknown_key(path)
     if kind == "missing":
         key = str(path[-1])
-        return f"is required: {_EXAMPLES.get(key) or _first_sentence(_owner(path), key)}"
-    if kind == "too_long" and "joints" in path:
+        example = "text, for example three_dof" if path == ("name",) else _EXAMPLES.get(key)
+        return f"is required: {example or _first_sentence(_owner(path), key)}"
+    if kind == "too_long" and path == ("joints",):
         return f"{context['actual_length']} joints; armkin takes 1 to {context['max_length']}"
     if kind == "too_short" and path == ("joints",):
         return "is empty; an arm has at least one joint"
@@ -142,7 +146,7 @@ def _text(error: Any) -> str:
     if kind in ("float_type", "int_type"):
         return _not_a_number(kind, path, value)
     if kind == "string_type":
-        return f'must be text, not {shown(value)}; write "{value}" in quotes if that is meant'
+        return f'must be text, not {shown(value)}; write "{shown(value)}" in quotes if that is meant'
     if kind == "bool_type":
         return f"must be true or false, not {shown(value)}"
     if kind == "literal_error":
@@ -171,6 +175,8 @@ def _not_a_number(kind: str, path: Path, value: Any) -> str:
     what = "a number" if kind == "float_type" else "a whole number"
     if path[-1] in ("gear", "pulley"):
         what += " or teeth {motor: 16, joint: 80}"
+    if kind == "int_type" and isinstance(value, float) and value.is_integer():
+        return f"must be {what}, not {value}; write {value:.0f}"
     text = f"must be {what}, not {shown(value)}"
     if not isinstance(value, str):
         return text
@@ -256,7 +262,8 @@ def _example(path: Path) -> str:
 def _first_sentence(owner: type[BaseModel], key: str) -> str:
     field = owner.model_fields.get(key)
     text = (field.description if field else None) or "see the schema"
-    return text.split(". ")[0].split("; ")[0].rstrip(".")
+    first = text.split(". ")[0].split("; ")[0].rstrip(".")
+    return first[:1].lower() + first[1:]
 
 
 def shown(value: Any) -> str:
@@ -269,5 +276,4 @@ def shown(value: Any) -> str:
         return "a mapping" if value else "an empty mapping {}"
     if isinstance(value, tuple | list):
         return "a list" if value else "an empty list []"
-    text = " ".join(str(value).split())
-    return f"the text '{text if len(text) <= 40 else text[:37] + '...'}'"
+    return f"the text '{strict_yaml.shown(str(value))}'"
