@@ -36,9 +36,9 @@ from numpy.typing import NDArray
 from armkin.ik import loop, roots, slides
 from armkin.ik.chain import inverse
 from armkin.ik.loop import Loop
-from armkin.ik.merge import Answers, concatenate, merge, pack
+from armkin.ik.merge import Answers, concatenate, merge, pack, projection
 from armkin.ik.pencil import Pencil, Role, build, roles
-from armkin.ik.polish import Polished, pose_error, refine, tip
+from armkin.ik.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.soa import Array
 
 Bool = NDArray[np.bool_]
@@ -79,15 +79,18 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (16, 6))
     q[:, prismatic] = rng.uniform(-1, 1, (16, int(np.sum(prismatic))))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
     goal = np.tile(np.eye(4), (16, 1, 1))
     goal[:, :3] = np.moveaxis(frame, -1, 0)
+    size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
+    # Collinear axes, say: no solution is isolated and no role can do better.
+    redundant = bool(np.all(size[:, -1] < 1e-9))
     rated: list[tuple[float, float, Pencil]] = []
     # The first roles nearly always do; some arms with two prismatic joints need the others.
     for slots, hidden in (((0, 1, 5), (0,)), ((0, 1, 5), (1, 2)), ((2, 3, 4), (0, 1, 2))):
         rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slots, hidden)]
         rated.sort(key=lambda item: item[0])
-        if rated and rated[0][1] < HEALTHY:
+        if redundant or (rated and rated[0][1] < HEALTHY):
             break
     best = rated[0][2]
     others = [pencil for _, error, pencil in rated[1:] if error < USELESS]
@@ -190,13 +193,19 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, careful: bool) -> tuple[
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
     unsettled[seed.pose[missed | touch]] = True
     touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
-    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once.
-    pose, hidden, blurred = seed.pose[good], seed.hidden[good], done.guess[good] > 1e-5
-    order = np.lexsort((hidden, pose))
-    pose, hidden, blurred = pose[order], hidden[order], blurred[order]
-    close = (np.diff(pose) == 0) & (np.diff(hidden) < 1e-4) & (blurred[1:] | blurred[:-1])
-    unsettled[pose[1:][close]] = True
-    return _answers(closed, seed.pose, done, good), unsettled, touching
+    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
+    # and if the two answers are not the same.
+    answers = _answers(closed, seed.pose, done, good)
+    hidden, blurred = seed.hidden[good], done.guess[good] > 1e-5
+    order = np.lexsort((hidden, answers.pose))
+    close = (np.diff(answers.pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
+    close &= blurred[order][1:] | blurred[order][:-1]
+    unsettled[answers.pose[order][1:][close]] = True
+    key = projection(closed.prismatic, answers.q)
+    order = np.lexsort((key, answers.pose))
+    twice = (np.diff(answers.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
+    unsettled[answers.pose[order][1:][twice]] = True
+    return answers, unsettled, touching
 
 
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:

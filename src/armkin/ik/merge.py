@@ -48,6 +48,12 @@ def concatenate(parts: list[Answers]) -> Answers:
     )
 
 
+def projection(prismatic: Bool, q: Array) -> Array:
+    """One number for each joint vector (M, 6), equal for equal poses of the joints, else hardly ever."""
+    cosine, sine = np.where(prismatic, q, np.cos(q)), np.where(prismatic, q, np.sin(q))
+    return np.asarray(cosine @ _WEIGHTS[0] + sine @ _WEIGHTS[1])
+
+
 def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple[Answers, Bool]:
     """Sort answers by pose and keep one of each set of equal ones.
 
@@ -65,10 +71,9 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         The answers that stay, poses ascending, and for each pose (N,) whether two answers further apart
         than rounding explains were merged.
     """
-    turned = np.where(prismatic, answers.q, np.cos(answers.q)) @ _WEIGHTS[0]
-    turned += np.where(prismatic, answers.q, np.sin(answers.q)) @ _WEIGHTS[1]
-    order = np.lexsort((turned, answers.pose))
-    key, answers = turned[order], answers.take(order)
+    key = projection(prismatic, answers.q)
+    order = np.lexsort((key, answers.pose))
+    key, answers = key[order], answers.take(order)
     pose, q, residual = answers.pose, answers.q, answers.residual
     keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
     widest = float(np.abs(_WEIGHTS).sum()) * NEAR

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.ik.nudge import nudged
 from armkin.soa import Array
 
 Bool = NDArray[np.bool_]
@@ -89,16 +90,6 @@ def jacobian(frame: Array, joints: list[Array], prismatic: Bool) -> Array:
     return out
 
 
-def _inverse(matrix: Array) -> Array:
-    """Inverses of (M, k, k); exactly singular members are moved off by rounding-sized noise."""
-    try:
-        out: Array = np.asarray(np.linalg.inv(matrix))
-    except np.linalg.LinAlgError:
-        noise = np.random.default_rng(0).standard_normal(matrix.shape[1:])
-        out = np.asarray(np.linalg.inv(matrix + 1e-13 * (1 + np.abs(matrix).max()) * noise))
-    return out
-
-
 def refine(
     link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False
 ) -> Polished:
@@ -131,14 +122,14 @@ def refine(
         if stale.size:
             chosen = slice(None) if stale.size == active.size else stale
             square = jacobian(frame[..., chosen], [joint[..., chosen] for joint in joints], prismatic)
-            fresh = _inverse(square)
+            fresh = nudged(np.linalg.inv, square)
             index = active[chosen]
             weakness[index] = np.sqrt(np.einsum("mij,mij->m", fresh, fresh))
             if damped and step < steps - 2:
                 transposed = np.swapaxes(square, 1, 2)
                 damping = size[chosen] * np.minimum(size[chosen], 1.0)
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
-                fresh = np.matmul(_inverse(normal), transposed)
+                fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
         going = np.flatnonzero(size > CONVERGED)
         if step == steps or going.size == 0:
@@ -148,7 +139,8 @@ def refine(
             error, last = error[:, going], last[going]
         move = np.matmul(inverse[active], error.T[:, :, None])[:, :, 0].T
         longest = np.abs(move).max(axis=0)
-        value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, 1e-300))
+        move[:, ~np.isfinite(longest)] = 0.0  # the inverse of an all but singular Jacobian has overflown
+        value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
     return Polished(best.T, residual, guess, weakness)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armkin.ik import line_features
 from armkin.ik.chain import inverse
+from armkin.ik.nudge import nudged
 from armkin.ik.pencil import Bool, Pencil, end_monomials
 from armkin.ik.polish import advance, turn
 from armkin.soa import Array
@@ -38,7 +39,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
     lead = pencil.W.shape[0]
-    G = _solve(equations[:, :, :lead], equations[:, :, lead:])
+    G = nudged(np.linalg.solve, equations[:, :, :lead], equations[:, :, lead:])
     rough = np.abs(G).max(axis=(1, 2)) > 1e6
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
@@ -59,16 +60,6 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough)
-
-
-def _solve(left: Array, right: Array) -> Array:
-    """Batched solve; noise of rounding size is added if a member is exactly singular."""
-    try:
-        out: Array = np.asarray(np.linalg.solve(left, right))
-    except np.linalg.LinAlgError:
-        noise = np.random.default_rng(0).standard_normal(left.shape[1:])
-        out = np.asarray(np.linalg.solve(left + 1e-13 * (1 + np.abs(left).max()) * noise, right))
-    return out
 
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
@@ -98,7 +89,7 @@ def _eliminate_ends(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
         return np.swapaxes(basis[:, :, pencil.rank :], 1, 2), recover[:, 4:]
     basis, triangle = np.linalg.qr(Q, mode="complete")
     transposed = np.swapaxes(basis, 1, 2)
-    return transposed[:, 9:], _solve(triangle[:, 4:9, 4:9], transposed[:, 4:9])
+    return transposed[:, 9:], nudged(np.linalg.solve, triangle[:, 4:9, 4:9], transposed[:, 4:9])
 
 
 def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
