@@ -1,0 +1,89 @@
+"""The shipped arms against poses that their sources, or others, print."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armkin import robot_file
+from armkin.arm import load
+from armkin.kinematics import fk
+
+ROBOTS = Path(__file__).parents[1] / "robots"
+UP = [0, 0, 0, 0, 0, 0]
+
+# robot, joints [deg], tip [mm], tolerance [mm] (the digits that the source prints), source
+POSES = [
+    ("puma560", [0, 45, 180, 0, 45, 0], (596.3, -150.05, 657.48), 0.01, "RTB notebook kinematics, fkine(qn)"),
+    (
+        "puma560",
+        np.degrees([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
+        (247.8, -125.9, 1146),
+        0.5,
+        "RTB notebook icra2021",
+    ),
+    ("puma560", UP, (452.1, -150.05, 431.8 + 671.83), 0.001, "ssik puma560_ik T_HOME, plus the pedestal"),
+    ("ur3e", UP, (-456.75, -223.15, 66.5), 0.001, "ssik ur3e_ik T_HOME, in the controller's base frame"),
+    ("ur5e", UP, (-817.2, -232.9, 62.8), 0.001, "ssik ur5e_ik T_HOME, in the controller's base frame"),
+    ("irb120", UP, (374, 0, 630), 0.001, "ssik irb120_ik T_HOME"),
+    ("irb2400", UP, (940, 0, 1455), 0.001, "ros-industrial/abb irb2400_macro.xacro"),
+    ("jaco_j2n6s300", UP, (0, 64.2619, 361.0789), 0.1, "ssik jaco2_ik T_HOME (another lineage of numbers)"),
+    ("panda", [0] * 7, (88, 0, 926), 0.001, "ssik panda_ik T_HOME"),
+    (
+        "ar4",
+        [-9.686, -8.991, 18.549, 7.965, 22.667, -6.458],
+        (267.292, -43.402, 412.343),
+        0.002,
+        "Polymistis/ar4-hmi defaults.json",
+    ),
+    ("cobra600", [0] * 4, (600, 0, 387), 0.001, "325 + 275 mm stretched"),
+    ("thor", UP, (0, 0, 569.5), 0.001, "99 + 103 + 160 + 89.5 + 104.5 + 13.5 mm upright, from the URDF"),
+]
+
+
+@pytest.mark.parametrize(("name", "joints", "tip", "tolerance", "source"), POSES)
+def test_printed_pose(
+    name: str, joints: list[float], tip: tuple[float, ...], tolerance: float, source: str
+) -> None:
+    arm = load(ROBOTS / f"{name}.yaml")
+    assert fk(arm, np.radians(joints))[:3, 3] == pytest.approx(tip, abs=tolerance), source
+
+
+def test_stanford_reaches_along_its_boom() -> None:
+    """412 + 263 mm and the boom's own length straight up, 154 mm aside: the table's lengths added by hand."""
+    q = np.array([0, 0, 400.0, 0, 0, 0])
+    assert fk(load(ROBOTS / "stanford.yaml"), q)[:3, 3] == pytest.approx((0, 154, 1075), abs=1e-9)
+
+
+def test_parol6_flange_and_tool_are_the_older_table() -> None:
+    """PAROL6_ROBOT.py of commit ce377ab has a6 = -45.25, d6 = -62.8 where we have the flange and a tool."""
+    arm = load(ROBOTS / "parol6.yaml")
+    q = np.radians([10, -80, 170, 20, 30, 40])
+    rows = [  # alpha, a, d
+        *((-90, 23.42, 110.5), (180, 180, 0), (90, -43.5, 0)),
+        *((-90, 0, -176.35), (90, 0, 0), (180, -45.25, -62.8)),
+    ]
+    T = np.eye(4)
+    for angle, (alpha, a, d) in zip(q, rows, strict=True):
+        c, s, ca, sa = (
+            math.cos(angle),
+            math.sin(angle),
+            math.cos(math.radians(alpha)),
+            math.sin(math.radians(alpha)),
+        )
+        T = T @ [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+    assert np.abs(fk(arm, q) - T).max() < 1e-9
+
+
+def test_step_chains_give_the_steps_that_the_sources_print() -> None:
+    printed = {
+        "ar4": [88.888, 111.111, 111.111, 99.555, 43.720, 44.444],
+        "parol6": [113.777778, 355.555556, 321.693122, 71.111111, 71.111111, 177.777778],
+        "moveo": [32800 / 360, 18000 / 360, 72000 / 360, 3280 / 360, 14400 / 360],
+    }
+    for name, steps_per_degree in printed.items():
+        motors = robot_file.read(ROBOTS / f"{name}.yaml").motor_list()
+        assert [motor.pulses_per_unit() for motor in motors] == pytest.approx(steps_per_degree, abs=1e-3), (
+            name
+        )
