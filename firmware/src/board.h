@@ -1,0 +1,18 @@
+// Which board this is. make passes -DBOARD_…; in the Arduino IDE a Mega is a RAMPS 1.4 and an Uno a CNC Shield:
+// for servos on a bare Uno, exchange the last #include.
+#pragma once
+
+#if defined(BOARD_mega_ramps14) || defined(ARDUINO_AVR_MEGA2560) || defined(ARDUINO_AVR_MEGA)
+#include "boards/mega_ramps14.h"
+#elif defined(BOARD_uno_servos)
+#include "boards/uno_servos.h"
+#else
+#include "boards/uno_cnc_shield.h"
+#endif
+
+#define AXES (STEPPERS + SERVOS)
+#define ROWS AXES
+#define ALL_AXES ((1U << AXES) - 1)
+#define STEPPER_AXES ((1U << STEPPERS) - 1)
+#define SERVO_AXES (ALL_AXES & ~STEPPER_AXES)
+#define CLOCK 16000000UL

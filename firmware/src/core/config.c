@@ -1,0 +1,127 @@
+#include "config.h"
+
+#include <string.h>
+
+#include "crc.h"
+#include "hal.h"
+
+struct limits limits;
+
+enum { HEAD = 12, SERVO_LOWEST = 400, SERVO_HIGHEST = 2600 };
+static const int32_t FARTHEST = 1L << 30;
+
+enum error config_write(uint16_t offset, const uint8_t *data, uint8_t length) {
+    if (offset > sizeof memory.image || length > sizeof memory.image - offset) {
+        return E_VALUE;
+    }
+    memory.config = 0;
+    memory.known = 0;
+    memcpy((uint8_t *)&memory.image + offset, data, length);
+    return OK;
+}
+
+static uint32_t magnitude(int32_t x) {
+    return x < 0 ? 0U - (uint32_t)x : (uint32_t)x;
+}
+
+static bool axis_valid(uint8_t i) {
+    const struct axis_config *axis = &memory.image.axis[i];
+    if (axis->flags & ~(USED | INVERT)) {
+        return false;
+    }
+    if (!(axis->flags & USED)) {
+        return true;
+    }
+    if (i >= STEPPERS && (axis->lower < SERVO_LOWEST || axis->upper > SERVO_HIGHEST)) {
+        return false;
+    }
+    return axis->lower >= -FARTHEST && axis->upper <= FARTHEST && axis->lower <= axis->home &&
+           axis->home <= axis->upper && axis->max_rate > 0 && axis->max_accel > 0 && axis->max_accel < 1UL << 24;
+}
+
+static bool row_valid(uint8_t r) {
+    const struct row_config *row = &memory.image.row[r];
+    uint64_t largest = 0;
+    for (uint8_t i = 0; i < AXES; i++) {
+        const struct axis_config *axis = &memory.image.axis[i];
+        if (!row->weight[i]) {
+            continue;
+        }
+        if (!(axis->flags & USED)) {
+            return false;
+        }
+        const uint32_t low = magnitude(axis->lower), high = magnitude(axis->upper);
+        largest += (uint64_t)magnitude(row->weight[i]) * (low > high ? low : high);
+    }
+    return row->lower <= row->upper && largest < 1UL << 30;
+}
+
+static bool image_valid(uint16_t length) {
+    const struct image *image = &memory.image;
+    if (length < HEAD || image->layout != 1 || image->axes != AXES || image->rows > ROWS ||
+        length != HEAD + AXES * sizeof image->axis[0] + image->rows * sizeof image->row[0] ||
+        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH)) || image->step_high > 80 || image->step_low > 80 ||
+        image->dir_setup > 100) {
+        return false;
+    }
+    for (uint8_t i = 0; i < AXES; i++) {
+        if (!axis_valid(i)) {
+            return false;
+        }
+    }
+    for (uint8_t r = 0; r < image->rows; r++) {
+        if (!row_valid(r)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+enum error config_commit(uint16_t length, uint32_t crc) {
+    if (length > sizeof memory.image || crc_block(&memory.image, length) != crc || crc == 0 || !image_valid(length)) {
+        return E_CONFIG_BAD;
+    }
+    memory.config = crc;
+    config_activate();
+    return OK;
+}
+
+void config_activate(void) {
+    memset(&limits, 0, sizeof limits);
+    for (uint8_t i = 0; i < AXES; i++) {
+        const struct axis_config *axis = &memory.image.axis[i];
+        if (!memory.config || !(axis->flags & USED)) {
+            continue;
+        }
+        const uint32_t cycles = CLOCK / 4 / axis->max_rate;
+        limits.used |= 1U << i;
+        limits.invert |= axis->flags & INVERT ? 1U << i : 0;
+        limits.step_time[i] = cycles > 0xFFFF ? 0xFFFF : cycles;
+        limits.stop_time[i] = 1e3F * CLOCK / axis->max_accel;
+    }
+    hal_configured();
+}
+
+bool within(int32_t lower, int32_t upper, int32_t before, int32_t after) {
+    if (after < lower) {
+        return after >= before;
+    }
+    return after <= upper || after <= before;
+}
+
+int32_t row_value(uint8_t row, const int32_t counts[AXES]) {
+    uint32_t sum = 0;
+    for (uint8_t i = 0; i < AXES; i++) {
+        sum += (uint32_t)(int32_t)memory.image.row[row].weight[i] * (uint32_t)counts[i];
+    }
+    return (int32_t)sum;
+}
+
+bool row_known(uint8_t row) {
+    for (uint8_t i = 0; i < AXES; i++) {
+        if (memory.image.row[row].weight[i] && !(memory.known >> i & 1)) {
+            return false;
+        }
+    }
+    return true;
+}

@@ -1,0 +1,33 @@
+// PROTOCOL.md, section 10.
+#pragma once
+
+enum error {
+    OK,
+    E_NO_SESSION,
+    E_VERSION,
+    E_TYPE,
+    E_LENGTH,
+    E_VALUE,
+    E_CONFIG_NONE,
+    E_CONFIG_BAD,
+    E_BUSY,
+    E_LOST,
+    E_KNOWN,
+    E_DISABLED,
+    E_START,
+    E_END,
+    E_INTERVAL,
+    E_STEPS,
+    E_RATE,
+    E_LIMIT,
+    E_LIMIT_JOINT,
+    E_CREDIT,
+    E_ABORT,
+    E_HELD,
+    E_SILENCE,
+    E_DRY,
+    E_OVERRUN,
+    E_SWITCH,
+    E_TRAVEL,
+    E_TIME,
+};
