@@ -13,7 +13,7 @@ static const int64_t MOST_CATCHING_UP = 20000000;
 
 static int64_t anchor_real;
 static uint64_t anchor_cycle, host_cycle;
-static int64_t slipped;
+static int64_t slipped, waited, waiting_since;       /* ns; the last: 0 while not waiting */
 
 static int64_t now_ns(void) {
     struct timespec t;
@@ -28,7 +28,8 @@ void pace_reset(void) {
 
 void pace_host_spoke(void) { host_cycle = chip_now(); }
 
-int64_t pace_wait(void) {
+/* Nanoseconds until simulated time may go on; negative if it is late. */
+static int64_t early(int64_t now) {
     double speed = pace_speed;
     if (speed <= 0) {
         if (chip_now() < host_cycle + pace_ahead) {
@@ -37,15 +38,27 @@ int64_t pace_wait(void) {
         }
         speed = 1;
     }
-    int64_t due = anchor_real + (int64_t)((double)(chip_now() - anchor_cycle) * (1e9 / CLOCK_HZ) / speed);
-    int64_t wait = due - now_ns();
+    return anchor_real + (int64_t)((double)(chip_now() - anchor_cycle) * (1e9 / CLOCK_HZ) / speed) - now;
+}
+
+int64_t pace_wait(void) {
+    int64_t now = now_ns(), wait = early(now);
+    if (wait > 0) {
+        if (!waiting_since)
+            waiting_since = now;
+        return wait;
+    }
+    if (waiting_since)
+        waited += now - waiting_since;
+    waiting_since = 0;
     if (wait < -MOST_CATCHING_UP) {
         slipped -= wait;
         pace_reset();
     }
-    return wait > 0 ? wait : 0;
+    return 0;
 }
 
 void pace_json(FILE *out) {
-    fprintf(out, "{\"speed\": %g, \"slipped_ms\": %.3f}", pace_speed, (double)slipped / 1e6);
+    fprintf(out, "{\"speed\": %g, \"waited_ms\": %.3f, \"slipped_ms\": %.3f}", pace_speed, (double)waited / 1e6,
+            (double)slipped / 1e6);
 }

@@ -42,7 +42,12 @@ static inline struct segment *queue_slot(uint8_t index) {
     return &queue[index % QUEUE_SLOTS];
 }
 
-void dda_direction(uint16_t back);  // sets the DIR pins; at least one interval before the next step
+// Sets the DIR pins, one interval before the next step.
+#ifdef __AVR__
+#include "../avr/direction.h"
+#else
+void dda_direction(uint16_t back);
+#endif
 
 // Takes up the segment at the tail. False: there is none.
 static inline bool dda_load(void) {

@@ -1,0 +1,37 @@
+// Switches, the abort input and the drivers' ENABLE.
+#include "../core/hal.h"
+#include "../core/memory.h"
+#include "avr.h"
+
+void hal_drivers(bool on) {
+    const bool high = on == !!(memory.image.flags & ENABLE_HIGH);
+    (void)high;
+#define SET_ENABLE(port, bit) \
+    if (high) {               \
+        PIN_HIGH(port, bit);  \
+    } else {                  \
+        PIN_LOW(port, bit);   \
+    }
+    ENABLE_PINS(SET_ENABLE)
+}
+
+uint8_t hal_switches(void) {
+    uint8_t levels = 0;
+#define ONE_SWITCH(i, port, bit) levels |= PIN_READ(port, bit) << (i);
+    SWITCH_PINS(ONE_SWITCH)
+    return levels;
+}
+
+#define ABORT_READ(port, bit) PIN_READ(port, bit)
+bool hal_abort_level(void) {
+    return ABORT_PIN(ABORT_READ);
+}
+
+void pins_setup(void) {
+#define SWITCH_INPUT(i, port, bit) PIN_PULL_UP(port, bit);
+#define ABORT_INPUT(port, bit) PIN_PULL_UP(port, bit);
+#define ENABLE_OUTPUT(port, bit) PIN_OUTPUT(port, bit);
+    SWITCH_PINS(SWITCH_INPUT)
+    ABORT_PIN(ABORT_INPUT)
+    ENABLE_PINS(ENABLE_OUTPUT)
+}

@@ -1,0 +1,50 @@
+// What happens before main: why the chip was reset, the watchdog off, the stack painted.
+#include <avr/io.h>
+#include <avr/pgmspace.h>
+#include <avr/wdt.h>
+
+#include "avr.h"
+
+// Bootloaders clear MCUSR. Optiboot hands its value on in r2 since version 6 (8 leaves MCUSR alone as well); the Uno's stock 4.4 and
+// the Mega's stk500v2 say nothing.
+static uint8_t seen_mcusr __attribute__((section(".noinit")));
+uint8_t seen_r2 __attribute__((used, externally_visible, section(".noinit")));  // named in assembly
+
+__attribute__((naked, used, section(".init0"))) static void save_r2(void) {
+    __asm__ __volatile__("sts seen_r2, r2");
+}
+
+// 0xC5 from the end of the variables to the end of memory: what is still there was never touched by the stack.
+__attribute__((naked, used, section(".init1"))) static void paint_stack(void) {
+    __asm__ __volatile__(
+        "    ldi r30, lo8(_end)\n"
+        "    ldi r31, hi8(_end)\n"
+        "    ldi r24, 0xC5\n"
+        "    ldi r25, hi8(%0 + 1)\n"
+        "1:  st Z+, r24\n"
+        "    cpi r30, lo8(%0 + 1)\n"
+        "    cpc r31, r25\n"
+        "    brlo 1b\n"
+        :
+        : "i"(RAMEND));
+}
+
+__attribute__((naked, used, section(".init3"))) static void stop_watchdog(void) {
+    seen_mcusr = MCUSR;
+    MCUSR = 0;
+    wdt_disable();  // after a watchdog reset it runs on, at 16 ms
+}
+
+uint8_t reset_cause(void) {
+    enum { CAUSES = 0x0F };
+    if (seen_mcusr & CAUSES) {
+        return seen_mcusr & CAUSES;
+    }
+#ifdef __AVR_ATmega328P__
+    const uint8_t optiboot = pgm_read_byte(FLASHEND);  // its major version
+    if (optiboot >= 6 && optiboot < 32) {
+        return seen_r2 & CAUSES;
+    }
+#endif
+    return 0;
+}

@@ -1,0 +1,83 @@
+// Servo pulses: timer 2 counts half microseconds, its compare interrupt makes the edges, one servo after the other.
+//
+// A pulse is longer than the timer's turn of 128 µs, so it is walked in steps, each far enough ahead (64 µs) for the
+// interrupt to set the next one in time. Edges come late by what the tick interrupt takes (up to some 20 µs at full stepping rate): with
+// the steppers at rest they are exact.
+#include <avr/interrupt.h>
+
+#include "../core/motion.h"
+#include "avr.h"
+
+enum { NONE = 0xFF };
+
+static uint16_t width[SERVOS];        // half µs of this frame's pulses, 0: none
+static uint8_t current = NONE;        // whose pulse is running
+static uint16_t ahead;                // half µs until its end, beyond the compare that is set
+static volatile bool busy;
+
+static inline void edge(uint8_t servo, bool high) {
+#define SERVO_EDGE(i, port, bit) \
+    if (servo == (i)) {          \
+        if (high) {              \
+            PIN_HIGH(port, bit); \
+        } else {                 \
+            PIN_LOW(port, bit);  \
+        }                        \
+    }
+    SERVO_PINS(SERVO_EDGE)
+}
+
+static inline void next_pulse(void) {
+    do {
+        current++;
+    } while (current < SERVOS && !width[current]);
+    if (current < SERVOS) {
+        edge(current, true);
+        ahead = width[current];
+    } else {
+        current = NONE;
+        TIMSK2 = 0;
+        busy = false;
+    }
+}
+
+ISR(TIMER2_COMPA_vect) {
+    if (ahead == 0) {
+        edge(current, false);
+        next_pulse();
+        if (ahead == 0) {
+            return;
+        }
+    }
+    if (ahead >= 512) {
+        ahead -= 256;  // the same compare, a turn later
+    } else {
+        const uint8_t step = ahead >= 256 ? 128 : ahead;
+        OCR2A += step;
+        ahead -= step;
+    }
+}
+
+void servo_frame(void) {
+    int32_t counts[AXES];
+    if (busy) {
+        return;
+    }
+    motion_counts(counts);
+    for (uint8_t i = 0; i < SERVOS; i++) {
+        const bool on = motion.pulses && memory.known >> (STEPPERS + i) & 1;
+        width[i] = on ? 2 * (uint16_t)counts[STEPPERS + i] : 0;
+    }
+    busy = true;
+    ahead = 0;
+    TIFR2 = 1 << OCF2A;
+    OCR2A = TCNT2 + 16;
+    TIMSK2 = 1 << OCIE2A;
+}
+
+void servo_setup(void) {
+#define SERVO_OUTPUT(i, port, bit) PIN_OUTPUT(port, bit);
+    SERVO_PINS(SERVO_OUTPUT)
+    TCCR2A = 0;
+    TCCR2B = 1 << CS21;  // clock / 8
+}

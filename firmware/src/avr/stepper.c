@@ -1,0 +1,94 @@
+// Timer 1: the tick interrupt.
+//
+// Order in it: step edges first, so that they only wait for the interrupt itself; then the timer, while there is plenty of time;
+// then the arithmetic of the next tick, during which STEP stays high; then STEP low.
+#include <avr/interrupt.h>
+
+#include "../core/config.h"
+#include "../core/dda.h"
+#include "../core/hal.h"
+#include "avr.h"
+
+uint8_t direction_invert;
+
+static uint8_t step_high;  // cycles that STEP stays high at least
+static const volatile uint8_t *probe_port;
+static uint8_t probe_mask, probe_level;
+
+// -Os, as the Arduino IDE compiles, would make it slower.
+__attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
+    const uint8_t bits = dda.bits;
+    (void)bits;
+#define STEP_HIGH(i, port, bit, ...) \
+    if (bits & 1 << (i)) {           \
+        PIN_HIGH(port, bit);         \
+    }
+    STEPPER_PINS(STEP_HIGH)
+    const uint8_t rise = TCNT1L;
+
+    if (dda.probe) {
+        dda_probe((*probe_port & probe_mask) == probe_level);
+    }
+    const uint16_t interval = dda_next();
+    if (interval) {
+        OCR1A = interval - 1;
+        if (TCNT1 >= interval - 8) {  // too late for this tick: it would come a whole turn of the timer later
+            TCNT1 = 0;
+            dda.overruns |= 0x80;
+        }
+        dda_bits();
+    } else {
+        TIMSK1 = 0;
+        TCCR1B = 0;
+    }
+
+    while ((uint8_t)(TCNT1L - rise) < step_high && interval) {
+    }
+#define STEP_LOW(i, port, bit, ...) PIN_LOW(port, bit);
+    STEPPER_PINS(STEP_LOW)
+    if (TIFR1 & 1 << OCF1A && interval && dda.overruns < 255) {
+        dda.overruns++;
+    }
+}
+
+void hal_timer_start(uint16_t interval) {
+    HAL_LOCK();
+    TCCR1A = 0;
+    TCCR1B = 1 << WGM12 | 1 << CS10;  // clear on compare, no prescaler
+    OCR1A = interval - 1;
+    TCNT1 = 0;
+    TIFR1 = 1 << OCF1A;
+    TIMSK1 = 1 << OCIE1A;
+    HAL_UNLOCK();
+}
+
+void hal_timer_stop(void) {
+    HAL_LOCK();
+    TIMSK1 = 0;
+    TCCR1B = 0;
+    HAL_UNLOCK();
+}
+
+void hal_probe(uint8_t input, bool high) {
+    static const volatile uint8_t *const ports[] = {
+#define SWITCH_PORT(i, port, bit) [i] = &PIN##port,
+        SWITCH_PINS(SWITCH_PORT)};
+    static const uint8_t masks[] = {
+#define SWITCH_MASK(i, port, bit) [i] = 1 << (bit),
+        SWITCH_PINS(SWITCH_MASK)};
+    probe_port = ports[input];
+    probe_mask = masks[input];
+    probe_level = high ? probe_mask : 0;
+}
+
+void hal_configured(void) {
+    direction_invert = limits.invert;
+    step_high = memory.image.step_high * 8 / 5 + 1;  // 0.1 µs to cycles
+}
+
+void stepper_setup(void) {
+#define OUTPUTS(i, step_port, step_bit, dir_port, dir_bit) \
+    PIN_OUTPUT(step_port, step_bit);                       \
+    PIN_OUTPUT(dir_port, dir_bit);
+    STEPPER_PINS(OUTPUTS)
+}
