@@ -244,6 +244,15 @@ class EmulatedBoard:
         """Net steps of every axis since the emulator started; positive: DIR low."""
         return {axis: figures["net"] for axis, figures in self.stats()["axes"].items()}
 
+    def wait(self, seconds: float) -> None:
+        """Wait until so much simulated time has passed, whatever the machine's load.
+
+        An opening of the port, and the reset that goes with it, come before this time.
+        """
+        end = self.control("cycles")["cycle"] + seconds * CLOCK_HZ
+        while self.control("cycles")["cycle"] < end:
+            time.sleep(0.001)
+
     def trace(self) -> Trace:
         """What was recorded so far; for a board made with trace=True."""
         if not self._traced:

@@ -343,7 +343,7 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
         assert Path(board.port).is_symlink()
         for boots in (2, 3, 4):  # power-on was the first
             with serial.Serial(board.port, 250000, timeout=5) as port:
-                time.sleep(0.02)
+                board.wait(2 * MS)
                 assert ask(port, b"r") == b"02 %04x 0\n" % boots
                 assert ask(port, b"p\x64") == b"\n"
         assert board.net()["X"] == 300
@@ -351,12 +351,11 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
             os.close(os.open(board.port, os.O_RDWR | os.O_NOCTTY))
         assert board.stats()["port"]["opened"] == 8
         board.control("reset-on-open off")
-        time.sleep(0.02)
+        board.wait(2 * MS)
         with serial.Serial(board.port, 250000, timeout=5) as port:
-            assert ask(port, b"r").startswith(b"02 0009 0") or board.stats()["resets"] == 9
-            first = port
-            with serial.Serial(board.port, 250000, timeout=5):  # a second user resets nothing
-                assert ask(first, b"p\x01") == b"\n"
+            assert board.stats()["resets"] == 9
+            with serial.Serial(board.port, 250000, timeout=5):
+                assert ask(port, b"p\x01") == b"\n"
             assert board.stats()["resets"] == 9
         where = Path(board.port)
     assert not where.parent.exists()
@@ -364,7 +363,7 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
 
 def test_a_long_transfer_keeps_every_byte(probe: Path) -> None:
     with EmulatedBoard(elf=probe) as board, serial.Serial(board.port, 250000, timeout=5) as port:
-        time.sleep(0.02)
+        board.wait(2 * MS)
         sent = bytes(range(5, 255)) * 20
         begin = time.monotonic()
         port.write(b"e" + sent)
@@ -381,14 +380,16 @@ def test_the_clock_follows_real_time_or_the_host(probe: Path) -> None:
         return float(passed) / CLOCK_HZ / (time.monotonic() - begin)
 
     with EmulatedBoard(elf=probe) as board:
-        assert 0.5 < rate(board, 0.3) < 1.1
+        assert 0.05 < rate(board, 0.3) < 1.1  # a busy machine may be slower, never faster
         board.control("speed 0.25")
-        assert 0.1 < rate(board, 0.3) < 0.3
+        assert 0.05 < rate(board, 0.3) < 0.35
     with EmulatedBoard(elf=probe, speed="max", ahead_ms=2000) as board:
         with serial.Serial(board.port, 250000, timeout=5) as port:
-            port.write(b"x")
-            assert rate(board, 0.2) > 1.2  # free, as the host has just spoken
-        time.sleep(1.5)
+            assert ask(port, b"r").startswith(b"02 ")
+            waited = board.stats()["pace"]["waited_ms"]
+            board.wait(0.5)
+            assert board.stats()["pace"]["waited_ms"] == waited  # free, as the host has just spoken
+        board.wait(2)
         assert rate(board, 0.3) < 1.1  # and not when it is silent
 
 
@@ -468,7 +469,7 @@ def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
         assert process.stdout is not None
         assert f"--port {link}" in "".join(process.stdout.readline() for _ in range(4))
         with serial.Serial(str(link), 250000, timeout=5) as port:
-            time.sleep(0.02)
+            time.sleep(0.5)
             assert ask(port, b"l") == b"1110\n"
         with socket.socket(socket.AF_UNIX) as client, client.makefile("rw") as lines:
             client.connect(str(control))
