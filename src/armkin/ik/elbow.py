@@ -120,13 +120,14 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if arm.prismatic[0] and abs(link[1][2, 2]) < 1e-6:
         return None  # the slide lies in the arm's plane
     why = "joints 2 and 3 are parallel" if n == 3 else "joints 2, 3 and 4 are parallel"
+    labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")
     if n == 3:
         elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
 
         def xyz(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
             return elbow.solve(goal, [0.0, 0.0, 0.0], prefer)
 
-        return Geometry("elbow", why, True, xyz, labels=("shoulder", "elbow"))
+        return Geometry("elbow", why, True, xyz, labels=labels)
 
     elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
@@ -156,4 +157,4 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         fourth = Pair(c4, sense[2] * s4)
         return [*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt
 
-    return Geometry("elbow with pitch", why, True, pitch, labels=("shoulder", "elbow"))
+    return Geometry("elbow with pitch", why, True, pitch, labels=labels)

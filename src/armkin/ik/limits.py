@@ -21,8 +21,9 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
 
     value: any shape, in (-pi, pi]; near: broadcastable [rad]. Returns the values and
-    whether they are within [lower, upper]; where no copy is, the one nearest to `near`.
+    whether they are within [lower, upper]; where no copy is, the principal value.
     """
+    principal = value
     if not (isinstance(near, float) and near == 0.0):
         value = value + TURN * np.rint((near - value) / TURN)
         low, high = float(np.min(near)) - np.pi, float(np.max(near)) + np.pi
@@ -40,7 +41,10 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)
         value, above = np.where(fits, moved, value), above & ~fits
-    return value, ~(below | above)
+    outside = below | above
+    if value is not principal:
+        value = np.where(outside, principal, value)
+    return value, ~outside
 
 
 def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import Chain, axes, inverse, reverse
+from armkin.ik.chain import FLIP, Chain, axes, inverse, reverse
+from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import Geometry
 from armkin.ik.position import Position
 from armkin.ik.subproblems import Pair
@@ -67,17 +68,42 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name = "SCARA" if lift is not None else "planar"
     why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
-    return Geometry(name, why, True, solve, labels=("elbow", "elbow"))
+    labels = ("", "elbow", "") if (~arm.prismatic).sum() == task.constraints - (lift is not None) else ()
+    return Geometry(name, why, True, solve, labels=labels)
 
 
 def _two(chain: Chain) -> Solve:
-    """Two planar joints that place a point: behind a slide along z whose value does not matter."""
+    """Two planar joints that place a point.
+
+    Two turning ones are an elbow; otherwise a virtual slide along z, whose value does not
+    matter, makes it a `Position` problem.
+    """
+    if not chain.prismatic.any():
+        return _two_turning(chain)
     virtual = Chain(np.array([np.eye(4), *chain.link]), np.array([True, *chain.prismatic]))
     position = Position(virtual, chain.link[2][:3, 3])
 
     def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
         pairs, doubt = position.solve([goal[0], goal[1], 0.0 * goal[0]], [Pair(0.0, None), *prefer])
         return pairs[1:], doubt
+
+    return solve
+
+
+def _two_turning(chain: Chain) -> Solve:
+    base, L1 = chain.link[0], chain.link[1]
+    sense2 = np.sign(L1[2, 2])
+    if sense2 < 0:
+        L1 = L1 @ FLIP
+    tip = (FLIP if sense2 < 0 else np.eye(4))[:3, :3] @ chain.link[2][:3, 3]
+    two_link = TwoLink(L1[:2, 3], (L1[:3, :3] @ tip)[:2], float(sense2))
+    start = soa.constant(inverse(base))
+
+    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+        # height does not matter: any point above or below the target will do
+        p = soa.apply(start, [goal[0], goal[1], 0.0])
+        first, second, doubt = two_link.solve(p[0], p[1], *prefer)
+        return [first, second], doubt
 
     return solve
 
