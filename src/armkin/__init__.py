@@ -1,3 +1,85 @@
-"""armkin: robot arms from a YAML table to real motion."""
+"""armkin: robot arms from a YAML table to real motion.
+
+>>> import armkin
+>>> arm = armkin.load("robots/three_dof.yaml")
+>>> armkin.fk(arm, [0.0, 0.0, 0.0])[:3, 3].tolist()
+[455.0, 10.0, 170.0]
+
+Millimetres and radians throughout; leading axes are batch axes. Importing this costs next to nothing:
+numpy and the rest are imported with the first name that needs them.
+"""
+
+import sys as _sys
+from importlib import import_module as _import_module
+from types import ModuleType as _ModuleType
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm as Arm
+    from armkin.arm import load as load
+    from armkin.errors import ArmkinError as ArmkinError
+    from armkin.errors import FileError as FileError
+    from armkin.errors import LinkError as LinkError
+    from armkin.errors import MissingExtraError as MissingExtraError
+    from armkin.errors import NoSolutionError as NoSolutionError
+    from armkin.errors import RobotFileError as RobotFileError
+    from armkin.errors import UsageError as UsageError
+    from armkin.ik.limits import turns as turns
+    from armkin.ik.solutions import Solutions as Solutions
+    from armkin.ik.solutions import Status as Status
+    from armkin.ik.solve import ik as ik
+    from armkin.kinematics import condition as condition
+    from armkin.kinematics import fk as fk
+    from armkin.kinematics import frames as frames
+    from armkin.kinematics import jacobian as jacobian
+    from armkin.kinematics import manipulability as manipulability
+
+# Public name -> its module. (The block above says the same to type checkers; a test compares them.)
+_HOME = {
+    "Arm": "arm",
+    "load": "arm",
+    "ArmkinError": "errors",
+    "FileError": "errors",
+    "LinkError": "errors",
+    "MissingExtraError": "errors",
+    "NoSolutionError": "errors",
+    "RobotFileError": "errors",
+    "UsageError": "errors",
+    "turns": "ik.limits",
+    "Solutions": "ik.solutions",
+    "Status": "ik.solutions",
+    "ik": "ik.solve",
+    "condition": "kinematics",
+    "fk": "kinematics",
+    "frames": "kinematics",
+    "jacobian": "kinematics",
+    "manipulability": "kinematics",
+}
+
+__all__ = [*_HOME, "__version__"]
+
+
+def __getattr__(name: str) -> object:
+    module = _HOME.get(name)
+    if module is None:
+        raise AttributeError(f"module 'armkin' has no attribute '{name}'; it has {', '.join(_HOME)}")
+    value = getattr(_import_module(f"armkin.{module}"), name)
+    globals()[name] = value  # the next look-up does not come here
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+class _Package(_ModuleType):
+    """The package keeps ``armkin.ik`` the function when the module of the same name is imported."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _HOME and isinstance(value, _ModuleType)):
+            super().__setattr__(name, value)
+
+
+_sys.modules[__name__].__class__ = _Package

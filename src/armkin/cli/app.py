@@ -1,0 +1,182 @@
+"""The shell around the commands: the group, and the one place where errors become exit codes."""
+
+import errno
+import os
+import signal
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from armkin import errors
+from armkin.cli import COMMANDS, output
+from armkin.cli.arguments import options_first
+
+RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED, TERMINATED = 1, 2, 3, 4, 5, 130, 143
+
+EXIT_CODES: dict[type[errors.ArmkinError], int] = {
+    errors.FileError: RUNTIME,
+    errors.RobotFileError: ROBOT_FILE,
+    errors.UsageError: USAGE,
+    errors.NoSolutionError: NO_SOLUTION,
+    errors.MissingExtraError: RUNTIME,
+    errors.LinkError: LINK,
+}
+
+_SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+class Command(TyperCommand):
+    """A command whose negative numbers are arguments, not options, and whose help says no more than needed."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the options, then all that is none."""
+        takes_value = [
+            name
+            for parameter in self.params
+            if parameter.param_type_name == "option" and not getattr(parameter, "is_flag", False)
+            for name in parameter.opts
+        ]
+        return super().parse_args(ctx, options_first(args, takes_value))
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """The usage line as the documents write it: ``ROBOT Q... [OPTIONS]``."""
+        return [*(name for name, _ in self._arguments()), "[OPTIONS]"]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Arguments and options, without Typer's names of Python types."""
+        options = [p.get_help_record(ctx) for p in self.get_params(ctx) if p.param_type_name == "option"]
+        for title, entries in (("Arguments", self._arguments()), ("Options", options)):
+            if entries:
+                with formatter.section(title):
+                    formatter.write_dl(entries)
+
+    def _arguments(self) -> list[tuple[str, str]]:
+        return [
+            (str(p.metavar or p.name), str(getattr(p, "help", None) or ""))
+            for p in self.params
+            if p.param_type_name == "argument"
+        ]
+
+
+class Commands(TyperGroup):
+    """The group: lists all commands, and imports the one that runs."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        for name, text in COMMANDS.items():
+            self.add_command(TyperCommand(name, help=text, rich_markup_mode=None))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """The command that the first word names, in place of its entry in the list."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command and load(command.name), rest
+
+
+def load(name: str) -> Any:
+    """Import a command's module and let Typer read its function."""
+    function = getattr(import_module(f"armkin.cli.{name}"), name)
+    single = typer.Typer(add_completion=False, rich_markup_mode=None)
+    single.command(name, cls=Command, context_settings=_SETTINGS)(function)
+    return typer.main.get_command(single)
+
+
+app = typer.Typer(
+    cls=Commands, add_completion=False, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin"
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from armkin import __version__
+
+        sys.stdout.write(f"armkin {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def armkin(
+    ctx: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Robot arms from a YAML table to real motion. Millimetres and degrees throughout."""
+    if ctx.invoked_subcommand is None:
+        raise errors.UsageError(f"which command? {', '.join(COMMANDS)}; see armkin --help")
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run a command line and return its exit code; no exception leaves here."""
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
+        # What a failed command has printed stays printed: the rows of a batch before the malformed one.
+        return _exit_code(_flush) or code
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _exit_code(command: Callable[[], Any]) -> int:
+    try:
+        return int(command() or 0)
+    except errors.ArmkinError as error:
+        output.error(str(error))
+        return next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else RUNTIME
+    except OSError as error:
+        return _os_error(error)
+    except MemoryError:
+        output.error("not enough memory; ask for less at once")
+        return RUNTIME
+    except Exception as error:
+        return _unexpected(error)
+
+
+def _flush() -> None:
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _terminate(signum: int, frame: object) -> None:
+    """SIGTERM ends the command as Ctrl-C does, through its ``finally``s, with its own exit code."""
+    sys.exit(TERMINATED)
+
+
+def _os_error(error: OSError) -> int:
+    """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
+    if error.errno != errno.EPIPE:  # `| head` has seen enough: nothing to complain about
+        where = error.filename if error.filename is not None else "standard output"
+        output.error(f"{where}: {error.strerror or error}")
+    try:
+        _flush()
+    except (OSError, ValueError):
+        # What is still buffered goes nowhere, or the interpreter complains about it when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return RUNTIME
+
+
+def _unexpected(error: Exception) -> int:
+    """Typer's own complaints about the command line, and our bugs."""
+    if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
+        message = str(error.format_message())
+        context = getattr(error, "ctx", None)
+        if context is not None:
+            message = f"{message.rstrip('.')}\nsee {context.command_path} --help"
+        output.error(message[:1].lower() + message[1:])
+        return int(getattr(error, "exit_code", USAGE))
+    if os.environ.get("ARMKIN_TRACEBACK"):
+        import traceback
+
+        traceback.print_exc()
+    output.error(
+        f"internal error: {type(error).__name__}: {error}\n"
+        "this is a bug in armkin: please report it with the command line and ARMKIN_TRACEBACK=1's output"
+    )
+    return RUNTIME

@@ -1,0 +1,35 @@
+"""The command line before it is parsed: negative numbers are arguments, not options."""
+
+from collections.abc import Collection
+
+_NOT_NUMBERS = ("inf", "infinity", "nan")
+
+
+def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
+    """Sort a command's words so that the parser cannot take ``-30`` for an option.
+
+    takes_value: options that are followed by a value, which is left as it is. Whatever begins with a
+    dash and is no number stays an option, known or not, so that ``--jsn`` is still an error.
+
+    >>> options_first(["arm.yaml", "-30", "5", "--near", "-1,2", "--json"], ["--near"])
+    ['--near', '-1,2', '--json', '--', 'arm.yaml', '-30', '5']
+    """
+    options: list[str] = []
+    words: list[str] = []
+    rest = iter(args)
+    for word in rest:
+        if word == "--":
+            words.extend(rest)
+        elif word[:1] != "-" or word == "-" or _looks_like_number(word):
+            words.append(word)
+        else:
+            options.append(word)
+            if word in takes_value:
+                options.extend(value for value in [next(rest, None)] if value is not None)
+    return [*options, "--", *words] if words else options
+
+
+def _looks_like_number(word: str) -> bool:
+    """Whether somebody who wrote this word meant a negative number: -5, -.5, -5x, -inf."""
+    body = word[1:].lower()
+    return body[:1].isdigit() or (body[:1] == "." and body[1:2].isdigit()) or body in _NOT_NUMBERS

@@ -1,0 +1,79 @@
+"""Numbers as people write them on a command line or in a CSV file."""
+
+import re
+from collections.abc import Sequence
+
+from armkin.errors import UsageError
+
+# Far beyond any arm, in degrees or mm: what is larger is a slip, and would drown in rounding.
+LARGEST = 1e9
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+
+
+def number(text: str, name: str) -> float:
+    """One finite number; name: what it is, for the message.
+
+    >>> number("-1e3", "q1")
+    -1000.0
+    """
+    plain = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
+    shown = text if len(text) <= 40 else text[:37] + "..."
+    if not _NUMBER.fullmatch(plain):
+        raise UsageError(f"{name}: {_why_not(plain, shown)}")
+    value = float(plain)
+    if abs(value) > LARGEST:
+        raise UsageError(f"{name}: '{shown}' is too large; numbers here go up to {LARGEST:g}")
+    return value
+
+
+def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
+    """One number a name; what: who wants them, for the message about a wrong count.
+
+    >>> numbers(["390", "80"], ["x", "y"], "task xy")
+    [390.0, 80.0]
+    """
+    if len(words) != len(names):
+        raise UsageError(
+            f"{what} takes {len(names)} number{'s' if len(names) != 1 else ''} ({' '.join(names)}), "
+            f"got {len(words)}{_separator_hint(words, names)}"
+        )
+    return [number(word, name) for word, name in zip(words, names, strict=True)]
+
+
+def listed(text: str, names: Sequence[str], what: str) -> list[float]:
+    """Comma-separated numbers, as options take them: ``--near 0,90,-90``."""
+    words = text.split(",")
+    if len(words) == 1 and len(names) > 1 and len(text.split()) == len(names):
+        raise UsageError(f"{what}: separate the numbers with commas: {','.join(text.split())}")
+    return numbers(words, names, what)
+
+
+def whole(text: str, name: str, low: int, high: int) -> int:
+    """A whole number within bounds."""
+    value = number(text, name)
+    if value != int(value) or not low <= value <= high:
+        raise UsageError(f"{name}: '{text}' must be a whole number from {low} to {high}")
+    return int(value)
+
+
+def _why_not(plain: str, shown: str) -> str:
+    bare = plain.lower().lstrip("+-")
+    if not bare:
+        return "a number is missing"
+    if bare in ("nan", "inf", "infinity"):
+        return f"'{shown}' is not finite; give a number"
+    for unit in ("mm", "degrees", "deg", "\u00b0"):
+        if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
+            return f"'{shown}': units are fixed (mm, degrees); write {plain[: -len(unit)].strip()}"
+    if _NUMBER.fullmatch(plain.rstrip(",")):
+        return f"'{shown}' ends with a comma; write {plain.rstrip(',')}"
+    if plain.count(",") == 1 and _NUMBER.fullmatch(plain.replace(",", ".")):
+        return f"'{shown}' is not a number; write {plain.replace(',', '.')} with a point"
+    return f"'{shown}' is not a number"
+
+
+def _separator_hint(words: Sequence[str], names: Sequence[str]) -> str:
+    if len(words) == 1 and len(names) > 1 and len(words[0].replace(",", " ").split()) == len(names):
+        return "; separate them with spaces: " + " ".join(words[0].replace(",", " ").split())
+    return ""

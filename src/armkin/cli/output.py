@@ -1,0 +1,77 @@
+"""Where things go: data to stdout or a file, messages to stderr, progress to a terminal only."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from armkin.errors import FileError
+
+Write = Callable[[str], object]
+
+
+@contextmanager
+def destination(path: str | None) -> Iterator[Write]:
+    """The function that writes a command's data: to stdout, or to a file that appears whole or not at all."""
+    if path is not None:
+        from armkin.files import whole
+
+        with whole(path) as file:
+            yield file.write
+    elif sys.stdout is None:
+        raise FileError("standard output is closed; give --out FILE or open it")
+    else:
+        yield sys.stdout.write
+
+
+def warn(message: str) -> None:
+    """Say something on stderr that does not change the exit code."""
+    _say("warning", "33", message)
+
+
+def error(message: str) -> None:
+    """Say on stderr why the command fails."""
+    _say("error", "31", message)
+
+
+def _say(word: str, colour: str, message: str) -> None:
+    if sys.stderr is None:
+        return
+    head = f"\x1b[{colour}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
+    # A file's name may hold what is no text, or a line feed: one or two lines whatever it is.
+    lines = [line for line in message.splitlines() if line.strip()]
+    text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
+    try:
+        print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
+    except (OSError, UnicodeError):
+        pass  # nobody listens; the exit code still tells
+
+
+def _coloured(stream: TextIO) -> bool:
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+@contextmanager
+def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
+    """A counter on stderr while a long command runs, if stderr is a terminal; call it with the count so far."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda done: None
+        return
+    import time
+
+    last = time.monotonic()
+    shown = False
+
+    def tick(done: int) -> None:
+        nonlocal last, shown
+        if (now := time.monotonic()) - last >= 0.2:
+            last, shown = now, True
+            part = f" of {total:,} ({100 * done // total} %)" if total else ""
+            print(f"\r{done:,}{part} {what} ", end="", file=sys.stderr, flush=True)
+
+    try:
+        yield tick
+    finally:
+        if shown:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
