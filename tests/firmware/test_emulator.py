@@ -385,6 +385,7 @@ def test_the_clock_follows_real_time_or_the_host(probe: Path) -> None:
         assert 0.05 < rate(board, 0.3) < 0.35
     with EmulatedBoard(elf=probe, speed="max", ahead_ms=2000) as board:
         with serial.Serial(board.port, 250000, timeout=5) as port:
+            board.wait(2 * MS)
             assert ask(port, b"r").startswith(b"02 ")
             waited = board.stats()["pace"]["waited_ms"]
             board.wait(0.5)
