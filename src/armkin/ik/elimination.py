@@ -49,8 +49,8 @@ ACCEPTED = 1e-10  # residual of an answer, lengths scaled
 TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
+SHAKES = (0.0, 1e-5, 0.0, 1e-6, 1e-4)  # how far each pass moves the pose, see (v)
 HEALTHY, USELESS = -8.0, -5.0  # log10 of a role's raw error from which on it is good enough, or unfit
-PASSES = 5
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,10 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     hidden_joint = best.hidden_joint
     others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
     again = build(best.role, closed.links, closed.prismatic, PSI[1])
-    return Elimination(closed, (best, again, *others)[:PASSES], rated[0][1])
+    plans = [best, again, *others]
+    while len(plans) < len(SHAKES):
+        plans.append(plans[len(plans) % 2])
+    return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0][1])
 
 
 def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> tuple[float, float, Pencil]:
@@ -169,7 +172,7 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
         still = np.zeros(open_poses.size, dtype=np.bool_)
         for begin in range(0, open_poses.size, CHUNK):
             part = open_poses[begin : begin + CHUNK]
-            answers, unsettled, touch = _attempt(elimination.loop, pencil, goal[part], number > 0)
+            answers, unsettled, touch = _attempt(elimination.loop, pencil, goal[part], number)
             found.append(answers._replace(pose=part[answers.pose]))
             still[begin : begin + CHUNK] = unsettled
             touching[part] |= touch
@@ -179,9 +182,10 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
     return concatenate(found) if found else _none(), touching
 
 
-def _attempt(closed: Loop, pencil: Pencil, goal: Array, careful: bool) -> tuple[Answers, Bool, Bool]:
-    """One pencil's answers for goals (N, 4, 4), the poses it leaves open and those with touching roots."""
-    seed = roots.seeds(pencil, inverse(goal), TILT[careful])
+def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool]:
+    """Answers of one pass for goals (N, 4, 4), the poses it leaves open and those with touching roots."""
+    careful, shake = number > 0, SHAKES[number]
+    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful])
     target = goal[seed.pose]
     if careful:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
@@ -189,14 +193,14 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, careful: bool) -> tuple[
         done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
     good = done.residual < (TOUCHING if careful else ACCEPTED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
-    missed = ~good & ((seed.tilt == 0) | (done.residual < 1e-3))
+    missed = ~good & ((seed.tilt < 1e-4) | (done.residual < 1e-3))
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
     unsettled[seed.pose[missed | touch]] = True
     touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
     answers = _answers(closed, seed.pose, done, good)
-    hidden, blurred = seed.hidden[good], done.guess[good] > 1e-5
+    hidden, blurred = seed.hidden[good], done.guess[good] > 1e-5 + 10 * shake
     order = np.lexsort((hidden, answers.pose))
     close = (np.diff(answers.pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
     close &= blurred[order][1:] | blurred[order][:-1]
@@ -206,6 +210,18 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, careful: bool) -> tuple[
     twice = (np.diff(answers.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
     unsettled[answers.pose[order][1:][twice]] = True
     return answers, unsettled, touching
+
+
+def _shaken(goal: Array, size: float) -> Array:
+    """Goals (N, 4, 4) moved a little, in a direction that no arm is made for."""
+    if size == 0:
+        return goal
+    x, y, z = size * np.array([0.61, -0.49, 0.63])
+    spin = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    move = np.eye(4)
+    move[:3, :3] = np.linalg.solve(np.eye(3) - spin / 2, np.eye(3) + spin / 2)  # Cayley: a rotation
+    move[:3, 3] = size * np.array([-0.53, 0.57, 0.47])
+    return np.asarray(move @ goal)
 
 
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
