@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from armkin.errors import NoSolutionError as NoSolutionError
     from armkin.errors import RobotFileError as RobotFileError
     from armkin.errors import UsageError as UsageError
+    from armkin.ik.closest import Closest as Closest
+    from armkin.ik.closest import closest as closest
+    from armkin.ik.geometry import method as method
     from armkin.ik.limits import turns as turns
     from armkin.ik.solutions import Solutions as Solutions
     from armkin.ik.solutions import Status as Status
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
     from armkin.kinematics import frames as frames
     from armkin.kinematics import jacobian as jacobian
     from armkin.kinematics import manipulability as manipulability
+    from armkin.lock import lock as lock
+    from armkin.lock import unlock as unlock
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
@@ -47,6 +52,9 @@ _HOME = {
     "NoSolutionError": "errors",
     "RobotFileError": "errors",
     "UsageError": "errors",
+    "Closest": "ik.closest",
+    "closest": "ik.closest",
+    "method": "ik.geometry",
     "turns": "ik.limits",
     "Solutions": "ik.solutions",
     "Status": "ik.solutions",
@@ -56,6 +64,8 @@ _HOME = {
     "frames": "kinematics",
     "jacobian": "kinematics",
     "manipulability": "kinematics",
+    "lock": "lock",
+    "unlock": "lock",
 }
 
 __all__ = [*_HOME, "__version__"]

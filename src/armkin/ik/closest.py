@@ -122,17 +122,18 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
         H = np.where(both, H, np.eye(n))
         values, vectors = np.linalg.eigh(H)
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        converged = (slope <= FLAT) & (values[:, 0] > -1e-6)
+        converged = (slope <= FLAT * (1.0 + cost)) & (values[:, 0] > -1e-6)
         if converged.all():
             break
         # a step downhill along every eigenvector, whatever its curvature; flat ones gently
         along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0))
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), 1e-4))
+        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), 1e-5))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         for shrink in (1.0, 0.25, 0.05, 0.005):
             trial = np.clip(q + shrink * step * unit, arm.lower, arm.upper)
             now = _cost(arm, task, trial, target)
-            better = (now <= cost) & ~converged
+            # equal but for rounding is still a step towards a vanishing gradient
+            better = (now <= cost * (1.0 + 1e-14)) & ~converged
             q = np.where(better[:, None], trial, q)
             cost = np.where(better, now, cost)
             step[better] = 0.0

@@ -136,11 +136,10 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
     if task.orientation == "full":
         parts.append(target[:, :3, 3] - T[:, :3, 3])
         R, Rt = T[:, :3, :3], target[:, :3, :3]
-        # half the sum of the columns' vector products: the rotation vector to first order; and
-        # its opposite branch (half a turn) is told by the trace
+        # half the sum of the columns' vector products is the rotation vector to third order
         w = 0.5 * np.cross(R, Rt, axis=1).sum(axis=2)
         trace = np.einsum("mij,mij->m", R, Rt)
-        far = trace < 1.0
+        far = trace < 3.0 - 1e-8
         if far.any():
             w[far] = _rotation_vector(Rt[far] @ np.swapaxes(R[far], 1, 2))
         parts.append(w)
@@ -153,11 +152,12 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         if task.orientation == "axis":
             z = T[:, :3, 2]
             w = np.cross(z, target[:, 3:])
-            opposed = np.einsum("mi,mi->m", z, target[:, 3:]) < 0
-            if opposed.any():
-                size = np.linalg.norm(w[opposed], axis=1, keepdims=True)
-                w[opposed] = np.where(size > 0, w[opposed] / np.maximum(size, 1e-300), T[opposed][:, :3, 0])
-                w[opposed] *= np.pi - np.arcsin(np.minimum(size, 1.0))
+            sine = np.linalg.norm(w, axis=1)
+            cosine = np.einsum("mi,mi->m", z, target[:, 3:])
+            angle = np.arctan2(sine, cosine)
+            w = np.where(sine[:, None] > 1e-12, w * (angle / np.maximum(sine, 1e-300))[:, None], w)
+            half = (sine <= 1e-12) & (cosine < 0)  # opposed: any axis across will do
+            w[half] = np.pi * T[half][:, :3, 0]
             parts.append(w)
     return np.concatenate(parts, axis=1)
 
