@@ -1,0 +1,368 @@
+"""Coordinated moves: joint values in, exact device segments out.
+
+A move is a straight line in joint space, and so in the motors' counts, because motors are linear in
+joints. All motors follow one trapezoid (speed up, cruise, slow down) over the line's parameter, so they
+start and stop together. The motor with the most steps, the *leader*, sets the ticks:
+
+    trapezoid t(n), n = leader steps  --cut-->  segments {ticks, interval, add, steps[]}
+
+Segments end on whole leader steps, and their steps are differences of one rounded line: their sums are
+exact by construction. A segment's ticks are evenly spaced up to a linear change of the interval, which the
+device adds up (firmware/PROTOCOL.md, section 6). Within a ramp a segment spans 8 % of the time since (or
+until) standstill: so few that a 32-segment queue always holds the way to a stop, so many that no step is
+farther than one count from the trapezoid.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin import kinematics, pulses
+from armkin.errors import NoSolutionError, UsageError
+from armkin.limits import outside
+from armkin.protocol import Segment
+from armkin.soa import Array
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+Counts = NDArray[np.int64]
+
+CLOCK = 16_000_000  # [1/s] of every board so far
+MIN_INTERVAL = 400  # [cycles] between ticks
+
+_GROWTH = 1.08  # time at a ramp segment's end over time at its start, seen from standstill
+# Inside such a segment the interval is linear, and at its fast end the acceleration is
+# 4 g^2 / (1 + g)^2 times the mean: plan the mean that much lower.
+_EASE = ((1 + _GROWTH) / (2 * _GROWTH)) ** 2
+_SHORTEST = 0.004  # [s] a segment's time at least, unless a single step is shorter
+_CRUISE = 0.05  # [s] a cruise segment's time at least
+_TICK = 1300  # [cycles] slower segments are oversampled down to about this
+_LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
+
+
+@dataclass(frozen=True)
+class Move:
+    """One straight line from rest to rest."""
+
+    start: Counts  # (motors,)
+    end: Counts  # (motors,)
+    segments: tuple[Segment, ...]
+    cycles: int  # of the clock, all segments together
+    peak: float  # [1/s] greatest speed, in lines per second
+
+    @property
+    def leader(self) -> int:
+        """Steps of the motor with the most steps."""
+        return int(np.abs(self.end - self.start).max(initial=0))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Moves through waypoints, at rest in each: what `armkin send` does, and `--dry-run` prints."""
+
+    arm: Arm
+    start: Counts  # (motors,)
+    moves: tuple[Move, ...]
+    clock: int = CLOCK
+
+    @property
+    def end(self) -> Counts:
+        """Counts at the end: (motors,)."""
+        return self.moves[-1].end if self.moves else self.start
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first tick to the last."""
+        return sum(move.cycles for move in self.moves) / self.clock
+
+    @property
+    def segments(self) -> int:
+        """Number of device segments."""
+        return sum(len(move.segments) for move in self.moves)
+
+    @property
+    def top_speed(self) -> Array:
+        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
+        spans = [np.abs(_span(self.arm, move)) * move.peak for move in self.moves]
+        return np.max(spans, axis=0) if spans else np.zeros(self.arm.n)
+
+    @property
+    def top_rate(self) -> Array:
+        """Greatest rate of every motor: (motors,) [counts/s]."""
+        rates = [np.abs(move.end - move.start) * move.peak for move in self.moves]
+        return np.max(rates, axis=0) if rates else np.zeros(len(self.start))
+
+    def trace(self, step: float = 0.01) -> Trace:
+        """The path in time, sampled every `step` seconds, with the end of every move."""
+        times, joints, begin = [np.zeros(1)], [pulses.joints(self.arm, self.start)[None]], 0.0
+        for move in self.moves:
+            seconds = move.cycles / self.clock
+            t = np.append(np.arange(step, seconds - step / 4, step), seconds)
+            done = progress(move, t * self.clock)
+            times.append(begin + t)
+            joints.append(pulses.joints(self.arm, move.start) + done[:, None] * _span(self.arm, move))
+            begin += seconds
+        q = np.concatenate(joints)
+        position = kinematics.frames(self.arm, q)[..., :3, 3]
+        return Trace(np.concatenate(times), q, position)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A plan sampled in time."""
+
+    time: Array  # (T,) [s]
+    joints: Array  # (T, n) [rad | mm]
+    position: Array  # (T, n + 2, 3) [mm] base, every joint's frame, tool
+
+
+def plan(
+    arm: Arm,
+    start: ArrayLike,
+    targets: ArrayLike,
+    *,
+    speed: float = 1.0,
+    clock: int = CLOCK,
+    min_interval: int = MIN_INTERVAL,
+) -> Plan:
+    """Moves from counts through joint targets, stopping at each.
+
+    start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
+    Raises NoSolutionError for a target outside the limits, UsageError if max_speed, max_accel or a drive
+    is missing, or if the device cannot make steps that fast.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> p = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
+    >>> p.end.tolist(), round(p.duration, 2), np.rad2deg(p.top_speed).round().tolist()
+    ([-1067, -10144, 5667], 1.95, [21.0, 60.0, 60.0])
+    """
+    check_rates(arm)
+    if not 0 < speed <= 1:
+        raise UsageError(f"speed {100 * speed:g} % is not possible; it goes from above 0 to 100 percent")
+    at = np.asarray(start, dtype=np.int64)
+    goals = np.atleast_2d(np.asarray(targets, dtype=float))
+    check_limits(arm, goals)
+    moves = []
+    for goal in pulses.pulses(arm, goals):
+        moves.append(_joint_move(arm, at, goal, speed, clock, min_interval))
+        at = goal
+    first = moves[0].start if moves else at
+    return Plan(arm, first, tuple(moves), clock)
+
+
+def check_rates(arm: Arm) -> None:
+    """Raise UsageError, naming the joint, if a max_speed or max_accel is missing."""
+    for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel)):
+        for name, value in zip(arm.joint_names, values, strict=True):
+            if math.isnan(value):
+                where = f" in {arm.path}" if arm.path else ""
+                raise UsageError(f"joint {name} has no {key}: motion needs one; add {key}: to it{where}")
+
+
+def check_limits(arm: Arm, targets: Array) -> None:
+    """Raise NoSolutionError, naming row and joint, if a target (w, n) is outside the joint limits.
+
+    A straight line between two poses within the limits stays within them.
+    """
+    if targets.shape[-1] != arm.n:
+        raise UsageError(f"{arm.name} has {arm.n} joints: expected {arm.n} values, got {targets.shape[-1]}")
+    if not np.all(np.isfinite(targets)):
+        raise UsageError("joint values must be finite to be sent")
+    for row, joint in np.argwhere(outside(arm, targets)):
+        unit = 1.0 if arm.prismatic[joint] else math.pi / 180
+        name, word = arm.joint_names[joint], "mm" if arm.prismatic[joint] else "deg"
+        low, high = arm.lower[joint] / unit, arm.upper[joint] / unit
+        which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
+        raise NoSolutionError(
+            f"{which}{name} = {targets[row, joint] / unit:.10g} {word} is outside its limits "
+            f"{low:.10g} to {high:.10g}: nothing was moved"
+        )
+
+
+def line(
+    start: Sequence[int],
+    end: Sequence[int],
+    top: float,
+    accel: float,
+    *,
+    clock: int = CLOCK,
+    min_interval: int = MIN_INTERVAL,
+) -> Move:
+    """The segments of a straight line in counts, from rest to rest.
+
+    top: [1/s] greatest speed, accel: [1/s^2] greatest acceleration, both in lines. The leader's rate must
+    be within the device's: `clock` / `min_interval`.
+    """
+    first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
+    n = int(np.abs(last - first).max(initial=0))
+    if n == 0:
+        return Move(first, last, (), 0, 0.0)
+    ramp = _Trapezoid(n, top * n, accel * n * _EASE)
+    segments: list[Segment] = []
+    total, carry = 0, 0.0
+    bounds = list(ramp.bounds())
+    for a, b in pairwise(bounds):
+        steps = _rounded(last - first, b, n) - _rounded(last - first, a, n)
+        exact = (ramp.time(b) - ramp.time(a)) * clock
+        ticks, interval, add = _spacing(ramp, a, b, exact + carry, clock, min_interval)
+        segments.append(Segment(ticks, interval, add, tuple(int(s) for s in steps)))
+        cycles = cycles_of(segments[-1])
+        # What rounding took or gave is made up for by the next segment; time lost to a speed limit is not.
+        carry = min(exact + carry - cycles, 0.0) if cycles > exact + carry + ticks else exact + carry - cycles
+        if ramp.cruising(a, b):
+            carry = 0.0
+        total += cycles
+    return Move(first, last, tuple(segments), total, ramp.peak / n)
+
+
+def cycles_of(segment: Segment) -> int:
+    """Clock cycles of a segment, exactly as the device counts them."""
+    if segment.add == 0:
+        return segment.ticks * segment.interval
+    return segment.ticks * segment.interval + int(((np.arange(segment.ticks) * segment.add) >> 8).sum())
+
+
+def progress(move: Move, cycles: Array) -> Array:
+    """How far along its line a move is (0 to 1) after so many clock cycles: (T,) -> (T,)."""
+    if not move.segments:
+        return np.ones_like(cycles)
+    ends = np.cumsum([cycles_of(s) for s in move.segments])
+    steps = np.array([max(abs(x) for x in s.steps) for s in move.segments])
+    which = np.minimum(np.searchsorted(ends, cycles, side="left"), len(ends) - 1)
+    first = np.array([s.interval for s in move.segments], dtype=float)[which]
+    slope = np.array([s.add for s in move.segments], dtype=float)[which] / 256
+    ticks = np.array([s.ticks for s in move.segments], dtype=float)[which]
+    # time of tick j: j first + j (j - 1) / 2 slope; its inverse in the form that slope 0 allows
+    b = first - slope / 2
+    begin = np.concatenate([[0], ends[:-1]])[which]
+    whole = ticks * (b + ticks * slope / 2)  # the device's is up to a cycle a tick shorter
+    t = (cycles - begin) * whole / (ends[which] - begin)
+    j = 2 * t / (b + np.sqrt(np.maximum(b * b + 2 * slope * t, 0.0)))
+    before = np.concatenate([[0], np.cumsum(steps)[:-1]])[which]
+    done = before + steps[which] * np.minimum(j / ticks, 1.0)
+    return np.asarray(np.minimum(done / steps.sum(), 1.0))
+
+
+@dataclass(frozen=True)
+class _Trapezoid:
+    """Speed up, cruise, slow down over n leader steps; speeds in steps/s."""
+
+    n: int
+    top: float
+    accel: float
+
+    @property
+    def peak(self) -> float:
+        """Greatest speed that is reached."""
+        return min(self.top, math.sqrt(self.accel * self.n))
+
+    @property
+    def way(self) -> float:
+        """Steps of one ramp."""
+        return float(self.peak**2 / (2 * self.accel))
+
+    def time(self, at: float) -> float:
+        """Seconds from standstill to step `at`."""
+        rise = self.peak / self.accel
+        if at <= self.way:
+            return math.sqrt(2 * at / self.accel)
+        if at < self.n - self.way:
+            return rise + (at - self.way) / self.peak
+        whole = 2 * rise + (self.n - 2 * self.way) / self.peak
+        return whole - math.sqrt(2 * (self.n - at) / self.accel)
+
+    def speed(self, at: float) -> float:
+        """Speed [steps/s] at step `at`."""
+        return min(self.peak, math.sqrt(2 * self.accel * max(min(at, self.n - at), 0.0)))
+
+    def cruising(self, a: int, b: int) -> bool:
+        """Whether a segment has no part of a ramp."""
+        return a >= self.way and b <= self.n - self.way
+
+    def bounds(self) -> Iterator[int]:
+        """Leader steps where segments end: geometric in the ramps, even between them."""
+        rise = [0]
+        whole = min(int(self.way), self.n // 2)
+        while rise[-1] < whole:
+            t = self.time(rise[-1])
+            t = max(t * _GROWTH, t + _SHORTEST)
+            at = max(int(self.accel * t * t / 2), rise[-1] + 1)
+            rise.append(whole if at + (at - rise[-1]) // 2 > whole else at)
+        yield from rise
+        middle = self.n - 2 * whole
+        if middle:
+            longest = max(_CRUISE, (_GROWTH - 1) * self.peak / self.accel)
+            parts = min(max(1, math.ceil(middle / (self.peak * longest))), middle)
+            parts = max(parts, math.ceil(middle / 30_000))
+            yield from (whole + middle * i // parts for i in range(1, parts))
+        yield from (self.n - at for at in reversed(rise) if self.n - at > whole)
+
+
+def _spacing(
+    ramp: _Trapezoid, a: int, b: int, cycles: float, clock: int, min_interval: int
+) -> tuple[int, int, int]:
+    """Ticks, interval and add that take a segment from leader step a to b in about `cycles`."""
+    steps = b - a
+    over = max(1, int(cycles / (_TICK * steps)))
+    if steps <= 127:
+        over = min(over, 255 // steps)  # as the short form has it
+    over = max(over, math.ceil(1.6 * cycles / (_LONGEST * steps)))
+    ticks = over * steps
+    if ticks > 65535:
+        raise UsageError("this motion is slower than the device can time; choose a higher --speed")
+    mean = cycles / ticks
+    # Intervals at the two ends: right at the faster one, and at the other such that the time is right.
+    fast = mean
+    corner = a < ramp.way < b or a < ramp.n - ramp.way < b
+    if not corner and not ramp.cruising(a, b):
+        fast = min(clock / (over * max(ramp.speed(a), ramp.speed(b))), mean)
+    slow = 2 * mean - fast
+    change = fast - slow if ramp.speed(b) > ramp.speed(a) else slow - fast
+    add = round(256 * change / ticks)
+    interval = round(mean - add * (ticks - 1) / 512 + (0.5 if add else 0.0))
+    # Rounding must not make any tick faster than the plan's top speed, nor than the device.
+    floor = max(min_interval, math.ceil(clock / (over * ramp.peak) - 1e-9))
+    last = (256 * interval + (ticks - 1) * add) >> 8
+    interval += max(0, floor - min(interval, last))
+    return ticks, interval, add
+
+
+def _rounded(span: Counts, at: int, n: int) -> Counts:
+    """span * at / n rounded half away from zero, in whole numbers."""
+    return np.asarray(np.sign(span) * ((2 * np.abs(span) * at + n) // (2 * n)))
+
+
+def _span(arm: Arm, move: Move) -> Array:
+    """Change of every joint over a move: (n,)."""
+    return pulses.joints(arm, move.end) - pulses.joints(arm, move.start)
+
+
+def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, min_interval: int) -> Move:
+    change = np.abs(pulses.joints(arm, end) - pulses.joints(arm, start))
+    moving = change > 1e-12
+    if not moving.any():
+        return Move(start, end, (), 0, 0.0)
+    top = float((arm.max_speed[moving] / change[moving]).min()) * speed
+    accel = float((arm.max_accel[moving] / change[moving]).min())
+    rates = np.abs(end - start) * min(top, math.sqrt(accel * _EASE))
+    if rates.max() > clock / min_interval:
+        k = int(rates.argmax())
+        joint = int(np.argmax(np.abs(arm.motor_gain[k]) * change))
+        unit, word = (1.0, "mm/s") if arm.prismatic[joint] else (math.pi / 180, "deg/s")
+        fast = change[joint] * rates[k] / abs(end - start)[k] / unit
+        allowed = clock / min_interval
+        raise UsageError(
+            f"joint {arm.joint_names[joint]} at {fast:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
+            f"{pulses.motor_names(arm)[k]}; the board makes {allowed:,.0f}\n"
+            f"lower its max_speed, or send with --speed {math.floor(100 * speed * allowed / rates[k])}"
+        )
+    return line(start.tolist(), end.tolist(), top, accel, clock=clock, min_interval=min_interval)
