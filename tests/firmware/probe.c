@@ -11,7 +11,9 @@
  *   t<n>   n pulses on Y, one each timer1 compare interrupt, 640 cycles apart
  *   f      waits for timer1's compare flag, puts X DIR high, enables the interrupt: one pulse on Y
  *   g      one 1500 us pulse on A3 (RAMPS: D11), as a servo's
+ *   v<n>   writes n to the EEPROM; V reads it back, in hex
  *   d      uses 300 bytes of stack */
+#include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/wdt.h>
@@ -192,6 +194,13 @@ int main(void) {
             _delay_us(1500);
             SERVO_PORT &= ~(1 << SERVO);
             sei();
+            break;
+        case 'v':
+            eeprom_write_byte((uint8_t *)5, get());
+            eeprom_busy_wait();
+            break;
+        case 'V':
+            put_hex(eeprom_read_byte((uint8_t *)5), 2);
             break;
         case 'd':
             put_hex(deep(), 2);

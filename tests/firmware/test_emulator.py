@@ -222,6 +222,15 @@ def test_a_bootloader_hides_the_cause_and_swallows_bytes(probe: Path) -> None:
         assert board.run(5 * MS, b"r") == b"00 0002 0\n"
 
 
+def test_the_eeprom_outlasts_every_reset(probe: Path) -> None:
+    with stepped(probe) as board:
+        started(board)
+        assert board.run(20 * MS, b"v\xa7") == b"\n"
+        for kind in ("external", "power", "watchdog"):
+            board.control(f"reset {kind}")
+            assert started(board).run(20 * MS, b"V") == b"a7\n"
+
+
 def test_memory_figures_and_access_by_name(probe: Path) -> None:
     with stepped(probe) as board:
         started(board)
