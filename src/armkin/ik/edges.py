@@ -7,6 +7,7 @@ singular and unreachable.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 Bool = NDArray[np.bool_]
 
 SOLUTION = 1e-9  # of the reach: what counts as a solution
-WEAK = 1e-5  # smallest singular value below which a branch may be a double root or part of a self-motion
+WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
+DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 
 
@@ -55,15 +57,16 @@ def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
     if len(found):
         k, b = found.T
         sigma[k, b], V[k, b], nullity[k, b] = numeric.null_space(arm, task, q[k, b], target[k])
-    valid = _merge(arm, q, valid, sigma, size.reshape(K, B))
+    separate = valid
+    valid, merged = _merge(arm, q, valid, sigma, size.reshape(K, B))
     status = np.where(valid.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
+    double = merged | (separate & (sigma < DOUBLE))
+    status[double.any(axis=1)] = Status.BOUNDARY
     free = np.zeros((K, n), bool)
     weak = np.argwhere(valid & (sigma < WEAK))
     if len(weak):
         k, b = weak.T
         moving, joints = _self_motion(arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k])
-        double = ~moving
-        status[k[double]] = Status.BOUNDARY
         status[k[moving]] = Status.SINGULAR
         for row, who in zip(k[moving], joints[moving], strict=True):
             free[row] |= who
@@ -71,9 +74,12 @@ def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
     return Examined(q, valid, status, free)
 
 
-def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> Bool:
-    """Keep one of each cluster; the radius grows where the Jacobian is weak: rounding / sigma."""
-    valid = valid.copy()
+def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> tuple[Bool, Bool]:
+    """Keep one of each cluster, and say which were merged away.
+
+    The radius grows where the Jacobian is weak: rounding / sigma.
+    """
+    before, valid = valid, valid.copy()
     radius = 1e-7 + np.minimum(1e-13 / np.maximum(sigma, 1e-300), 3e-4)
     B = q.shape[1]
     for i in range(B):
@@ -86,7 +92,7 @@ def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> Bool:
             worse_i = size[:, i] > size[:, j]
             valid[same & worse_i, i] = False
             valid[same & ~worse_i, j] = False
-    return valid
+    return valid, before & ~valid
 
 
 def _self_motion(
@@ -100,16 +106,35 @@ def _self_motion(
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     moving = np.zeros(len(q), bool)
     joints = np.zeros(q.shape, bool)
-    for index in range(int(nullity.max())):
-        who = np.flatnonzero(nullity > index)
-        for way in (1.0, -1.0):
-            step = way * STEP * V[who, arm.n - 1 - index] * unit
-            there, size = numeric.correct(arm, task, q[who] + step, target[who], steps=12)
+    for who, direction in _null_directions(arm.n, V, nullity):
+        for way in (STEP, -STEP):
+            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=12)
             moved = np.abs(there - q[who]) / unit
-            far = (moved.max(axis=1) > 0.3 * STEP * np.abs(V[who, arm.n - 1 - index]).max(axis=1)) & (size < 1e-11)
+            far = (moved.max(axis=1) > 0.3 * STEP * np.abs(direction).max(axis=1)) & (size < 1e-11)
             moving[who] |= far
             joints[who] |= far[:, None] & (moved > 1e-3 * STEP)
     return moving, joints
+
+
+def _null_directions(
+    n: int, V: Array, nullity: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    """Which branches to push, and where: (m,) indices and (m, n) directions.
+
+    In a null space of several dimensions a self-motion may hide between the basis vectors:
+    there every joint is pushed as far as the null space lets it.
+    """
+    for index in range(int(nullity.max())):
+        who = np.flatnonzero(nullity > index)
+        yield who, V[who, n - 1 - index]
+    many = np.flatnonzero(nullity > 1)
+    for joint in range(n if len(many) else 0):
+        in_null = np.arange(n) >= n - nullity[many][:, None]
+        push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
+        size = np.linalg.norm(push, axis=1)
+        some = size > 0.1
+        if some.any():
+            yield many[some], push[some] / size[some, None]
 
 
 def _one_of_a_curve(

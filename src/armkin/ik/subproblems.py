@@ -74,7 +74,7 @@ def rotation_between(ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: float, p
     c = soa.add(soa.mul(ux, vx), soa.mul(uy, vy))
     s = soa.sub(soa.mul(ux, vy), soa.mul(uy, vx))
     h2 = c * c + s * s
-    free = h2 < FREE * scale**4
+    free = h2 < (FREE * scale * scale) ** 2
     inverse = 1.0 / np.sqrt(np.where(free, 1.0, h2)) if np.any(free) else 1.0 / np.sqrt(h2)
     c, s = c * inverse, s * inverse
     if np.any(free):
