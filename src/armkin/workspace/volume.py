@@ -17,9 +17,9 @@ An improved Monte Carlo method based on Gaussian growth to calculate the workspa
 Engineering Applications of Artificial Intelligence 64, 2017).
 
 A cell on the border is reached in part. Counting all such cells gives an upper figure, counting none
-a lower one; as a border falls anywhere in its cells, the middle of the two is taken, and half of
-what is between them is the error. Cells that the samples missed count as borders, and so widen the
-error; where that is worse than larger cells are, neighbouring cells are merged.
+a lower one; as a border falls anywhere in its cells, the middle of the two is taken. The error is half
+of what is between the two, plus how far the figure moves when the cells are merged to twice their
+size, which shows what the samples have missed. Of all sizes the one with the least error is taken.
 """
 
 from __future__ import annotations
@@ -79,20 +79,22 @@ def extent(arm: Arm, seed: int = 0) -> Extent:
         low[0] = max(low[0], 0.0)
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else _SIDE)
     _fill(cells, rng, _UNIFORM, _GROWN)
-    lower, upper = cells.bracket()
-    while (coarse := cells.merged()) is not None:
-        below, above = coarse.bracket()
-        if above - below >= upper - lower:
-            break
-        cells, lower, upper = coarse, below, above
+    levels = [cells]
+    while (coarse := levels[-1].merged()) is not None:
+        levels.append(coarse)
+    brackets = np.array([level.bracket() for level in levels])
+    middles = brackets.mean(axis=1)
+    errors = 0.5 * np.diff(brackets, axis=1)[:-1, 0] + np.abs(np.diff(middles))
+    chosen = int(np.argmin(errors))
+    cells = levels[chosen]
     shape = " x ".join(str(k) for k in cells.shape)
     sweep = "a full turn" if section.closed else "its range"
     return Extent(
         dimensions,
-        0.5 * (lower + upper),
-        0.5 * (upper - lower),
+        float(middles[chosen]),
+        float(errors[chosen]),
         f"{shape} cells of equal area in a section, swept exactly by {arm.joint_names[0]} over {sweep}; "
-        "border cells count half, and are the error",
+        "border cells count half; the error is that half and the change with cells of twice the size",
     )
 
 
