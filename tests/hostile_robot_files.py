@@ -314,6 +314,12 @@ def _joints(count: int) -> str:
     return head + ("".join(rows) or " []") + "\n"
 
 
+def _motors(count: int) -> str:
+    row = "{{name: M{0}, joints: {{q{0}: 1}}, full_steps: 200, microsteps: 1}}"
+    rows = "".join(f"  - {row.format(i)}\n" for i in range(count))
+    return f"{_joints(1)}motors:\n{rows}"
+
+
 def cases() -> dict[str, bytes]:
     """Every hostile file by its name."""
     texts = {name: _edited(*edit).encode() for name, edit in _edits().items()}
@@ -331,6 +337,12 @@ def cases() -> dict[str, bytes]:
         "null document": b"--- ~\n",
         "one word": b"arm\n",
         "one number": b"42\n",
+        "25 motors": _motors(25).encode(),
+        "1000 motors": _motors(1000).encode(),
+        "weights of 100 joints": MOTORS.replace(
+            "joints: {J3: 1}", f"joints: {{{', '.join(f'J{i}: 1' for i in range(100))}}}"
+        ).encode(),
+        "a thousand unknown keys": b"".join(b"k%d: 1\n" % i for i in range(1000)),
         "a list": b"- name: arm\n- convention: standard\n",
         "an empty mapping": b"{}\n",
         "byte order mark alone": b"\xef\xbb\xbf",

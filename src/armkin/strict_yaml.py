@@ -23,7 +23,7 @@ from typing import Any
 import yaml
 
 MAX_BYTES = 256 * 1024
-MAX_VALUES = 10_000
+MAX_VALUES = 2_000  # an arm of twelve joints with all its motors has 500
 MAX_DEPTH = 12
 MAX_DIGITS = 15  # an integer of 15 digits is still exact as a float
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.model import Drive, Joint, Motor, RobotFile
 
 MAX_JOINTS = 12
+MAX_MOTORS = 24  # two on each joint
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
@@ -217,7 +218,7 @@ def _motors(robot: RobotFile) -> Iterator[Problem]:
         for i, motor in enumerate(robot.motors):
             for path, message in (*_drive(motor), *_weights(motor, robot)):
                 yield ("motors", i, *path), message
-        yield from _determined(robot.motors)
+        yield from _determined(robot, robot.motors)
     if robot.gripper is not None:
         yield from _gripper(robot)
 
@@ -236,9 +237,9 @@ def _weights(motor: Motor, robot: RobotFile) -> Iterator[Problem]:
         yield (), "a prismatic joint's stepper needs lead, the mm per turn"
 
 
-def _determined(motors: tuple[Motor, ...]) -> Iterator[Problem]:
+def _determined(robot: RobotFile, motors: tuple[Motor, ...]) -> Iterator[Problem]:
     """The joints must follow from the motors: the weights' rank is the number of joints they name."""
-    names = sorted({name for motor in motors for name in motor.joints})
+    names = [joint.name for joint in robot.joints if any(joint.name in motor.joints for motor in motors)]
     rows = [[motor.joints.get(name, 0.0) for name in names] for motor in motors]
     for column, name in enumerate(names):
         pivot = max(rows, key=lambda row: abs(row[column]), default=None)

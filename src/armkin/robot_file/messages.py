@@ -135,8 +135,8 @@ def _text(error: Any) -> str:
         key = str(path[-1])
         example = "text, for example three_dof" if path == ("name",) else _EXAMPLES.get(key)
         return f"is required: {example or _first_sentence(_owner(path), key)}"
-    if kind == "too_long" and path == ("joints",):
-        return f"{context['actual_length']} joints; armkin takes 1 to {context['max_length']}"
+    if kind == "too_long" and path in (("joints",), ("motors",)):
+        return f"{len(value)} {path[0]}; armkin takes 1 to {context['max_length']}"
     if kind == "too_short" and path == ("joints",):
         return "is empty; an arm has at least one joint"
     if kind in ("too_short", "too_long"):

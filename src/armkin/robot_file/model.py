@@ -158,7 +158,9 @@ class Motor(Drive):
 
     name: Name = Field(description="The motor's name in messages and results.")
     joints: dict[str, Value] = Field(
-        description="Weights: motor angle before its ratio = sum of weight x joint value.", min_length=1
+        description="Weights: motor angle before its ratio = sum of weight x joint value.",
+        min_length=1,
+        max_length=checks.MAX_JOINTS,
     )
 
 
@@ -167,6 +169,8 @@ class Gripper(Drive):
 
     open: Value = Field(description="Position when open, in the drive's degrees (mm with a lead).")
     closed: Value = Field(description="Position when closed, in the drive's degrees (mm with a lead).")
+    max_speed: Rate | None = Field(None, description="deg/s or mm/s of the drive; needed to move the gripper.")
+    max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to move the gripper.")
 
 
 class Homing(_Model):
@@ -194,6 +198,9 @@ class Board(_Model):
     driver: Driver | None = Field(None, description="Stepper driver: it sets the pulse timing.")
     enable: Literal["low", "high"] | None = Field(
         None, description="Level of the ENABLE pin that switches the drivers on; low for the listed ones."
+    )
+    abort: Literal["open", "closed"] | None = Field(
+        None, description="The abort input when it is not pressed: open (default), or closed to ground."
     )
 
 
@@ -263,6 +270,7 @@ class RobotFile(_Model):
         None,
         description="Motors that are not one to one with joints, instead of the joints' drives.",
         min_length=1,
+        max_length=checks.MAX_MOTORS,
     )
     gripper: Gripper | None = Field(None, description="A servo or stepper with `open` and `closed`.")
     board: Board | None = Field(None, description="The controller, for `armkin send`.")
