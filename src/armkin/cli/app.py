@@ -109,8 +109,8 @@ def armkin(
         raise errors.UsageError(f"which command? {', '.join(COMMANDS)}; see armkin --help")
 
 
-def run(arguments: list[str] | None = None) -> int:
-    """Run a command line and return its exit code; no exception leaves here."""
+def run(arguments: list[str]) -> int:
+    """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
         code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
