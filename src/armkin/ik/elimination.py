@@ -17,10 +17,12 @@ x is infinite.
 eigenspace has dimension one.
 (iv) Regularity depends on the arm: a pair of parallel axes makes most roles identically singular.  `prepare`
 measures it on random poses, and only roles that give their generating joints back are used.
-(v) There remain poses on which (iii) fails: roots at infinity, equal roots, roots that rounding turned into
-complex pairs.  They show (entries above 1e6, roots closer than 1e-4 with rough vectors, candidates that
-stall), and such a pose is solved again with another offset and other hidden joints until a pass shows none of
-these or the passes are used up; all passes' answers count.
+(v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
+rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
+roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none.
+Such a pose is solved again, with another offset, other hidden joints, and moved by 1e-6 to 1e-3: an isolated
+solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
+longer.  This goes on until a pass shows none of these, or six are done; all passes' answers count.
 Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
 the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
 self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
@@ -49,7 +51,7 @@ ACCEPTED = 1e-10  # residual of an answer, lengths scaled
 TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
-SHAKES = (0.0, 1e-5, 0.0, 1e-6, 1e-4)  # how far each pass moves the pose, see (v)
+SHAKES = (0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
 HEALTHY, USELESS = -8.0, -5.0  # log10 of a role's raw error from which on it is good enough, or unfit
 
 

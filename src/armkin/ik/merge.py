@@ -58,9 +58,9 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
     """Sort answers by pose and keep one of each set of equal ones.
 
     Two answers are one if the point halfway between them is an answer too, to the accuracy that both
-    have: the radius is 1e-6 where the Jacobian is good and grows like the square root of the residual
-    where it is weak.  Two real roots near a fold stay apart: halfway, the pose is off by the square
-    of their distance.
+    have, or if one lies within the other's uncertainty: the radius is 1e-6 where the Jacobian is good
+    and grows like residual / sigma_min, up to the root of the residual, where it is weak.  Two real roots
+    near a fold stay apart: halfway, the pose is off by the square of their distance.
 
     Args:
         chain, prismatic: (7, 4, 4) and (6,), scaled.
@@ -92,7 +92,10 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         target = np.ascontiguousarray(np.moveaxis(goal[pose[first], :3], 0, -1))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(EXACT, 4 * np.maximum(residual[first], residual[second]))
-        same = (distance < SAME) | (halfway < blur)
+        # How far off an answer may be itself: its next Newton step, along a valley that may well be curved.
+        radius = 3 * answers.weakness * residual
+        reach = np.maximum(radius[first], radius[second])
+        same = (distance < np.maximum(SAME, reach)) | (halfway < blur)
         worse = residual[second] > residual[first]
         keep[np.where(worse, second, first)[same]] = False
         merged[pose[first[same & (distance > 1e-2 * SAME)]]] = True

@@ -90,9 +90,7 @@ def roles(prismatic: Bool, slots: tuple[int, ...], hidden: tuple[int, ...]) -> l
     found = []
     for slot in slots:
         for backward in (False, True):
-            order = tuple(
-                (slot - i) % 6 if backward else (POSE_LINK - slot + i) % 6 for i in range(6)
-            )
+            order = tuple((slot - i) % 6 if backward else (POSE_LINK - slot + i) % 6 for i in range(6))
             if prismatic[order[5]]:
                 continue
             for h in hidden:

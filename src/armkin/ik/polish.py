@@ -90,9 +90,7 @@ def jacobian(frame: Array, joints: list[Array], prismatic: Bool) -> Array:
     return out
 
 
-def refine(
-    link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False
-) -> Polished:
+def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False) -> Polished:
     """Newton steps (Levenberg-Marquardt ones if ``damped``), keeping the best point met.
 
     Args:
