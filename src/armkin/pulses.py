@@ -96,7 +96,7 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     >>> np.rad2deg(armkin.joints(arm, [-1067, -10144, 5667])).round(6).tolist()
     [-30.009375, 4.998371, -4.995]
     """
-    inverse = _inverse(arm)
+    inverse = joints_per_pulse(arm)
     values = np.asarray(p, dtype=np.float64)
     m = len(arm.motor_gain)
     if values.ndim == 0 or values.shape[-1] != m:
@@ -162,7 +162,7 @@ def resolution(arm: Arm) -> Array:
     Rounding the motors puts a joint within half of this of its exact value. With one motor a joint
     it is the joint's step; where several motors turn a joint, their steps add up.
     """
-    return np.asarray(np.abs(_inverse(arm)).sum(axis=1))
+    return np.asarray(np.abs(joints_per_pulse(arm)).sum(axis=1))
 
 
 def motor_names(arm: Arm) -> list[str]:
@@ -196,7 +196,7 @@ def outside_travel(arm: Arm, p: ArrayLike) -> NDArray[np.bool_]:
 
 def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     """Pulses before rounding, and how far arithmetic may have moved them: (..., motors) twice."""
-    _inverse(arm)
+    joints_per_pulse(arm)
     values = as_joints(arm, q)
     if not np.all(np.isfinite(values)):
         raise UsageError("joint values must be finite to become pulses")
@@ -207,8 +207,11 @@ def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     return exact, _HALF + 4 * np.finfo(float).eps * size
 
 
-def _inverse(arm: Arm) -> Array:
-    """Joints per pulse: (n, motors)."""
+def joints_per_pulse(arm: Arm) -> Array:
+    """How far a pulse of each motor moves each joint: (n, motors) [rad | mm].
+
+    Raises UsageError if the motors do not determine the joints.
+    """
     gain = arm.motor_gain
     still = [name for name, column in zip(arm.joint_names, gain.T, strict=True) if not column.any()]
     if len(still) == arm.n:
@@ -231,7 +234,7 @@ def _nearest(arm: Arm, q: Array, exact: Array, around: Array) -> Array:
     """Per pose, the neighbouring pulses with the nearest tip: (N, motors)."""
     rounded = pulses(arm, q).astype(float)
     near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + around], axis=1)  # (N, C, motors)
-    actual = arm.home + (near - arm.motor_bias) @ _inverse(arm).T
+    actual = arm.home + (near - arm.motor_bias) @ joints_per_pulse(arm).T
     tip = position(arm, actual)
     distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)
 

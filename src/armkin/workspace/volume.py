@@ -64,7 +64,7 @@ def extent(arm: Arm, seed: int = 0) -> Extent:
     An arm whose tip has fewer freedoms than the space it moves in (two joints in space sweep a
     surface) has the volume 0.
     """
-    normal, freedoms = _motion(arm)
+    normal, freedoms = motion(arm)
     dimensions = 3 if normal is None else 2
     if freedoms < dimensions:
         what = {0: "does not move", 1: "stays on a curve", 2: "stays on a surface"}[freedoms]
@@ -98,7 +98,7 @@ def extent(arm: Arm, seed: int = 0) -> Extent:
     )
 
 
-def _motion(arm: Arm) -> tuple[Array | None, int]:
+def motion(arm: Arm) -> tuple[Array | None, int]:
     """The normal of the plane that the tip moves in (None: space), and the tip's freedoms."""
     low, high = span(arm)
     q = low + (high - low) * np.random.default_rng(1).random((64, arm.n))
