@@ -40,6 +40,11 @@ if TYPE_CHECKING:
     from armkin.kinematics import manipulability as manipulability
     from armkin.lock import lock as lock
     from armkin.lock import unlock as unlock
+    from armkin.pulses import best as best
+    from armkin.pulses import joints as joints
+    from armkin.pulses import pulses as pulses
+    from armkin.pulses import rounding as rounding
+    from armkin.workspace import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
@@ -66,6 +71,11 @@ _HOME = {
     "manipulability": "kinematics",
     "lock": "lock",
     "unlock": "lock",
+    "best": "pulses",
+    "joints": "pulses",
+    "pulses": "pulses",
+    "rounding": "pulses",
+    "workspace": "workspace",
 }
 
 __all__ = [*_HOME, "__version__"]
