@@ -10,8 +10,10 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from armkin.boards import BOARDS
+
 if TYPE_CHECKING:
-    from armkin.robot_file.model import Drive, Joint, Motor, RobotFile
+    from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotFile
 
 MAX_JOINTS = 12
 MAX_MOTORS = 24  # two on each joint
@@ -20,12 +22,6 @@ Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
 Triple = tuple[float, float, float]
 
-# Outputs of the boards: steppers, servos. (Pins: firmware/boards.)
-BOARD_AXES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "uno_cnc_shield": (("X", "Y", "Z", "A"), ("S0",)),
-    "mega_ramps14": (("X", "Y", "Z", "E0", "E1"), ("S0", "S1", "S2", "S3")),
-    "uno_servos": ((), ("S0", "S1", "S2", "S3", "S4", "S5")),
-}
 _STEPPER_KEYS = ("full_steps", "microsteps", "gear", "pulley", "lead")
 _SERVO_KEYS = ("travel", "pulse_us", "zero")
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
@@ -288,12 +284,23 @@ def _axes(robot: RobotFile) -> Iterator[Problem]:
         used.add(drive.axis)
         if robot.board is None:
             continue
-        steppers, servos = BOARD_AXES[robot.board.kind]
-        allowed = steppers if drive.kind == "stepper" else servos
+        board = BOARDS[robot.board.kind]
+        allowed = board.steppers if drive.kind == "stepper" else board.servos
         if drive.axis not in allowed:
             what = f"{robot.board.kind} has no {drive.kind} axis {drive.axis}"
             yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
-    if robot.board is not None and not BOARD_AXES[robot.board.kind][0]:
+    if robot.board is not None:
+        yield from _board(robot, robot.board)
+
+
+def _board(robot: RobotFile, settings: Board) -> Iterator[Problem]:
+    board = BOARDS[settings.kind]
+    if not board.steppers:
         for key in ("driver", "enable"):
-            if getattr(robot.board, key) is not None:
-                yield ("board", key), f"{robot.board.kind} has no stepper drivers; remove it"
+            if getattr(settings, key) is not None:
+                yield ("board", key), f"{settings.kind} has no stepper drivers; remove it"
+    for i, joint in enumerate(robot.joints):
+        if joint.homing is not None and joint.homing.switch not in board.switches:
+            what = f"{settings.kind} has no limit input {joint.homing.switch}"
+            message = f"{what}; it has {', '.join(board.switches) or 'none at all'}"
+            yield ("joints", i, "homing", "switch"), message

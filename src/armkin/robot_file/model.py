@@ -169,8 +169,8 @@ class Gripper(Drive):
 
     open: Value = Field(description="Position when open, in the drive's degrees (mm with a lead).")
     closed: Value = Field(description="Position when closed, in the drive's degrees (mm with a lead).")
-    max_speed: Rate | None = Field(None, description="deg/s or mm/s of the drive; needed to move the gripper.")
-    max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to move the gripper.")
+    max_speed: Rate | None = Field(None, description="deg/s or mm/s of the drive; needed to grip.")
+    max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to grip.")
 
 
 class Homing(_Model):

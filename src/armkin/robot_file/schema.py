@@ -4,12 +4,12 @@ Made from the pydantic model, less what our YAML never holds (null), and with li
 every schema version knows.
 """
 
-from typing import Any, cast
+from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from armkin.robot_file.model import RobotFile
+from armkin.robot_file.model import Pose, RobotFile
 
 # The smallest useful file of each convention.
 EXAMPLES: list[dict[str, Any]] = [
@@ -74,8 +74,8 @@ def json_schema() -> dict[str, Any]:
     >>> json_schema()["required"]
     ['name', 'convention', 'joints']
     """
-    made = RobotFile.model_json_schema(schema_generator=_Generator)
-    made = cast(dict[str, Any], _without_titles(made))
+    Pose.model_rebuild()  # its defaults stand in the schema, and its own build was deferred
+    made = _tidied(RobotFile.model_json_schema(schema_generator=_Generator))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "armkin robot file",
@@ -84,14 +84,20 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def _without_titles(part: Any) -> Any:
-    """pydantic titles ("Max Speed") hide the descriptions in editors' hovers; the keys are titles enough."""
-    if isinstance(part, dict):
-        return {
-            key: _without_titles(value)
-            for key, value in part.items()
-            if not (key == "title" and isinstance(value, str))
-        }
+def _tidied(part: Any) -> Any:
+    """The same schema from every pydantic: whole bounds as integers, a lone reference without its allOf.
+
+    Titles go ("Max Speed"), as they hide the descriptions in editors' hovers.
+    """
+    if isinstance(part, float) and part.is_integer():
+        return int(part)
     if isinstance(part, list):
-        return [_without_titles(value) for value in part]
-    return part
+        return [_tidied(value) for value in part]
+    if not isinstance(part, dict):
+        return part
+    kept = {k: _tidied(v) for k, v in part.items() if not (k == "title" and isinstance(v, str))}
+    match kept.get("allOf"):
+        case [{"$ref": str(reference)}]:
+            del kept["allOf"]
+            return {"$ref": reference, **kept}
+    return kept
