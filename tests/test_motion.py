@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armkin import arm as arms
-from armkin import motion, pulses
+from armkin import motion
 from armkin.arm import Arm
 from armkin.errors import NoSolutionError, UsageError
 from armkin.protocol import Segment
+from armkin.pulses import joints, pulses
 
 CLOCK, MIN_INTERVAL = motion.CLOCK, motion.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
@@ -148,7 +149,7 @@ def test_a_trace_starts_and_ends_where_the_counts_do(three_dof: Arm) -> None:
     assert trace.time[-1] == pytest.approx(plan.duration)
     assert np.all(np.diff(trace.time) >= 0)
     assert trace.joints[0] == pytest.approx(three_dof.home)
-    assert trace.joints[-1] == pytest.approx(pulses.joints(three_dof, plan.end))
+    assert trace.joints[-1] == pytest.approx(joints(three_dof, plan.end))
     speed = np.abs(np.diff(trace.joints, axis=0)) / np.maximum(np.diff(trace.time), 1e-9)[:, None]
     assert np.all(speed <= 0.5 * three_dof.max_speed * (1 + 1e-6))
     assert trace.position.shape == (len(trace.time), 5, 3)
@@ -170,7 +171,7 @@ def test_a_target_outside_the_limits_is_refused_by_name(three_dof: Arm) -> None:
 
 
 def test_a_start_outside_the_limits_may_come_back(three_dof: Arm) -> None:
-    outside = pulses.pulses(three_dof, np.deg2rad([125, 90, -90]))
+    outside = pulses(three_dof, np.deg2rad([125, 90, -90]))
     plan = motion.plan(three_dof, outside, np.deg2rad([110, 90, -90]))
     assert plan.end[0] == 3911
 

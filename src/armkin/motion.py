@@ -24,10 +24,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin import kinematics, pulses
 from armkin.errors import NoSolutionError, UsageError
+from armkin.kinematics import frames
 from armkin.limits import outside
 from armkin.protocol import Segment
+from armkin.pulses import joints as joints_of
+from armkin.pulses import motor_names, pulses
 from armkin.soa import Array
 
 if TYPE_CHECKING:
@@ -102,16 +104,16 @@ class Plan:
 
     def trace(self, step: float = 0.01) -> Trace:
         """The path in time, sampled every `step` seconds, with the end of every move."""
-        times, joints, begin = [np.zeros(1)], [pulses.joints(self.arm, self.start)[None]], 0.0
+        times, joints, begin = [np.zeros(1)], [joints_of(self.arm, self.start)[None]], 0.0
         for move in self.moves:
             seconds = move.cycles / self.clock
             t = np.append(np.arange(step, seconds - step / 4, step), seconds)
             done = progress(move, t * self.clock)
             times.append(begin + t)
-            joints.append(pulses.joints(self.arm, move.start) + done[:, None] * _span(self.arm, move))
+            joints.append(joints_of(self.arm, move.start) + done[:, None] * _span(self.arm, move))
             begin += seconds
         q = np.concatenate(joints)
-        position = kinematics.frames(self.arm, q)[..., :3, 3]
+        position = frames(self.arm, q)[..., :3, 3]
         return Trace(np.concatenate(times), q, position)
 
 
@@ -152,11 +154,21 @@ def plan(
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
     moves = []
-    for goal in pulses.pulses(arm, goals):
+    for goal in pulses(arm, goals):
         moves.append(_joint_move(arm, at, goal, speed, clock, min_interval))
         at = goal
     first = moves[0].start if moves else at
     return Plan(arm, first, tuple(moves), clock)
+
+
+def motor_accel(arm: Arm) -> Array:
+    """Greatest acceleration of every motor: (motors,) [counts/s^2].
+
+    That of a motor which turns several joints suits the most delicate of them, whichever moves: so a hold,
+    of which the board knows motors only, is within the joints' max_accel.
+    """
+    each = np.abs(arm.motor_gain) * arm.max_accel
+    return np.asarray(np.where(each > 0, each, np.inf).min(axis=1))
 
 
 def check_rates(arm: Arm) -> None:
@@ -343,16 +355,17 @@ def _rounded(span: Counts, at: int, n: int) -> Counts:
 
 def _span(arm: Arm, move: Move) -> Array:
     """Change of every joint over a move: (n,)."""
-    return pulses.joints(arm, move.end) - pulses.joints(arm, move.start)
+    return joints_of(arm, move.end) - joints_of(arm, move.start)
 
 
 def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, min_interval: int) -> Move:
-    change = np.abs(pulses.joints(arm, end) - pulses.joints(arm, start))
+    change = np.abs(joints_of(arm, end) - joints_of(arm, start))
     moving = change > 1e-12
     if not moving.any():
         return Move(start, end, (), 0, 0.0)
     top = float((arm.max_speed[moving] / change[moving]).min()) * speed
     accel = float((arm.max_accel[moving] / change[moving]).min())
+    accel = min(accel, float((motor_accel(arm) / np.maximum(np.abs(end - start), 1)).min()))
     rates = np.abs(end - start) * min(top, math.sqrt(accel * _EASE))
     if rates.max() > clock / min_interval:
         k = int(rates.argmax())
@@ -362,7 +375,7 @@ def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, 
         allowed = clock / min_interval
         raise UsageError(
             f"joint {arm.joint_names[joint]} at {fast:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
-            f"{pulses.motor_names(arm)[k]}; the board makes {allowed:,.0f}\n"
+            f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}\n"
             f"lower its max_speed, or send with --speed {math.floor(100 * speed * allowed / rates[k])}"
         )
     return line(start.tolist(), end.tolist(), top, accel, clock=clock, min_interval=min_interval)

@@ -1,0 +1,75 @@
+"""What the host must know of each board before it is connected: one entry a board, one a driver.
+
+The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two tables together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board that the firmware supports."""
+
+    kind: str  # as `board: {kind: ...}` in a robot file
+    number: int  # as INFO says it
+    steppers: tuple[str, ...]  # names of its stepper axes, in the protocol's order
+    servos: tuple[str, ...]  # of its servo axes, which follow
+    switches: tuple[str, ...]  # of its limit inputs
+    queue: int  # segments
+    frame: int  # [bytes] payload + CRC
+    min_interval: int  # [cycles] between ticks
+    clock: int = 16_000_000  # [1/s]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """All axes, in the protocol's order."""
+        return self.steppers + self.servos
+
+    @property
+    def servo_mask(self) -> int:
+        """Bit i: axis i is a servo."""
+        return ((1 << len(self.servos)) - 1) << len(self.steppers)
+
+    @property
+    def rows(self) -> int:
+        """Joint-limit rows that its configuration may have."""
+        return len(self.axes)
+
+
+BOARDS = {
+    board.kind: board
+    for board in (
+        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 160, 400),
+        Board(
+            "mega_ramps14",
+            2,
+            ("X", "Y", "Z", "E0", "E1"),
+            ("S0", "S1", "S2", "S3"),
+            ("X_MIN", "X_MAX", "Y_MIN", "Y_MAX", "Z_MIN", "Z_MAX"),
+            128,
+            240,
+            480,
+        ),
+        Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 160, 1600),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Driver:
+    """What a stepper driver's data sheet asks for; times in 0.1 us, `wake` in ms."""
+
+    step_high: int
+    step_low: int
+    dir_setup: int
+    wake: int
+
+
+DRIVERS = {
+    "A4988": Driver(10, 10, 2, 1),
+    "DRV8825": Driver(19, 19, 7, 2),
+    "TMC2208": Driver(1, 1, 1, 1),
+    "TMC2209": Driver(1, 1, 1, 1),
+}
