@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from armkin.kinematics import manipulability as manipulability
     from armkin.lock import lock as lock
     from armkin.lock import unlock as unlock
-    from armkin.pulses import best as best
+    from armkin.pulses import best_pulses as best_pulses
     from armkin.pulses import joints as joints
     from armkin.pulses import pulses as pulses
     from armkin.pulses import rounding as rounding
@@ -71,7 +71,7 @@ _HOME = {
     "manipulability": "kinematics",
     "lock": "lock",
     "unlock": "lock",
-    "best": "pulses",
+    "best_pulses": "pulses",
     "joints": "pulses",
     "pulses": "pulses",
     "rounding": "pulses",

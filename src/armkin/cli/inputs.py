@@ -10,6 +10,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
+    from armkin.ik.tasks import Task
 
 
 def load(robot: str) -> Arm:
@@ -27,6 +28,11 @@ def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     """One value for each joint [deg | mm], comma-separated."""
     return listed(text, arm.joint_names, option)
+
+
+def target(task: Task, words: Sequence[str] | None) -> list[float]:
+    """One value for each of the target's numbers [mm, deg]."""
+    return numbers(words or (), task.labels, f"task {task.name}")
 
 
 def no_numbers(words: Sequence[str] | None) -> None:

@@ -22,3 +22,29 @@ Out = Annotated[
     str | None,
     typer.Option("--out", metavar="FILE", help="Write to a file, which appears whole or not at all."),
 ]
+Target = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="TARGET...", help="By the arm's task, see `armkin info`: x y z, x y z phi, ... in mm, deg."),
+]
+AllBranches = Annotated[
+    bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")
+]
+Near = Annotated[
+    str | None,
+    typer.Option("--near", metavar="Q,...", help="Joint values to stay close to. [default: the home pose]"),
+]
+BranchName = Annotated[
+    str | None,
+    typer.Option("--branch", metavar="NAME", help="The branch of that name, for example 'left, elbow up'."),
+]
+TaskName = Annotated[
+    str | None,
+    typer.Option("--task", metavar="TASK", help="What the target prescribes. [default: the robot file's]"),
+]
+Lock = Annotated[
+    list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.")
+]
+Sweep = Annotated[
+    list[str] | None,
+    typer.Option("--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."),
+]

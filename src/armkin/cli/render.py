@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import output, units
+from armkin.errors import NoSolutionError
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -86,12 +87,41 @@ def table(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,), indent: str
 
 
 def pose_line(arm: Arm, values: Sequence[float]) -> str:
-    """The arm and its joint values on one line: ``three_dof  q1 = -30, q2 = 5 deg``."""
-    parts = [
-        f"{name} = {short(value)}" + (" mm" if unit == "mm" else "")
-        for name, value, unit in zip(arm.joint_names, values, units.names(arm), strict=True)
-    ]
-    return f"{arm.name}: {', '.join(parts)}" + (" deg" if not arm.prismatic[-1] else "")
+    """The arm and its joint values on one line: ``three_dof: q1 = -30, q2 = 5, q3 = -5 deg``."""
+    return f"{arm.name}: {labelled(arm.joint_names, values, units.names(arm))}"
+
+
+def labelled(names: Sequence[str], values: Sequence[float], each_unit: Sequence[str]) -> str:
+    """``x = 390, y = 80, z = 300 mm``: a unit where the next number's differs."""
+    parts = []
+    for i, (name, value, unit) in enumerate(zip(names, values, each_unit, strict=True)):
+        last = i + 1 == len(names) or each_unit[i + 1] != unit
+        parts.append(f"{name} = {short(value)}" + (f" {unit}" if last and unit else ""))
+    return ", ".join(parts)
+
+
+def joint_headings(arm: Arm) -> list[str]:
+    """Column headings of joint values: ``q1/deg``."""
+    return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
+
+
+def unsolved(arm: Arm, answer: dict[str, Any]) -> NoSolutionError:
+    """Why there is no best branch, and how far away the nearest legal pose is."""
+    nearest = answer["closest"]
+    away = f"the nearest pose within limits is {nearest['distance_mm']:.4f} mm away"
+    if answer["status"] == "unreachable":
+        return NoSolutionError(f"{arm.name} cannot reach this target; {away}")
+    if answer["branches_within_limits"]:
+        return NoSolutionError("the branch of that name is not within limits; others are: see --all-branches")
+    return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
+
+
+def unsolved_rows(tally: Tally) -> NoSolutionError:
+    """How many rows of a batch have no best branch."""
+    return NoSolutionError(
+        f"{tally.unsolved} of {tally.rows} rows have no branch within limits; "
+        f"the first is row {tally.first_unsolved}"
+    )
 
 
 def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:

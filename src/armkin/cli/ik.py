@@ -1,0 +1,183 @@
+"""`armkin ik`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render, solving, units
+from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
+from armkin.cli.options import AllBranches, Batch, BranchName, Json, Lock, Near, Out, Robot, Sweep, Target, TaskName
+from armkin.cli.render import fixed
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+    from armkin.ik.tasks import Task
+
+
+def ik(
+    robot: Robot,
+    target: Target = None,
+    all_branches: AllBranches = False,
+    near: Near = None,
+    branch: BranchName = None,
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits.")
+    ] = False,
+    task: TaskName = None,
+    lock: Lock = None,
+    sweep: Sweep = None,
+    json: Json = False,
+    batch: Batch = None,
+    out: Out = None,
+) -> None:
+    """All joint values that reach a target.
+
+    Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
+    the nearest pose within limits is shown instead.
+    """
+    from armkin.ik.tasks import task_for
+
+    arm = inputs.load(robot)
+    held = solving.holds(arm, lock or (), sweep or ())
+    what = task_for(arm, task)
+    request = solving.Request(
+        arm=arm,
+        task=what.name,
+        near=None if near is None else inputs.joint_list(arm, near, "--near"),
+        branch=branch,
+        holds=held,
+        swept=bool(sweep),
+    )
+    if batch is not None:
+        inputs.no_numbers(target)
+        tally = run_batch(
+            batch_rows(batch, what.labels, f"task {what.name}"),
+            out,
+            json,
+            lambda chunk: _answers(request, what, chunk, all_branches, turns, with_closest=json),
+            ["row", "status", "branch", *arm.joint_names, "within_limits", "residual_mm", "residual_deg", "motion"],
+            lambda row, answer: _records(arm, row, answer),
+        )
+        if tally.unsolved:
+            raise render.unsolved_rows(tally)
+        return
+    [answer] = _answers(request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True)
+    with output.destination(out) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    if answer["best"] is None:
+        raise render.unsolved(arm, answer)
+
+
+def _answers(
+    request: solving.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
+) -> Iterator[dict[str, Any]]:
+    arm = request.arm
+    targets = units.targets_in(task.labels, chunk.values)
+    for values, goal, found in zip(chunk.values.tolist(), targets, solving.solve(request, targets), strict=True):
+        listed, best = found.branches, found.best
+        if not all_branches:
+            listed, best = ([], None) if best is None else ([listed[best]], 0)
+        answer = {
+            **render.head(arm),
+            "task": task.name,
+            "target": values,
+            "target_labels": task.labels,
+            "near": request.near_out,
+            "status": found.status,
+            "method": found.method,
+            "why": found.why,
+            "complete": found.complete,
+            "joint_units": units.names(arm),
+            "branch_count": len(found.branches),
+            "branches_within_limits": sum(branch.within_limits for branch in found.branches),
+            "branches": _branches(request, listed, turns),
+            "best": best,
+            "closest": None,
+            "free_joints": found.free,
+        }
+        if best is None and with_closest:
+            nearest = solving.closest(request, goal)
+            answer["closest"] = {
+                "joints": units.joints_out(arm, nearest.q).tolist(),
+                "position_mm": nearest.position.tolist(),
+                "distance_mm": nearest.distance,
+                "angle_deg": float(units.angles_out(nearest.angle)),
+                "converged": nearest.converged,
+            }
+        yield answer
+
+
+def _branches(request: solving.Request, branches: Sequence[solving.Branch], turns: bool) -> list[dict[str, Any]]:
+    import numpy as np
+
+    import armkin
+
+    arm = request.arm
+    if not branches:
+        return []
+    q = np.array([branch.q for branch in branches])
+    joints = units.joints_out(arm, q)
+    violations = render.violations(arm, joints, q)
+    rows = []
+    for i, branch in enumerate(branches):
+        row = {
+            "joints": joints[i].tolist(),
+            "name": branch.name,
+            "within_limits": branch.within_limits,
+            "violations": violations[i],
+            "residual_mm": branch.residual_mm,
+            "residual_deg": float(units.angles_out(branch.residual_rad)),
+            "motion": branch.motion,
+        }
+        if turns:
+            near = units.joints_in(arm, request.near_out)
+            copies = armkin.turns(arm, branch.q, near=near)
+            held = [arm.joint_names.index(name) for hold in request.holds[:1] for name in hold]
+            same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
+            row["turns"] = units.joints_out(arm, copies[same]).tolist()
+        rows.append(row)
+    return rows
+
+
+def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
+    """CSV: one line a branch, or one line without joints."""
+    for branch in answer["branches"]:
+        rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
+        yield [row, answer["status"], branch["name"], *branch["joints"], *rest]
+    if not answer["branches"]:
+        yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]
+
+
+def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    headings = render.joint_headings(arm)
+    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
+    rows = [["", "branch", *headings, "motion", ""]]
+    for i, branch in enumerate(answer["branches"]):
+        bad = ", ".join(violation["joint"] for violation in branch["violations"])
+        mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
+        note = f"outside limits: {bad}" if bad else ""
+        rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
+        for copy in branch.get("turns", ())[1:]:
+            rows.append(["", "  or", *map(fixed, copy), "", ""])
+    if nearest := answer["closest"]:
+        miss = f"{fixed(nearest['distance_mm'])} mm away"
+        if nearest["angle_deg"] > 1e-6:
+            miss += f", turned by {fixed(nearest['angle_deg'])} deg"
+        rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
+    last = len(headings) + 3
+    return f"{arm.name}: {goal}\n\n{render.table(rows, left=(0, 1, last), indent='')}\n\n{_summary(answer)}\n"
+
+
+def _summary(answer: dict[str, Any]) -> str:
+    """What the table does not show: how many branches there are, and by which method."""
+    count, legal = answer["branch_count"], answer["branches_within_limits"]
+    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
+    if answer["free_joints"]:
+        text += f"; free: {', '.join(answer['free_joints'])}"
+    if count > len(answer["branches"]):
+        text += " (--all-branches lists all)"
+    sure = "every real branch is listed" if answer["complete"] else "there may be more"
+    return f"{text}\n{answer['method']}: {sure}"

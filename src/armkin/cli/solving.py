@@ -1,0 +1,192 @@
+"""Inverse kinematics for the command line: one answer a target, its branches sorted, locked joints put back."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import units
+from armkin.cli.numbers import number, whole
+from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+    from armkin.ik.closest import Closest
+    from armkin.ik.solutions import Solutions
+    from armkin.soa import Array
+
+MOST_SWEEPS = 10_000
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to solve for and how to choose."""
+
+    arm: Arm
+    task: str | None = None
+    near: Sequence[float] | None = None  # [deg | mm], by default home
+    branch: str | None = None  # name of the branch wanted
+    holds: Sequence[dict[str, float]] = ()  # joint name -> value [deg | mm]; several: all are tried
+    swept: bool = False
+
+    @property
+    def near_out(self) -> list[float]:
+        """The pose to stay close to [deg | mm]."""
+        return units.home_out(self.arm) if self.near is None else list(self.near)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One branch of one target, as joint values of the whole arm."""
+
+    q: Array  # (n,) [rad | mm]
+    name: str
+    within_limits: bool
+    residual_mm: float
+    residual_rad: float
+    motion: float  # sum of |change| from near [deg | mm]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """All there is to say about one target."""
+
+    status: str
+    method: str
+    why: str
+    complete: bool
+    free: list[str]
+    branches: list[Branch]  # within limits first, then by motion
+    best: int | None
+
+
+def solve(request: Request, targets: Array) -> list[Answer]:
+    """Answer targets (N, ...) [mm, rad]."""
+    import armkin
+    from armkin.ik.names import find
+
+    arm = request.arm
+    near = units.joints_in(arm, request.near_out)
+    parts: list[list[tuple[int, Answer, set[str]]]] = [[] for _ in targets]
+    for held in _holds_in(request):
+        kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
+        one = armkin.lock(arm, held) if held else arm
+        s = armkin.ik(one, targets, request.task, near=near[kept])
+        wanted = set(s.names)
+        if request.branch is not None:
+            wanted = {s.names[i] for i in find(s.names, request.branch)}
+        for i, answer in enumerate(_answers(request, held, s, near)):
+            parts[i].append((int(s.status[i]), answer, wanted))
+    return [_merged(request, found) for found in parts]
+
+
+def closest(request: Request, target: Array) -> Closest:
+    """The pose within limits nearest to one target [mm, rad], over all locked values."""
+    from dataclasses import replace
+
+    import armkin
+
+    arm = request.arm
+    near = units.joints_in(arm, request.near_out)
+    found = []
+    for held in _holds_in(request):
+        kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
+        one = armkin.lock(arm, held) if held else arm
+        nearest = armkin.closest(one, target, request.task, near=near[kept])
+        found.append(replace(nearest, q=armkin.unlock(arm, held, nearest.q) if held else nearest.q))
+    return min(found, key=lambda c: (c.distance, c.angle))
+
+
+def holds(arm: Arm, locks: Sequence[str], sweeps: Sequence[str]) -> list[dict[str, float]]:
+    """What `--lock J=V` and `--sweep J=LOW:HIGH:COUNT` hold: every combination [deg | mm]."""
+    values: dict[str, list[float]] = {}
+    for text in locks:
+        name, value = _named(arm, text, "--lock", "J3=20", values)
+        values[name] = [number(value, f"--lock {name}")]
+    for text in sweeps:
+        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", values)
+        parts = value.split(":")
+        if len(parts) != 3:
+            raise UsageError(f"--sweep {text}: write JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16")
+        low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
+        count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
+        values[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
+    if not values:
+        return []
+    total = 1
+    for choices in values.values():
+        total *= len(choices)
+    if total > MOST_SWEEPS:
+        raise UsageError(f"--sweep: {total} combinations; at most {MOST_SWEEPS} are tried")
+    return [dict(zip(values, choice, strict=True)) for choice in itertools.product(*values.values())]
+
+
+def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
+    from armkin.lock import joint_index
+
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise UsageError(f"{option} {text}: write JOINT=VALUE, for example {example}")
+    joint_index(arm, name)
+    if name in taken:
+        raise UsageError(f"{option} {text}: {name} is held already")
+    return name, value
+
+
+def _holds_in(request: Request) -> Iterator[dict[str, float]]:
+    """The held joints [rad | mm]; one empty hold if there are none."""
+    arm = request.arm
+    for held in request.holds or [{}]:
+        full = [held.get(name, 0.0) for name in arm.joint_names]
+        inside = dict(zip(arm.joint_names, units.joints_in(arm, full).tolist(), strict=True))
+        yield {name: inside[name] for name in held}
+
+
+def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
+    """The answers of one solver call, for the whole arm."""
+    import numpy as np
+
+    import armkin
+    from armkin import limits
+
+    arm = request.arm
+    q = armkin.unlock(arm, held, s.q) if held else s.q
+    within = s.within_limits & ~limits.outside(arm, np.nan_to_num(q)).any(axis=-1) if held else s.within_limits
+    change = units.joints_out(arm, np.abs(q - near))
+    motion = change.sum(axis=-1)
+    mm, rad = s.residual()
+    kept = [name for name in arm.joint_names if name not in held]
+    for i in range(len(s.status)):
+        branches = [
+            Branch(
+                q[i, b],
+                s.names[s.branch[i, b]],
+                bool(within[i, b]),
+                float(mm[i, b]),
+                float(rad[i, b]),
+                float(motion[i, b]),
+            )
+            for b in np.flatnonzero(s.valid[i])
+        ]
+        free = [name for name, is_free in zip(kept, s.free[i], strict=True) if is_free]
+        status = armkin.Status(int(s.status[i])).name.lower()
+        yield Answer(status, s.method, s.why, s.complete, free, branches, None)
+
+
+def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answer:
+    """One answer of those for all locked values: the best status, all branches, sorted."""
+    _, first, _ = min(found, key=lambda item: item[0])
+    both = [(branch, branch.name in wanted) for _, answer, wanted in found for branch in answer.branches]
+    both.sort(key=lambda item: (not item[0].within_limits, item[0].motion))
+    best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
+    return Answer(
+        first.status,
+        first.method,
+        first.why,
+        first.complete and not request.swept,
+        sorted({name for _, answer, _ in found for name in answer.free}),
+        [branch for branch, _ in both],
+        best,
+    )
