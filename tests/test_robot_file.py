@@ -82,6 +82,18 @@ def test_shipped_robot(path: Path) -> None:
             assert rate <= 20_000, motor.name
 
 
+def test_an_error_carries_every_problem() -> None:
+    text = DH.replace("home: 0", "home: tall").replace("gear: 2.5", "gear: 0").replace("a: 258, d: 0", "a: x")
+    with pytest.raises(RobotFileError) as caught:
+        robot_file.parse(text, "arm.yaml")
+    problems = caught.value.problems
+    assert [problem.split(": ")[0] for problem in problems] == [f"arm.yaml:{n}" for n in (10, 13, 23, 23)]
+    assert str(caught.value) == f"{problems[0]}\n3 more problems, on lines 13, 23"
+    with pytest.raises(RobotFileError) as caught:
+        robot_file.parse("name: 017", "arm.yaml")
+    assert caught.value.problems == (str(caught.value),)
+
+
 def test_shipped_robots_are_those_of_the_documents() -> None:
     names = {path.stem for path in (ROOT / "robots").glob("*.yaml")}
     papers = {"three_dof", "ra02", "ra02_screws", "planar_2dof", "planar_3dof", "labvolt_5150"}

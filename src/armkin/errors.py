@@ -22,7 +22,12 @@ class FileError(ArmkinError):
 
 
 class RobotFileError(ArmkinError):
-    """A robot file is not valid; the message begins with ``file:line:`` where a line is known."""
+    """A robot file is not valid; the message begins with ``file:line:`` where a line is known.
+
+    The message tells the first problem and where the others are; `problems` holds one line for each.
+    """
+
+    problems: tuple[str, ...] = ()
 
 
 class UsageError(ArmkinError, ValueError):

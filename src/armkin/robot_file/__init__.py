@@ -71,7 +71,7 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     try:
         document = strict_yaml.loads(raw)
     except strict_yaml.StrictYamlError as error:
-        raise RobotFileError(_located(name, error.line, error.problem)) from None
+        raise _invalid(name, [(error.line, error.problem)]) from None
     try:
         robot = _validated(document.data)
     except ValidationError as error:
@@ -82,7 +82,7 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
             for path, text in messages.told(error.errors(include_url=False))
         ]
         problems.sort(key=lambda problem: problem[0])
-        raise RobotFileError(_message(name, problems)) from None
+        raise _invalid(name, problems) from None
     robot._path = name
     robot._sha256 = hashlib.sha256(raw).hexdigest()
     return robot
@@ -115,16 +115,17 @@ def _located(name: str, line: int, text: str) -> str:
     return f"{name}:{line}: {text}" if line else f"{name}: {text}"
 
 
-def _message(name: str, problems: list[tuple[int, str]]) -> str:
-    """The first problem in full; of the others, where they are."""
-    first = _located(name, *problems[0])
-    if len(problems) == 1:
-        return first
-    if len(problems) == 2:
-        return f"{first}\n{_located(name, *problems[1])}"
-    lines = sorted({line for line, _ in problems[1:]})
-    places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
-    return f"{first}\n{len(problems) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
+def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
+    """The first problem in full, or two; of more, where they are."""
+    told = tuple(_located(name, line, text) for line, text in problems)
+    message = "\n".join(told[:2])
+    if len(told) > 2:
+        lines = sorted({line for line, _ in problems[1:]})
+        places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
+        message = f"{told[0]}\n{len(told) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
+    error = RobotFileError(message)
+    error.problems = told
+    return error
 
 
 def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:
