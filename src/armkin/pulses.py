@@ -29,8 +29,8 @@ Pulses = NDArray[np.int64]
 
 _LARGEST = 2.0**53  # beyond it a double no longer counts whole pulses
 _HALF = 1e-9  # pulses: closer than this to a half is a half, as degrees have no exact radians
-_CANDIDATES = 4096  # pulse vectors that `best` tries for one pose
-_AT_ONCE = 1 << 16  # tips that `best` computes in one go
+_CANDIDATES = 4096  # pulse vectors that `best_pulses` tries for one pose
+_AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
     return Rounding(exact, counts, actual, position(arm, exact), position(arm, actual))
 
 
-def best(arm: Arm, q: ArrayLike) -> Best:
+def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     """Among the pulse vectors around the exact one, that whose tip is nearest to the exact tip.
 
     q: (..., n) [rad | mm]. The search is complete over its neighbourhood: every motor takes the two
