@@ -1,4 +1,4 @@
-// What happens before main: why the chip was reset, the watchdog off, the stack painted.
+// What happens before main: why the chip was reset, and the watchdog off.
 #include <avr/io.h>
 #include <avr/pgmspace.h>
 #include <avr/wdt.h>
@@ -12,21 +12,6 @@ uint8_t seen_r2 __attribute__((used, externally_visible, section(".noinit")));  
 
 __attribute__((naked, used, section(".init0"))) static void save_r2(void) {
     __asm__ __volatile__("sts seen_r2, r2");
-}
-
-// 0xC5 from the end of the variables to the end of memory: what is still there was never touched by the stack.
-__attribute__((naked, used, section(".init1"))) static void paint_stack(void) {
-    __asm__ __volatile__(
-        "    ldi r30, lo8(_end)\n"
-        "    ldi r31, hi8(_end)\n"
-        "    ldi r24, 0xC5\n"
-        "    ldi r25, hi8(%0 + 1)\n"
-        "1:  st Z+, r24\n"
-        "    cpi r30, lo8(%0 + 1)\n"
-        "    cpc r31, r25\n"
-        "    brlo 1b\n"
-        :
-        : "i"(RAMEND));
 }
 
 __attribute__((naked, used, section(".init3"))) static void stop_watchdog(void) {

@@ -1,18 +1,19 @@
 // Servo pulses: timer 2 counts half microseconds, its compare interrupt makes the edges, one servo after the other.
 //
-// A pulse is longer than the timer's turn of 128 µs, so it is walked in steps, each far enough ahead (64 µs) for the
-// interrupt to set the next one in time. Edges come late by what the tick interrupt takes (up to some 20 µs at full stepping rate): with
-// the steppers at rest they are exact.
+// A pulse is longer than the timer's turn of 128 µs, so it is walked in steps, each far enough ahead (40 µs) for the
+// interrupt to set the next one in time. Other interrupts make edges late, the tick's by up to 20 µs. Where there are no steppers that
+// could suffer from it, the interrupt comes that much early and waits for the moment; beside steppers it does not.
 #include <avr/interrupt.h>
 
 #include "../core/motion.h"
 #include "avr.h"
 
-enum { NONE = 0xFF };
+enum { NONE = 0xFF, EARLY = STEPPERS ? 0 : 40 };  // half µs
 
 static uint16_t width[SERVOS];        // half µs of this frame's pulses, 0: none
 static uint8_t current = NONE;        // whose pulse is running
-static uint16_t ahead;                // half µs until its end, beyond the compare that is set
+static uint8_t moment;                // timer count that the compare is set for
+static uint16_t ahead;                // half µs from there to the pulse's end
 static volatile bool busy;
 
 static inline void edge(uint8_t servo, bool high) {
@@ -43,18 +44,24 @@ static inline void next_pulse(void) {
 
 ISR(TIMER2_COMPA_vect) {
     if (ahead == 0) {
+        while (EARLY && (int8_t)(TCNT2 - moment) < 0) {
+        }
         edge(current, false);
         next_pulse();
         if (ahead == 0) {
             return;
         }
     }
+    if (STEPPERS) {
+        sei();  // the edges are made; the rest can wait for a tick. The next compare is far
+    }
     if (ahead >= 512) {
         ahead -= 256;  // the same compare, a turn later
     } else {
         const uint8_t step = ahead >= 256 ? 128 : ahead;
-        OCR2A += step;
         ahead -= step;
+        moment += step;
+        OCR2A = moment - EARLY;
     }
 }
 
@@ -71,7 +78,8 @@ void servo_frame(void) {
     busy = true;
     ahead = 0;
     TIFR2 = 1 << OCF2A;
-    OCR2A = TCNT2 + 16;
+    moment = TCNT2 + 16 + EARLY;
+    OCR2A = moment - EARLY;
     TIMSK2 = 1 << OCIE2A;
 }
 

@@ -34,20 +34,21 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
         OCR1A = interval - 1;
         if (TCNT1 >= interval - 8) {  // too late for this tick: it would come a whole turn of the timer later
             TCNT1 = 0;
-            dda.overruns |= 0x80;
+            dda.overruns |= 1;
         }
         dda_bits();
     } else {
         TIMSK1 = 0;
-        TCCR1B = 0;
     }
 
-    while ((uint8_t)(TCNT1L - rise) < step_high && interval) {
+    while ((uint8_t)(TCNT1L - rise) < step_high) {
     }
 #define STEP_LOW(i, port, bit, ...) PIN_LOW(port, bit);
     STEPPER_PINS(STEP_LOW)
-    if (TIFR1 & 1 << OCF1A && interval && dda.overruns < 255) {
-        dda.overruns++;
+    if (!interval) {
+        TCCR1B = 0;
+    } else if (TIFR1 & 1 << OCF1A && dda.overruns < 255) {
+        dda.overruns++;  // the next tick is due already
     }
 }
 

@@ -8,12 +8,17 @@
 enum { END = 1, WIDE = 2 };  // flags
 enum { HEAD = 6 };           // type, tag, mask, flags, n
 
-// The axes of the batch, in order, and where each of them is while its segments are read.
-static struct {
-    uint8_t count;
-    uint8_t axis[AXES];
-    int32_t at[AXES];  // all axes
-} path;
+// The axes of the batch, in order: where each of them is while the segments are read, and what is asked of it at each.
+// Gathered once, as the loop over segments and lanes is what limits the board's segments per second.
+struct lane {
+    uint8_t axis;
+    uint16_t bit;  // 1 << axis
+    uint16_t step_time;
+    int32_t lower, upper;
+    int32_t at;
+};
+static struct lane lanes[AXES];
+static uint8_t lane_count;
 
 static enum error check_axis(uint8_t i, int32_t start) {
     if (!(limits.used >> i & 1)) {
@@ -28,28 +33,34 @@ static enum error check_axis(uint8_t i, int32_t start) {
     return start == motion.plan[i] ? OK : E_START;
 }
 
-static enum error check_axes(const uint8_t *starts, uint16_t mask, uint8_t *detail) {
-    path.count = 0;
-    memcpy(path.at, motion.plan, sizeof path.at);
-    for (uint8_t i = 0; i < 16; i++) {
-        if (!(mask >> i & 1)) {
+static enum error open_lanes(const uint8_t *starts, uint16_t mask, uint8_t *detail) {
+    struct lane *lane = lanes;
+    for (uint8_t i = 0; mask; i++, mask >>= 1) {
+        if (!(mask & 1)) {
             continue;
         }
         *detail = i;
-        const enum error error =
-            i >= AXES ? E_VALUE : check_axis(i, (int32_t)get32(starts + 4 * path.count));
+        const enum error error = i >= AXES ? E_VALUE : check_axis(i, (int32_t)get32(starts));
         if (error) {
             return error;
         }
-        path.axis[path.count++] = i;
+        *lane++ = (struct lane){
+            .axis = i,
+            .bit = 1U << i,
+            .step_time = limits.step_time[i],
+            .lower = memory.image.axis[i].lower,
+            .upper = memory.image.axis[i].upper,
+            .at = motion.plan[i],
+        };
+        starts += 4;
     }
+    lane_count = lane - lanes;
     *detail = 0;
     return OK;
 }
 
 // One segment from the frame into its slot. `time`: quarter cycles that it lasts at its fastest.
-static enum error read_segment(const uint8_t *p, uint8_t flags, struct segment *s, uint32_t *time) {
-    const bool wide = flags & WIDE;
+static enum error read_segment(const uint8_t *p, bool wide, struct segment *s, uint32_t *time) {
     memset(s, 0, sizeof *s);
     s->ticks = wide ? get16(p) : *p;
     p += wide ? 2 : 1;
@@ -66,32 +77,52 @@ static enum error read_segment(const uint8_t *p, uint8_t flags, struct segment *
     return OK;
 }
 
-static enum error check_steps(const uint8_t *p, uint8_t flags, struct segment *s, uint32_t time, uint8_t *detail) {
-    for (uint8_t n = 0; n < path.count; n++) {
-        const uint8_t i = *detail = path.axis[n];
-        const int16_t steps = flags & WIDE ? (int16_t)get16(p + 2 * n) : (int8_t)p[n];
+static enum error check_steps(const uint8_t *p, bool wide, struct segment *s, uint32_t time, uint8_t *detail) {
+    for (struct lane *lane = lanes; lane < lanes + lane_count; lane++) {
+        int16_t steps;
+        if (wide) {
+            steps = (int16_t)get16(p);
+            p += 2;
+        } else {
+            steps = (int8_t)*p++;
+        }
+        if (!steps) {
+            continue;
+        }
         const uint16_t size = steps < 0 ? 0U - (uint16_t)steps : (uint16_t)steps;
+        const int32_t before = lane->at;
+        const int32_t after = before + steps;
+        enum error error = OK;
         if (size > s->ticks) {
-            return E_STEPS;
+            error = E_STEPS;
+        } else if ((uint32_t)(size - 1) * lane->step_time > time) {
+            error = E_RATE;
+        } else if (!within(lane->lower, lane->upper, before, after)) {
+            error = E_LIMIT;
         }
-        if (size && (uint32_t)(size - 1) * limits.step_time[i] > time) {
-            return E_RATE;
+        if (error) {
+            *detail = lane->axis;
+            return error;
         }
-        const int32_t before = path.at[i];
-        path.at[i] = (int32_t)((uint32_t)before + (uint32_t)(int32_t)steps);
-        if (!within(memory.image.axis[i].lower, memory.image.axis[i].upper, before, path.at[i])) {
-            return E_LIMIT;
-        }
-        s->steps[i] = size;
-        s->back |= steps < 0 ? 1U << i : 0;
+        lane->at = after;
+        s->steps[lane->axis] = size;
+        s->back |= steps < 0 ? lane->bit : 0;
     }
-    *detail = 0;
     return OK;
 }
 
+static void put_lanes(int32_t counts[AXES]) {
+    for (uint8_t n = 0; n < lane_count; n++) {
+        counts[lanes[n].axis] = lanes[n].at;
+    }
+}
+
 static enum error check_rows(int32_t before[ROWS], uint8_t *detail) {
+    int32_t counts[AXES];
+    memcpy(counts, motion.plan, sizeof counts);
+    put_lanes(counts);
     for (uint8_t r = 0; r < memory.image.rows; r++) {
-        const int32_t after = row_value(r, path.at);
+        const int32_t after = row_value(r, counts);
         if (row_known(r) && !within(memory.image.row[r].lower, memory.image.row[r].upper, before[r], after)) {
             *detail = r;
             return E_LIMIT_JOINT;
@@ -102,22 +133,23 @@ static enum error check_rows(int32_t before[ROWS], uint8_t *detail) {
 }
 
 static enum error check_segments(const uint8_t *p, uint8_t count, uint8_t flags, uint8_t *detail) {
-    const uint8_t head = flags & WIDE ? 6 : 5;
-    const uint8_t size = head + path.count * (flags & WIDE ? 2 : 1);
+    const bool wide = flags & WIDE;
+    const uint8_t head = wide ? 6 : 5;
+    const uint8_t size = head + lane_count * (wide ? 2 : 1);
     int32_t rows[ROWS];
     for (uint8_t r = 0; r < memory.image.rows; r++) {
-        rows[r] = row_value(r, path.at);
+        rows[r] = row_value(r, motion.plan);
     }
     for (uint8_t n = 0; n < count; n++, p += size) {
         struct segment *s = motion_slot(n);
         uint32_t time;
-        enum error error = read_segment(p, flags, s, &time);
+        enum error error = read_segment(p, wide, s, &time);
         if (error) {
             *detail = n;
             return error;
         }
-        error = check_steps(p + head, flags, s, time, detail);
-        if (!error) {
+        error = check_steps(p + head, wide, s, time, detail);
+        if (!error && memory.image.rows) {
             error = check_rows(rows, detail);
         }
         if (error) {
@@ -151,7 +183,7 @@ enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t *detai
         return E_BUSY;
     }
     const uint8_t *starts = payload + HEAD;
-    enum error error = check_axes(starts, mask, detail);
+    enum error error = open_lanes(starts, mask, detail);
     if (error) {
         return error;
     }
@@ -162,12 +194,13 @@ enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t *detai
     if (error) {
         return error;
     }
-    for (uint8_t n = 0; n < path.count; n++) {
-        if (path.at[path.axis[n]] != (int32_t)get32(starts + 4 * (axes + n))) {
-            *detail = path.axis[n];
+    for (uint8_t n = 0; n < lane_count; n++) {
+        if (lanes[n].at != (int32_t)get32(starts + 4 * (axes + n))) {
+            *detail = lanes[n].axis;
             return E_END;
         }
     }
+    put_lanes(motion.plan);
     if (session.state == IDLE) {
         motion_begin(MOVING);
     }

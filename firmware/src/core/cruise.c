@@ -98,6 +98,7 @@ static void slice(void) {
         cruise.carry[i] = steps - whole;
         s->back |= whole < 0 ? 1U << i : 0;
         s->steps[i] = size(whole);
+        motion.plan[i] += whole;
         most = s->steps[i] > most ? s->steps[i] : most;
     }
     s->ticks = most;

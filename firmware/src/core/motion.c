@@ -16,8 +16,6 @@ static uint8_t latched_slot;
 static float speed;       // u: ms that the arm needs to stop, as last looked at
 static float hold_speed;  // u that the hold allows
 static uint8_t pace;
-static uint16_t last_axes;  // that moved in the segment settled last
-static bool last_end;
 
 static const float STANDING = 1.0F;       // ms: u at which a hold stands still
 static const float TOO_FAST = 30.0F;      // ms: u from which an abrupt stop loses steps
@@ -43,10 +41,11 @@ static uint16_t done(const struct segment *s, uint8_t axis, uint16_t ticks) {
 }
 
 static void add_steps(int32_t counts[AXES], const struct segment *s, uint16_t ticks) {
-    for (uint8_t i = 0; i < AXES; i++) {
+    uint16_t back = s->back;
+    for (uint8_t i = 0; i < AXES; i++, back >>= 1) {
         if (s->steps[i]) {
             const uint16_t n = ticks == s->ticks ? s->steps[i] : done(s, i, ticks);
-            counts[i] += s->back >> i & 1 ? -(int32_t)n : (int32_t)n;
+            counts[i] += back & 1 ? -(int32_t)n : (int32_t)n;
         }
     }
 }
@@ -85,11 +84,6 @@ static void settle(void) {
         const struct segment *s = queue_slot(settled);
         add_steps(memory.counts, s, s->ticks);
         queued_units -= units(s);
-        last_end = s->last;
-        last_axes = 0;
-        for (uint8_t i = 0; i < AXES; i++) {
-            last_axes |= s->steps[i] ? 1U << i : 0;
-        }
         settled++;
     }
 }
@@ -138,7 +132,6 @@ void motion_append(uint8_t segments, bool end) {
     for (uint8_t n = 0; n < segments; n++) {
         struct segment *s = motion_slot(n);
         s->last = end && n + 1 == segments;
-        add_steps(motion.plan, s, s->ticks);
         queued_units += units(s);
     }
     motion.ended = end;
@@ -254,9 +247,12 @@ void motion_millisecond(void) {
 
 // All of the queue is done.
 static void arrive(void) {
-    if (!last_end) {
+    const struct segment *s = queue_slot(settled - 1);  // nothing has been written over it yet
+    if (!s->last) {
         if (speed > TOO_FAST) {
-            motion_lose(last_axes);
+            for (uint8_t i = 0; i < AXES; i++) {
+                motion_lose(s->steps[i] ? 1U << i : 0);
+            }
         }
         if (session.state == MOVING) {
             session.state = HOLDING;  // no path is left to decelerate on

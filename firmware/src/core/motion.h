@@ -23,7 +23,7 @@ void motion_counts(int32_t counts[AXES]);  // steps made until now
 uint8_t motion_free(void);
 uint16_t motion_queued(void);  // ms
 
-// Appending: write segments into motion_slot(0), (1), … up to motion_free(), then publish them all at once.
+// Appending: write segments into motion_slot(0), (1), … up to motion_free(), move motion.plan on, then publish them all at once.
 struct segment *motion_slot(uint8_t ahead);
 void motion_append(uint8_t segments, bool end);
 

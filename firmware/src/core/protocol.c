@@ -23,6 +23,7 @@ static uint32_t nonce;
 static bool greeted;  // `nonce` is of a HELLO
 static uint8_t cause;
 static uint8_t abort_steady;
+static uint8_t told_free;  // credit that the host knows of
 static const int32_t FARTHEST = 1L << 30;
 
 void session_end(enum error error, uint8_t detail) {
@@ -48,11 +49,14 @@ static uint8_t *put_head(uint8_t *p) {
     return p;
 }
 
+static uint8_t *put_credit(uint8_t *p) {
+    *p++ = told_free = motion_free();
+    return put16(p, motion_queued());
+}
+
 static void send_ack(void) {
     uint8_t reply[8] = {ACK};
-    uint8_t *p = put_head(reply + 1);
-    *p++ = motion_free();
-    put16(p, motion_queued());
+    put_credit(put_head(reply + 1));
     link_send(reply, sizeof reply);
 }
 
@@ -91,8 +95,7 @@ static void send_status(uint8_t tag, uint8_t page) {
     }
     uint8_t *p = put_head(reply + 2);
     *p++ = flags();
-    *p++ = motion_free();
-    p = put16(p, motion_queued());
+    p = put_credit(p);
     p = put16(p, memory.known);
     *p++ = hal_switches();
     *p++ = dda.overruns;
@@ -411,6 +414,9 @@ void protocol_millisecond(void) {
 
 void protocol_poll(void) {
     motion_poll();
+    if (session.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4) {
+        send_ack();
+    }
     if (session.state == HOMING) {
         home_poll();
     } else if (session.state == JOGGING) {

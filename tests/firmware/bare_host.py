@@ -1,0 +1,204 @@
+"""A host for the emulated board in simulated time: it repeats to the cycle and knows no port and no planner.
+
+Not the one that armkin ships (that is link.py): this one can be wrong on purpose, and can saturate the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from emulator import EmulatedBoard
+
+from armkin import protocol
+from armkin.protocol import Ack, Info, Segment, State, Status
+
+CLOCK = 16_000_000
+AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6}
+STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0}
+WIDE = protocol.AxisImage(True, False, -(1 << 30), 1 << 30, 0, 40_000, 400_000)
+SERVO = protocol.AxisImage(True, False, 500, 2500, 1500, 2000, 8000)
+
+
+def image_for(board: str, stepper: protocol.AxisImage = WIDE, **times: int) -> protocol.Image:
+    """Every axis used, every stepper alike; A4988 timing."""
+    steppers = STEPPERS[board]
+    return protocol.Image((stepper,) * steppers + (SERVO,) * (AXES[board] - steppers), **times)
+
+
+@dataclass
+class Batch:
+    """What one MOTION frame carries, for `axes` from `start`; the end follows."""
+
+    axes: tuple[int, ...]
+    start: tuple[int, ...]
+    segments: tuple[Segment, ...]
+    at_rest: bool = False
+    end: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        sums = [sum(column) for column in zip(*(s.steps for s in self.segments), strict=True)]
+        self.end = tuple(a + b for a, b in zip(self.start, sums, strict=True))
+
+    def payload(self, tag: int) -> bytes:
+        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=self.at_rest)
+
+
+def batches(
+    axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], size: int, at_rest: bool = True
+) -> list[Batch]:
+    """One motion cut into batches of `size` segments, the last one with END."""
+    out: list[Batch] = []
+    at = tuple(start)
+    for i in range(0, len(segments), size):
+        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size])))
+        at = out[-1].end
+    if at_rest:
+        out[-1].at_rest = True
+    return out
+
+
+class BareHost:
+    """Talks to a board that is in ``speed="step"``; every call takes simulated time.
+
+    `sequence` is the next frame's number, `sent` counts bytes on the line, `resent` frames sent again.
+    """
+
+    def __init__(self, board: EmulatedBoard, baud: int = 250_000) -> None:
+        self.board = board
+        self.baud = baud
+        self.sequence = 0
+        self.time = 0.0  # [s] since this host began
+        self.resent = 0
+        self.acks: list[Ack] = []
+        self._splitter = protocol.Splitter()
+        self._line_free = 0.0
+        self.credit_poll = 0.002  # [s] between questions while waiting for credit
+
+    def run(self, seconds: float, data: bytes = b"", until: bytes = b"") -> list[protocol.Reply]:
+        """Put `data` on the line, let time pass, return what came."""
+        if data:
+            self._line_free = max(self._line_free, self.time) + 10 * len(data) / self.baud
+        out = self.board.run(seconds, data, until=until)
+        self.time += seconds  # an upper bound if `until` ended it early
+        return [r for p in self._splitter.feed(out) if (r := protocol.parse(p)) is not None]
+
+    def ask(self, payload: bytes, tries: int = 1) -> protocol.Reply:
+        """The answer to one frame; sent again if there is none within 50 ms."""
+        for _ in range(tries):
+            data = protocol.wire(payload)
+            replies = self.run(10 * len(data) / self.baud + 0.02, data)
+            if replies:
+                return replies[-1]
+        raise AssertionError(f"no answer to {payload.hex()}")
+
+    def status(self, page: int = 0) -> Status:
+        answer = self.ask(protocol.status_query(0, page), tries=100)
+        assert isinstance(answer, Status), answer
+        return answer
+
+    def hello(self, nonce: int) -> Info:
+        answer = self.ask(protocol.hello(0, nonce), tries=100)
+        assert isinstance(answer, Info), answer
+        self.sequence = 0
+        return answer
+
+    def order(self, payload_of: bytes) -> Ack:
+        """Send a frame in sequence (its tag is filled in) and demand that it is done."""
+        answer = self.ask(payload_of[:1] + bytes([self.sequence]) + payload_of[2:])
+        assert isinstance(answer, Ack)
+        assert (answer.error, answer.next) == (0, (self.sequence + 1) % 256), answer
+        self.sequence = answer.next
+        return answer
+
+    def setup(self, image: protocol.Image, counts: dict[int, int] | None, nonce: int = 1) -> None:
+        """Session, configuration, position (unless None), drivers and pulses on."""
+        info = self.hello(nonce)
+        data = image.pack()
+        room = info.frame - 8
+        for at in range(0, len(data), room):
+            self.order(protocol.config(0, at, data[at : at + room]))
+        self.order(protocol.commit(0, len(data), image.crc()))
+        if counts is not None:
+            self.order(protocol.set_position(0, counts))
+        self.order(protocol.enable(0, 3))
+        self.run(0.01)
+
+    def stream(self, work: Sequence[Batch], *, poll: float = 0.1, give_up: float = 60.0, slice_s: float = 0.5e-3) -> Status:
+        """Go back N with credit until all is acknowledged and the board is at rest (or the session has ended)."""
+        first = self.sequence
+        done = sent = 0  # batches
+        free = self.status().free
+        last_progress = last_poll = self.time
+        deadline = self.time + give_up
+        state = State.MOVING
+        error = 0
+        asked = False  # a STATUS is under way: a second one would only queue behind it
+        while self.time < deadline:
+            out = b""
+            waiting = sent < len(work) and sent == done  # for credit, which only answers bring
+            pause = poll if asked or not waiting else self.credit_poll
+            if self.time - last_poll >= pause:
+                asked = True
+                out += protocol.wire(protocol.status_query(1))
+                last_poll = self.time
+            if sent > done and self.time - last_progress > 0.03:
+                self.resent += sent - done
+                sent = done
+                last_progress = self.time
+            under_way = sum(len(b.segments) for b in work[done:sent])
+            while (
+                sent < len(work)
+                and sent - done < 100
+                and self._line_free + 10 * len(out) / self.baud < self.time + 2 * slice_s
+                and under_way + len(work[sent].segments) <= free
+            ):
+                out += protocol.wire(work[sent].payload((first + sent) % 256))
+                under_way += len(work[sent].segments)
+                if sent == done:
+                    last_progress = self.time
+                sent += 1
+            for reply in self.run(slice_s, out):
+                if isinstance(reply, Info):
+                    continue
+                if isinstance(reply, Ack):
+                    self.acks.append(reply)
+                else:
+                    asked = False
+                advance = (reply.next - (first + done)) % 256
+                if 0 < advance <= 100:
+                    done += advance
+                    sent = max(sent, done)
+                    last_progress = self.time
+                if advance <= 100:
+                    free = reply.free
+                state, error = State(reply.state), reply.error
+            if error or (done == len(work) and state == State.IDLE):
+                break
+        self.sequence = (first + done) % 256
+        return self.rest()
+
+    def rest(self, give_up: float = 30.0) -> Status:
+        """Ask until the board is at rest."""
+        deadline = self.time + give_up
+        while (status := self.status()).state != State.IDLE:
+            assert self.time < deadline, status
+        return status
+
+
+def cruise(axes: int, rate: float, seconds: float, signs: Sequence[int], ramp: float = 0.1, ticks: int = 100) -> list[Segment]:
+    """Up to `rate` ticks/s, all axes one step a tick, and down again: `ramp` s each way."""
+    segments: list[Segment] = []
+    floor = CLOCK // 65535 + 1
+    time = 0.0
+    while time < seconds:
+        slope = min(1.0, time / ramp + 0.02, (seconds - time) / ramp + 0.02)
+        interval = round(CLOCK / max(rate * slope, floor * 4))
+        n = max(10, min(ticks, round(0.01 * CLOCK / interval)))
+        segments.append(Segment(n, interval, 0, tuple(s * n for s in signs[:axes])))
+        time += n * interval / CLOCK
+    return segments
+
+
+def scaled(segment: Segment, **change: int) -> Segment:
+    return replace(segment, **change)
