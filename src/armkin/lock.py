@@ -66,7 +66,7 @@ def joint_index(arm: Arm, name: str) -> int:
         return arm.joint_names.index(name)
     close = get_close_matches(name, arm.joint_names, 1, 0.5)
     hint = f"; did you mean {close[0]}?" if close else ""
-    raise UsageError(f"{arm.name} has no joint '{name}'{hint} Its joints are {', '.join(arm.joint_names)}")
+    raise UsageError(f"{arm.name} has no joint '{name}'{hint}; its joints are {', '.join(arm.joint_names)}")
 
 
 def _motion(prismatic: bool, value: float) -> Array:

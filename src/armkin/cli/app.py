@@ -30,7 +30,7 @@ _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 class Command(TyperCommand):
-    """A command whose negative numbers are arguments, not options, and whose help says no more than needed."""
+    """A command whose negative numbers are arguments, and whose help says no more than needed."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the options, then all that is none."""
@@ -73,7 +73,7 @@ class Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
         name, command, rest = super().resolve_command(ctx, args)
-        return name, command and load(command.name), rest
+        return name, None if command is None else load(str(command.name)), rest
 
 
 def load(name: str) -> Any:

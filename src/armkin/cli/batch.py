@@ -81,7 +81,7 @@ def run_batch(
     heading: Sequence[str],
     records: Callable[[int, dict[str, Any]], Iterable[Sequence[Any]]],
 ) -> Tally:
-    """Answer all chunks: each row's answer as a line of JSON, or `heading` and the answer's `records` as CSV."""
+    """Answer all chunks: each row's answer as a line of JSON, or its `records` as CSV under a `heading`."""
     tally = Tally()
     with output.destination(out) as write, output.progress("rows") as tick:
         if not as_json:
@@ -144,9 +144,7 @@ def _name(source: str) -> str:
     return "standard input" if source == "-" else source
 
 
-def _chunk(
-    lines: list[bytes], first: int, names: Sequence[str], what: str, source: str
-) -> Iterator[Chunk]:
+def _chunk(lines: list[bytes], first: int, names: Sequence[str], what: str, source: str) -> Iterator[Chunk]:
     import numpy as np
 
     values = _all_plain(lines, len(names))

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 def fk(
     robot: Robot,
     q: Joints = None,
-    frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
+    frames: Annotated[
+        bool, typer.Option("--frames", help="Also the base's and every joint's frame.")
+    ] = False,
     json: Json = False,
     batch: Batch = None,
     out: Out = None,
@@ -81,8 +83,10 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
     rows = [
         ["position", *_labelled("xyz", xyz), "mm"],
         ["orientation", *_labelled(("roll", "pitch", "yaw"), rpy), "deg"],
-        *(["rotation" if i == 0 else "", *(x for value in row for x in ("", fixed(value, 6))), ""] for i, row in enumerate(R)),
     ]
+    for i, row in enumerate(R):
+        numbers = [word for value in row for word in ("", fixed(value, 6))]
+        rows.append(["" if i else "rotation", *numbers, ""])
     text = f"{render.pose_line(arm, answer['joints'])}\n\n{render.table(rows, left=(0, 1, 3, 5, 7))}\n"
     if "frames" in answer:
         table = [["frame", "x/mm", "y/mm", "z/mm"]]

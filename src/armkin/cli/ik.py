@@ -9,7 +9,19 @@ import typer
 
 from armkin.cli import inputs, output, render, solving, units
 from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
-from armkin.cli.options import AllBranches, Batch, BranchName, Json, Lock, Near, Out, Robot, Sweep, Target, TaskName
+from armkin.cli.options import (
+    AllBranches,
+    Batch,
+    BranchName,
+    Json,
+    Lock,
+    Near,
+    Out,
+    Robot,
+    Sweep,
+    Target,
+    TaskName,
+)
 from armkin.cli.render import fixed
 
 if TYPE_CHECKING:
@@ -24,7 +36,10 @@ def ik(
     near: Near = None,
     branch: BranchName = None,
     turns: Annotated[
-        bool, typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits.")
+        bool,
+        typer.Option(
+            "--turns", help="Also the other copies of each branch, whole turns away, within limits."
+        ),
     ] = False,
     task: TaskName = None,
     lock: Lock = None,
@@ -58,13 +73,24 @@ def ik(
             out,
             json,
             lambda chunk: _answers(request, what, chunk, all_branches, turns, with_closest=json),
-            ["row", "status", "branch", *arm.joint_names, "within_limits", "residual_mm", "residual_deg", "motion"],
+            [
+                "row",
+                "status",
+                "branch",
+                *arm.joint_names,
+                "within_limits",
+                "residual_mm",
+                "residual_deg",
+                "motion",
+            ],
             lambda row, answer: _records(arm, row, answer),
         )
         if tally.unsolved:
             raise render.unsolved_rows(tally)
         return
-    [answer] = _answers(request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True)
+    [answer] = _answers(
+        request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True
+    )
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None:
@@ -76,7 +102,9 @@ def _answers(
 ) -> Iterator[dict[str, Any]]:
     arm = request.arm
     targets = units.targets_in(task.labels, chunk.values)
-    for values, goal, found in zip(chunk.values.tolist(), targets, solving.solve(request, targets), strict=True):
+    for values, goal, found in zip(
+        chunk.values.tolist(), targets, solving.solve(request, targets), strict=True
+    ):
         listed, best = found.branches, found.best
         if not all_branches:
             listed, best = ([], None) if best is None else ([listed[best]], 0)
@@ -110,7 +138,9 @@ def _answers(
         yield answer
 
 
-def _branches(request: solving.Request, branches: Sequence[solving.Branch], turns: bool) -> list[dict[str, Any]]:
+def _branches(
+    request: solving.Request, branches: Sequence[solving.Branch], turns: bool
+) -> list[dict[str, Any]]:
     import numpy as np
 
     import armkin
@@ -153,7 +183,9 @@ def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
 
 def _text(arm: Arm, answer: dict[str, Any]) -> str:
     headings = render.joint_headings(arm)
-    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
+    goal = render.labelled(
+        answer["target_labels"], answer["target"], units.label_units(answer["target_labels"])
+    )
     rows = [["", "branch", *headings, "motion", ""]]
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])
@@ -162,7 +194,8 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
         rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
         for copy in branch.get("turns", ())[1:]:
             rows.append(["", "  or", *map(fixed, copy), "", ""])
-    if nearest := answer["closest"]:
+    nearest = answer["closest"]
+    if nearest and not answer["branches_within_limits"]:
         miss = f"{fixed(nearest['distance_mm'])} mm away"
         if nearest["angle_deg"] > 1e-6:
             miss += f", turned by {fixed(nearest['angle_deg'])} deg"
@@ -179,5 +212,5 @@ def _summary(answer: dict[str, Any]) -> str:
         text += f"; free: {', '.join(answer['free_joints'])}"
     if count > len(answer["branches"]):
         text += " (--all-branches lists all)"
-    sure = "every real branch is listed" if answer["complete"] else "there may be more"
-    return f"{text}\n{answer['method']}: {sure}"
+    sure = "no real branch is missing" if answer["complete"] else "there may be more"
+    return f"{text}\nsolved as {answer['method']} ({answer['why']}): {sure}"

@@ -15,7 +15,9 @@ Json = Annotated[
 Batch = Annotated[
     str | None,
     typer.Option(
-        "--batch", metavar="FILE|-", help="Many at once: a CSV file (or standard input), one row each. Gives CSV."
+        "--batch",
+        metavar="FILE|-",
+        help="Many at once: a CSV file, or standard input; one row each. Gives CSV.",
     ),
 ]
 Out = Annotated[
@@ -24,7 +26,9 @@ Out = Annotated[
 ]
 Target = Annotated[
     list[str] | None,
-    typer.Argument(metavar="TARGET...", help="By the arm's task, see `armkin info`: x y z, x y z phi, ... in mm, deg."),
+    typer.Argument(
+        metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."
+    ),
 ]
 AllBranches = Annotated[
     bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")
@@ -46,5 +50,7 @@ Lock = Annotated[
 ]
 Sweep = Annotated[
     list[str] | None,
-    typer.Option("--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."),
+    typer.Option(
+        "--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."
+    ),
 ]

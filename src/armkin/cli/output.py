@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TextIO
 
 from armkin.errors import FileError
@@ -42,10 +42,8 @@ def _say(word: str, colour: str, message: str) -> None:
     # A file's name may hold what is no text, or a line feed: one or two lines whatever it is.
     lines = [line for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
-    try:
+    with suppress(OSError, UnicodeError):  # nobody listens: the exit code still tells
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
-    except (OSError, UnicodeError):
-        pass  # nobody listens; the exit code still tells
 
 
 def _coloured(stream: TextIO) -> bool:
@@ -54,7 +52,7 @@ def _coloured(stream: TextIO) -> bool:
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A counter on stderr while a long command runs, if stderr is a terminal; call it with the count so far."""
+    """A counter on stderr, if that is a terminal, while a long command runs; call it with the count so far."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda done: None
         return

@@ -133,6 +133,6 @@ def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:
 def warn_of_rows(tally: Tally) -> None:
     """Say how many rows of a batch are outside the limits."""
     if tally.outside:
-        rows = f"row {tally.first_outside} is" if tally.outside == 1 else f"{tally.outside} of {tally.rows} rows are"
-        first = "" if tally.outside == 1 else f"; the first is row {tally.first_outside}"
-        output.warn(f"{rows} outside the limits{first}")
+        output.warn(
+            f"{tally.outside} of {tally.rows} rows are outside the limits; the first is row {tally.first_outside}"
+        )

@@ -1,4 +1,4 @@
-"""Inverse kinematics for the command line: one answer a target, its branches sorted, locked joints put back."""
+"""Inverse kinematics for the command line: one answer a target, branches sorted, locked joints put back."""
 
 from __future__ import annotations
 
@@ -153,7 +153,9 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
 
     arm = request.arm
     q = armkin.unlock(arm, held, s.q) if held else s.q
-    within = s.within_limits & ~limits.outside(arm, np.nan_to_num(q)).any(axis=-1) if held else s.within_limits
+    within = (
+        s.within_limits & ~limits.outside(arm, np.nan_to_num(q)).any(axis=-1) if held else s.within_limits
+    )
     change = units.joints_out(arm, np.abs(q - near))
     motion = change.sum(axis=-1)
     mm, rad = s.residual()

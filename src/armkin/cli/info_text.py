@@ -1,0 +1,193 @@
+"""`armkin info` for people: the tables as papers print them, from the same object as the JSON."""
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+
+from armkin.cli.render import short, table
+
+_WIDTH = 90
+
+
+def text(answer: dict[str, Any]) -> str:
+    """The whole summary."""
+    joints = answer["joints"]
+    kinds = "".join("P" if joint["type"] == "prismatic" else "R" for joint in joints)
+    form = {
+        "standard": "standard DH: Rz(theta) Tz(d) Tx(a) Rx(alpha)",
+        "modified": "modified DH (Craig): Rx(alpha) Tx(a) Rz(theta) Tz(d), alpha and a of the link before",
+        "screws": "screw axes at the zero pose",
+    }[answer["convention"]]
+    head = [f"{answer['robot']}: {len(joints)} joint{'s' * (len(joints) != 1)} ({kinds}), {form}"]
+    head += [fill(" ".join(answer[key].split()), _WIDTH) for key in ("description",) if answer[key]]
+    if answer["source"]:
+        head.append(fill("Source: " + " ".join(answer["source"].split()), _WIDTH))
+    parts = [
+        "\n".join(head),
+        _screws(joints) if answer["convention"] == "screws" else _dh(joints),
+        _frames(answer),
+        _ranges(answer),
+        _steppers(answer),
+        _servos(answer),
+        _matrix(answer),
+        _hardware(answer),
+        _solver(answer),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _dh(joints: Sequence[dict[str, Any]]) -> str:
+    rows = [["joint", "alpha/deg", "a/mm", "d/mm", "theta/deg"]]
+    for joint in joints:
+        dh = joint["dh"]
+        d, theta = short(dh["d"]), short(dh["theta"])
+        if joint["type"] == "prismatic":
+            d = _offset(joint, dh["d"])
+        else:
+            theta = _offset(joint, dh["theta"])
+        rows.append([joint["name"], short(dh["alpha"]), short(dh["a"]), d, theta])
+    return table(rows)
+
+
+def _offset(joint: dict[str, Any], constant: float) -> str:
+    """The joint's variable with its sign and the constant beside it: ``-q2 + 90``."""
+    variable = joint["name"] if joint["sign"] > 0 else f"-{joint['name']}"
+    if not constant:
+        return variable
+    return f"{variable} {'+' if constant > 0 else '-'} {short(abs(constant))}"
+
+
+def _screws(joints: Sequence[dict[str, Any]]) -> str:
+    rows = [["joint", "w", "v or point q/mm"]]
+    for joint in joints:
+        screw = joint["screw"]
+        at = f"q = {_triple(screw['q'])}" if screw["v"] is None else f"v = {_triple(screw['v'])}"
+        sign = "" if joint["sign"] > 0 else "  (counts against its axis)"
+        rows.append([joint["name"], _triple(screw["w"]), at + sign])
+    return table(rows, left=(0, 1, 2))
+
+
+def _triple(values: Sequence[float]) -> str:
+    return f"({', '.join(map(short, values))})"
+
+
+def _frames(answer: dict[str, Any]) -> str:
+    """Base, tool and zero pose, where they are not the identity."""
+    lines = []
+    for key in ("base", "tool", "zero_pose"):
+        pose = answer[key]
+        if pose is not None and (any(pose["xyz"]) or any(pose["rpy"]) or key == "zero_pose"):
+            name = key.replace("_", " ")
+            lines.append(f"  {name:9}  xyz {_triple(pose['xyz'])} mm, rpy {_triple(pose['rpy'])} deg")
+    return "\n".join(lines)
+
+
+def _ranges(answer: dict[str, Any]) -> str:
+    rows = [["joint", "limits", "home", "max speed", "max accel", "", "homing"]]
+    for joint, unit in zip(answer["joints"], answer["joint_units"], strict=True):
+        limits = joint["limits"]
+        homing = joint["homing"]
+        rows.append(
+            [
+                joint["name"],
+                "unlimited" if limits is None else f"{short(limits[0])} .. {short(limits[1])}",
+                short(joint["home"]),
+                "-" if joint["max_speed"] is None else f"{short(joint['max_speed'])}/s",
+                "-" if joint["max_accel"] is None else f"{short(joint['max_accel'])}/s2",
+                unit,
+                "" if homing is None else f"switch {homing['switch']} at {short(homing['at'])}",
+            ]
+        )
+    if not any(row[-1] for row in rows[1:]):
+        rows = [row[:-1] for row in rows]
+    return table(rows, left=(0, 5, 6))
+
+
+def _steppers(answer: dict[str, Any]) -> str:
+    heading = ["stepper", "axis", "full steps", "x micro", "x gear", "x pulley", "= pulses/turn", "one pulse"]
+    rows = [[*heading, "", ""]]
+    for motor in answer["motors"]:
+        if motor["kind"] == "stepper":
+            rows.append(
+                [
+                    motor["name"],
+                    motor.get("axis", "-"),
+                    str(motor["full_steps"]),
+                    str(motor["microsteps"]),
+                    short(motor["gear"]),
+                    short(motor["pulley"]),
+                    short(motor["pulses_per_turn"]),
+                    f"{motor['unit_per_pulse']:.7g}",
+                    motor["unit"],
+                    _remarks(motor),
+                ]
+            )
+    return table(rows, left=(0, 1, 8, 9)) if len(rows) > 1 else ""
+
+
+def _remarks(motor: dict[str, Any]) -> str:
+    lead = [f"lead {short(motor['lead'])} mm"] if "lead" in motor else []
+    return ", ".join(lead + ["inverted"] * motor["invert"])
+
+
+def _servos(answer: dict[str, Any]) -> str:
+    rows = [["servo", "axis", "travel/deg", "pulse/us", "zero/deg", "us/deg", ""]]
+    for motor in answer["motors"]:
+        if motor["kind"] == "servo":
+            rows.append(
+                [
+                    motor["name"],
+                    motor.get("axis", "-"),
+                    " .. ".join(map(short, motor["travel"])),
+                    " .. ".join(map(str, motor["pulse_us"])),
+                    short(motor["zero"]),
+                    short(motor["pulses_per_unit"]),
+                    "inverted" if motor["invert"] else "",
+                ]
+            )
+    return table(rows, left=(0, 1, 6)) if len(rows) > 1 else ""
+
+
+def _matrix(answer: dict[str, Any]) -> str:
+    """Motors as sums of joints, where they are not one to one."""
+    if answer["one_to_one"]:
+        return ""
+    lines = []
+    for motor in answer["motors"]:
+        total = ""
+        for name, weight in motor["joints"].items():
+            size = "" if abs(weight) == 1 else f"{short(abs(weight))} "
+            sign = "-" if weight < 0 else "+"
+            total += f" {sign} {size}{name}" if total else f"{'-' * (weight < 0)}{size}{name}"
+        lines.append(f"  motor {motor['name']} = {total}")
+    return "\n".join(lines)
+
+
+def _hardware(answer: dict[str, Any]) -> str:
+    lines = []
+    if gripper := answer["gripper"]:
+        where = f" on {gripper['axis']}" if "axis" in gripper else ""
+        ends = f"open {short(gripper['open'])}, closed {short(gripper['closed'])}"
+        lines.append(f"  gripper  {gripper['kind']}{where}, {ends}")
+    if board := answer["board"]:
+        lines.append("  board    " + ", ".join(str(value) for value in board.values()))
+    return "\n".join(lines)
+
+
+def _solver(answer: dict[str, Any]) -> str:
+    lines = [f"  reach    at most {answer['reach_mm']:.4f} mm from the first joint"]
+    if answer["task"] is not None:
+        pairs = zip(answer["target_labels"], answer["target_units"], strict=True)
+        wanted = " ".join(f"{label}/{unit}" if unit else label for label, unit in pairs)
+        offset = f", pitch offset {short(answer['pitch_offset'])} deg" if answer["pitch_offset"] else ""
+        lines.append(f"  task     {answer['task']}: target {wanted}{offset}")
+    if solver := answer["solver"]:
+        sure = "no real branch is missing" if solver["complete"] else "branches may be missing"
+        lines.append(_indented("  ik       ", f"{solver['method']} ({solver['why']}): {sure}"))
+    if answer["ik_refuses"]:
+        lines.append(_indented("  ik       ", answer["ik_refuses"]))
+    return "\n".join(lines)
+
+
+def _indented(head: str, words: str) -> str:
+    return fill(words, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head))
