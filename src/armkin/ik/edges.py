@@ -107,10 +107,12 @@ def _self_motion(
     moving = np.zeros(len(q), bool)
     joints = np.zeros(q.shape, bool)
     for who, direction in _null_directions(arm.n, V, nullity):
-        for way in (STEP, -STEP):
-            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=12)
+        # where several directions are lost at once, a short step would be drawn back into the corner
+        ways = (STEP, -STEP, 10 * STEP, -10 * STEP) if (nullity[who] > 1).any() else (STEP, -STEP)
+        for way in ways:
+            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=16)
             moved = np.abs(there - q[who]) / unit
-            far = (moved.max(axis=1) > 0.3 * STEP * np.abs(direction).max(axis=1)) & (size < 1e-11)
+            far = (moved.max(axis=1) > 0.3 * abs(way) * np.abs(direction).max(axis=1)) & (size < 1e-11)
             moving[who] |= far
             joints[who] |= far[:, None] & (moved > 1e-3 * STEP)
     return moving, joints

@@ -14,7 +14,7 @@ import numpy as np
 from armkin import soa
 from armkin.ik.chain import FLIP, Chain, inverse, is_parallel
 from armkin.ik.geometry import EXACT, Geometry
-from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.subproblems import Candidates, Pair, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -94,12 +94,16 @@ class TwoLink:
             self.scale**2,
             prefer3,
         )
-        c3, s3 = third
-        ux = lx + soa.sub(soa.mul(c3, mx), soa.mul(s3, my))
-        uy = ly + soa.add(soa.mul(s3, mx), soa.mul(c3, my))
+        third = third if self.sense > 0 else Pair(third.c, -third.s)
+        ux, uy, _ = self.reach(third)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
         doubt = any_branch(doubt2) | any_branch(doubt3)
-        return second, third if self.sense > 0 else Pair(c3, -s3), doubt
+        return second, third, doubt
+
+    def reach(self, third: Pair) -> list[Entry]:
+        """``l + Rz(q3) m``, before joint 2 turns it."""
+        x, y, _ = spin(third.c, soa.mul(self.sense, third.s), [self.mx, self.my, 0.0])
+        return [soa.add(self.lx, x), soa.add(self.ly, y), 0.0]
 
 
 def any_branch(doubt: Array) -> Array:
@@ -124,8 +128,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if n == 3:
         elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
 
-        def xyz(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
-            return elbow.solve(goal, [0.0, 0.0, 0.0], prefer)
+        def xyz(goal: list[Entry], prefer: list[Pair]) -> Candidates:
+            return Candidates(*elbow.solve(goal, [0.0, 0.0, 0.0], prefer))
 
         return Geometry("elbow", why, True, xyz, labels=labels)
 
@@ -136,7 +140,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     sense = [float(v) for v in task.sums[0][1:4] / task.sums[0][1]]
     turned = soa.constant(link[2] @ link[3])
 
-    def pitch(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def pitch(goal: list[Entry], prefer: list[Pair]) -> Candidates:
         total = (goal[3] - task.offsets[0]) / task.sums[0][1]
         c, s = soa.cos_sin(total)
         if n == 5:
@@ -155,6 +159,6 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         for pair, g in zip(pairs[1:], sense[:2], strict=True):
             c4, s4 = c4 * pair.c + g * s4 * pair.s, s4 * pair.c - g * c4 * pair.s
         fourth = Pair(c4, sense[2] * s4)
-        return [*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt
+        return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
 
     return Geometry("elbow with pitch", why, True, pitch, labels=labels)

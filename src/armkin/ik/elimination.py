@@ -22,7 +22,7 @@ rounding turned into complex pairs, poses on which the pencil is singular.  They
 roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none.
 Such a pose is solved again, with another offset, other hidden joints, and moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
-longer.  This goes on until a pass shows none of these, or six are done; all passes' answers count.
+longer.  This goes on until a pass shows none of these, or seven are done; all passes' answers count.
 Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
 the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
 self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
@@ -31,6 +31,7 @@ Three prismatic joints leave the orientation to the three others: `armkin.ik.sli
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +52,10 @@ ACCEPTED = 1e-10  # residual of an answer, lengths scaled
 TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
-SHAKES = (0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
-HEALTHY, USELESS = -8.0, -5.0  # log10 of a role's raw error from which on it is good enough, or unfit
+SHAKES = (0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
+SAMPLES = 11  # random poses on which roles are compared
+# log10 of a role's raw error: nothing better needed, good enough, unfit
+EXCELLENT, HEALTHY, USELESS = -9.5, -8.0, -5.0
 
 
 @dataclass(frozen=True)
@@ -79,44 +82,72 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     if np.sum(prismatic) >= 3:
         return Elimination(closed, (), -np.inf)
     rng = np.random.default_rng(5)
-    q = rng.uniform(-np.pi, np.pi, (16, 6))
-    q[:, prismatic] = rng.uniform(-1, 1, (16, int(np.sum(prismatic))))
+    q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
+    q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
     frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
-    goal = np.tile(np.eye(4), (16, 1, 1))
+    goal = np.tile(np.eye(4), (SAMPLES, 1, 1))
     goal[:, :3] = np.moveaxis(frame, -1, 0)
     size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
     # Collinear axes, say: no solution is isolated and no role can do better.
     redundant = bool(np.all(size[:, -1] < 1e-9))
-    rated: list[tuple[float, float, Pencil]] = []
-    # The first roles nearly always do; some arms with two prismatic joints need the others.
-    for slots, hidden in (((0, 1, 5), (0,)), ((0, 1, 5), (1, 2)), ((2, 3, 4), (0, 1, 2))):
+    rated: list[_Rating] = []
+    # The first slots nearly always do; some arms with two prismatic joints need the others.
+    for slots, hidden in _SEARCH:
         rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slots, hidden)]
-        rated.sort(key=lambda item: item[0])
-        if redundant or (rated and rated[0][1] < HEALTHY):
+        if _enough(rated, redundant, len(hidden) > 1):
             break
-    best = rated[0][2]
-    others = [pencil for _, error, pencil in rated[1:] if error < USELESS]
+    rated.sort(key=lambda rating: rating.cost)
+    best = rated[0].pencil
+    others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
     hidden_joint = best.hidden_joint
     others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
     again = build(best.role, closed.links, closed.prismatic, PSI[1])
-    plans = [best, again, *others]
+    plans = [best, *others[:1], again, *others[1:]]
     while len(plans) < len(SHAKES):
-        plans.append(plans[len(plans) % 2])
-    return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0][1])
+        plans.append(plans[-2])
+    return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0].error)
 
 
-def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> tuple[float, float, Pencil]:
-    """A role's cost, its raw error (90th percentile of log10 over the poses) and its pencil."""
+class _Rating(NamedTuple):
+    """How well a role does on an arm: the raw error is the 90th percentile of log10 over random poses."""
+
+    cost: float
+    error: float
+    pencil: Pencil
+
+
+# Where the pose is carried (slots of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
+_SEARCH = (
+    ((1,), (0,)),
+    ((0,), (0,)),
+    ((5,), (0,)),
+    ((0, 1, 5), (1, 2)),
+    ((2, 3, 4), (0, 1, 2)),
+)
+
+
+def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
+    """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
+    quick ones are all known, any that is healthy."""
+    sound = [rating for rating in rated if rating.error < EXCELLENT and rating.pencil.size <= 16]
+    if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
+        return True
+    tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
+    return tried_all and (redundant or any(rating.error < HEALTHY for rating in rated))
+
+
+def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
+    """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
     pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    few = slice(0, 3)  # a role that the arm makes singular loses every pose: no need to try them all
-    if np.median(_raw_error(pencil, closed, q[few], goal[few])[0]) > 1e-2:
-        return 1.0 + 1e-3 * pencil.size, 0.0, pencil
-    nearest, spurious = _raw_error(pencil, closed, q, goal)
-    error = float(np.quantile(np.log10(nearest + 1e-16), 0.9))
+    first, spurious = _raw_error(pencil, closed, q[:3], goal[:3])
+    if np.median(first) > 1e-2:  # a role that the arm makes singular loses every pose: no need to try more
+        return _Rating(20.0 + pencil.size, 0.0, pencil)
+    rest, more = _raw_error(pencil, closed, q[3:], goal[3:])
+    error = float(np.quantile(np.log10(np.concatenate([first, rest]) + 1e-16), 0.9))
     # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
-    cost = max(error, -11.0) + 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
-    return cost - 20.0, error, pencil
+    cost = 0.15 * pencil.size + 4 * float(np.mean([*spurious, *more])) - 0.5 * (role.slot == 1)
+    return _Rating(max(error, -11.0) + cost, error, pencil)
 
 
 def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
@@ -195,9 +226,12 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
         done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
     good = done.residual < (TOUCHING if careful else ACCEPTED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
-    missed = ~good & ((seed.tilt < 1e-4) | (done.residual < 1e-3))
+    # A complex pair that steps brought near the pose may be a real one, seen through rounding.
+    missed = ~good & ((seed.tilt < 1e-4) | (done.residual < (1e-5 if careful else 1e-3)))
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
-    unsettled[seed.pose[missed | touch]] = True
+    # A move of the pose may turn two close real roots into such a pair.
+    unsure = good & (seed.tilt > 0) & (seed.tilt < 1e-4 + 10 * np.sqrt(shake))
+    unsettled[seed.pose[missed | unsure]] = True
     touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.errors import UsageError
-from armkin.ik.subproblems import Pair
+from armkin.ik.subproblems import Candidates, Pair
 from armkin.ik.tasks import Task, default_task, task_for
 from armkin.soa import Array, Entry
 
@@ -34,15 +34,14 @@ class Geometry:
     """A solver for one arm and task.
 
     Closed forms set `pairs`: called with the target's entries (the columns of the targets,
-    or a `soa.Pose`) and the preferred motions of free joints, it returns a pair for each
-    joint on branch axes (b0, b1, b2, N), and doubt (N,). Others set `rows`: called with
+    or a `soa.Pose`) and the preferred motions of free joints, it returns `Candidates`. Others set `rows`: called with
     targets (N, m) or (N, 4, 4) it returns q (N, B, n), nan past the last branch, and doubt.
     """
 
     name: str
     why: str
     complete: bool
-    pairs: Callable[[list[Entry], list[Pair]], tuple[list[Pair], NDArray[np.bool_]]] | None = None
+    pairs: Callable[[list[Entry], list[Pair]], Candidates] | None = None
     rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
     labels: tuple[tuple[str, ...], ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
 

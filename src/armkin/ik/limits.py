@@ -23,6 +23,9 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     value: any shape, in (-pi, pi]; near: broadcastable [rad]. Returns the values and
     whether they are within [lower, upper]; where no copy is, the principal value.
     """
+    if lower >= -np.pi and upper <= np.pi:
+        # the principal value is the only one that can be legal
+        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     principal = value
     if not (isinstance(near, float) and near == 0.0):
         value = value + TURN * np.rint((near - value) / TURN)

@@ -117,7 +117,7 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Array
         goal = np.concatenate(parts, axis=1)
         entries = list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
-    pairs, doubt = geometry.pairs(entries, prefer)
+    pairs, doubt, _ = geometry.pairs(entries, prefer)
     values = np.broadcast_arrays(*(p.c if p.s is None else np.arctan2(p.s, p.c) for p in pairs))
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]

@@ -18,7 +18,7 @@ from armkin.ik.chain import FLIP, Chain, axes, inverse, reverse
 from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Pair
+from armkin.ik.subproblems import Candidates, Pair
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -49,10 +49,10 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     fixed = [soa.constant(L) for L in arm.link]
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: list[Pair]) -> Candidates:
         pairs, doubt = solve_plane(goal, [prefer[i] for i in kept])
         if lift is None:
-            return pairs, doubt
+            return Candidates(pairs, doubt)
         # the lift's value is what is missing in height when it is zero
         P = fixed[0]
         rest = iter(pairs)
@@ -63,7 +63,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             P = soa.times(P, fixed[i + 1])
         value = np.atleast_1d(np.asarray((goal[2] - P[11]) * float(np.sign(w[lift, 2]))))
         pairs.insert(lift, Pair(value, None))
-        return pairs, doubt
+        return Candidates(pairs, doubt)
 
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name = "SCARA" if lift is not None else "planar"

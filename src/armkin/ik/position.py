@@ -24,7 +24,7 @@ from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
 from armkin.ik.elbow import any_branch
 from armkin.ik.geometry import Geometry
-from armkin.ik.subproblems import Pair, linear, quadratic, rotation_between, trig_quadratic
+from armkin.ik.subproblems import Candidates, Pair, linear, quadratic, rotation_between, trig_quadratic
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -296,4 +296,4 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3])
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
-    return Geometry("three joints", f"{kinds}: {position.why}", True, position.solve)
+    return Geometry("three joints", f"{kinds}: {position.why}", True, lambda goal, prefer: Candidates(*position.solve(goal, prefer)))

@@ -18,7 +18,7 @@ from armkin.ik.geometry import Geometry, solver
 from armkin.ik.limits import SLACK, nearest_copy, nearest_row
 from armkin.ik.names import branch_names
 from armkin.ik.solutions import Solutions, Status
-from armkin.ik.subproblems import Pair
+from armkin.ik.subproblems import Pair, distance2, spin
 from armkin.ik.tasks import Task, read_targets
 from armkin.soa import Array, Entry
 
@@ -111,13 +111,15 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         prefer = [
             Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(close, arm.prismatic, strict=True)
         ]
-        pairs, doubt = geometry.pairs(entries, prefer)
-        miss = _miss(arm, task, link, pairs, entries)
+        pairs, doubt, miss = geometry.pairs(entries, prefer)
+        if miss is None:
+            miss = _miss(arm, task, link, pairs, entries)
         values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
         if len(task.sums):
             miss = np.maximum(miss, _sum_miss(task, values, entries))
+        shape = np.broadcast_shapes((1, 1, 1, len(goal)), *(np.shape(v) for v in values))
+        miss = np.broadcast_to(miss, shape)
         valid = miss <= ACCEPTED**2
-        shape = valid.shape
         B, N = int(np.prod(shape[:-1])), len(goal)
         if out is None:
             out = _empty(len(target), B, arm.n)
@@ -191,30 +193,30 @@ def _tidy(
         part.q[some] = q
 
 
-def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Array:
-    """Squared residual of every branch, from its pairs: (b0, b1, b2, N), lengths in units of the reach."""
-    P = link[0]
-    for i, pair in enumerate(pairs):
-        P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, pair.c, pair.s)
-        P = soa.times(P, link[i + 1])
-    where = goal[9:12] if task.orientation == "full" else goal[: task.position]
-    total: Entry = 0.0
-    for k, wanted in enumerate(where):
-        d = P[9 + k] - wanted
-        total = soa.add(total, d * d)
-    total = total * (1.0 / arm.reach**2)
-    if task.orientation == "full":
-        # two columns of a rotation determine the third
-        compare = [(k, goal[k]) for k in (0, 1, 2, 6, 7, 8)]
-    elif task.orientation == "axis":
-        compare = [(6 + k, goal[3 + k]) for k in range(3)]
-    else:
-        compare = []
-    for k, wanted in compare:
-        d = P[k] - wanted
-        total = total + d * d
-    shape = np.broadcast_shapes(*(np.shape(x) for pair in pairs for x in pair if x is not None), np.shape(total), (1, 1, 1, 1))
-    return np.broadcast_to(total, shape)
+def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:
+    """Squared residual of every branch, from its pairs, lengths in units of the reach.
+
+    The tool's point, and for orientations its x and z axes (two columns of a rotation
+    determine the third), carried from the tool back to the base.
+    """
+    p, axes = link[-1][9:12], {"none": (), "axis": (6,), "full": (0, 6)}[task.orientation]
+    columns = [link[-1][k : k + 3] for k in axes]
+    for i in range(arm.n - 1, -1, -1):
+        c, s = pairs[i]
+        if s is None:
+            p = [p[0], p[1], soa.add(p[2], c)]
+        else:
+            p = spin(c, s, p)
+            columns = [spin(c, s, v) for v in columns]
+        p = soa.apply(link[i], p)
+        columns = [soa.turn(link[i], v) for v in columns]
+    full = task.orientation == "full"
+    where = goal[9:12] if full else goal[: task.position]
+    total = soa.mul(1.0 / arm.reach**2, distance2(p, where))
+    wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
+    for v, w in zip(columns, wanted, strict=False):
+        total = total + distance2(v, w)
+    return total
 
 
 def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Array:

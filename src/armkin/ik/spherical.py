@@ -16,7 +16,7 @@ from armkin.ik.chain import Chain, inverse, is_parallel, reverse
 from armkin.ik.elbow import Elbow, any_branch
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.subproblems import Candidates, Pair, distance2, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Pose
 
@@ -40,9 +40,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     shoulder = SphericalWrist(chain, *centre)
 
-    def solve(goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
-        pairs, doubt = shoulder.solve(soa.inverse(goal), prefer[::-1])
-        return pairs[::-1], doubt
+    def solve(goal: Pose, prefer: list[Pair]) -> Candidates:
+        found = shoulder.solve(soa.inverse(goal), prefer[::-1])
+        return found._replace(pairs=found.pairs[::-1])
 
     return Geometry("spherical shoulder", f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}", True, solve)
 
@@ -80,6 +80,9 @@ class SphericalWrist:
             self.place = position.solve
             self.why = f"joints 1, 2 and 3: {position.why}"
         self.links = [soa.constant(L) for L in chain.link[:4]]
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
+        L3 = chain.link[3]
+        self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
         end = inverse(chain.link[6])
         self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # in the tool's frame
         self.end = soa.constant(end)
@@ -92,13 +95,16 @@ class SphericalWrist:
         self.rest5 = float(A[2, 2] * b[2])
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
 
-    def solve(self, goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
-        """All joints for a pose: six pairs on branch axes (b0, b1, 2, N), and doubt (N,)."""
-        pairs, doubt = self.place(soa.apply(goal, self.centre), prefer[:3])
+    def solve(self, goal: Pose, prefer: list[Pair]) -> Candidates:
+        """All joints for a pose, on branch axes (b0, b1, 2, N)."""
+        centre = soa.apply(goal, self.centre)
+        pairs, doubt = self.place(centre, prefer[:3])
         P = self.links[0]
         for i, pair in enumerate(pairs):
             P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, *pair)
             P = soa.times(P, self.links[i + 1])
+        there = soa.combine(1.0, P[9:12], self.height4, P[6:9])
+        miss = soa.mul(1.0 / self.reach**2, distance2(there, centre))
         # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
         x = soa.turn_back(P, soa.turn(goal, self.end[0:3]))
         z = soa.turn_back(P, soa.turn(goal, self.end[6:9]))
@@ -112,4 +118,8 @@ class SphericalWrist:
         back = soa.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
         c6, s6, _ = soa.turn_back(self.B, back)
         doubt = doubt | any_branch(doubt5) | any_branch(doubt4)
-        return [*pairs, fourth, fifth, Pair(c6, s6)], doubt
+        # the centre is where it must be, and so are the wrist's first and last columns
+        column = soa.turn(turn5, soa.combine(c6, self.B[0:3], s6, self.B[3:6]))
+        miss = miss + distance2(spin(c4, s4, u), z)
+        miss = miss + distance2(spin(c4, s4, column), x)
+        return Candidates([*pairs, fourth, fifth, Pair(c6, s6)], doubt, miss)

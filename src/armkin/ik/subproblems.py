@@ -29,6 +29,34 @@ class Pair(NamedTuple):
     s: Entry
 
 
+class Candidates(NamedTuple):
+    """What a closed form returns: candidate branches, not yet told from false ones.
+
+    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: (N,) targets on an edge. miss:
+    squared residual of every branch (lengths in units of the reach), recomputed from the
+    pairs, if the geometry has a shorter way than the whole chain; else None.
+    """
+
+    pairs: list[Pair]
+    doubt: Array
+    miss: Entry | None = None
+
+
+def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:
+    """``Rz(q) v``."""
+    x, y = v[0], v[1]
+    return [soa.sub(soa.mul(c, x), soa.mul(s, y)), soa.add(soa.mul(s, x), soa.mul(c, y)), v[2]]
+
+
+def distance2(u: list[Entry], v: list[Entry]) -> Entry:
+    """Squared distance of two vectors."""
+    total: Entry = 0.0
+    for a, b in zip(u, v, strict=False):
+        d = soa.sub(a, b)
+        total = soa.add(total, d * d)
+    return total
+
+
 def signs(axis: int) -> Array:
     """[+1, -1] along branch axis 0, 1 or 2 of (b0, b1, b2, N)."""
     shape = [1, 1, 1, 1]

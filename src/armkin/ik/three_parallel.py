@@ -17,7 +17,7 @@ from armkin import soa
 from armkin.ik.chain import Chain, inverse, is_parallel, reverse
 from armkin.ik.elbow import TwoLink, any_branch
 from armkin.ik.geometry import EXACT, Geometry
-from armkin.ik.subproblems import Pair, linear, rotation_between
+from armkin.ik.subproblems import Candidates, Pair, distance2, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Pose
 
@@ -38,9 +38,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     solver = ThreeParallel(chain)
 
-    def solve(goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
-        pairs, doubt = solver.solve(soa.inverse(goal), prefer[::-1])
-        return pairs[::-1], doubt
+    def solve(goal: Pose, prefer: list[Pair]) -> Candidates:
+        found = solver.solve(soa.inverse(goal), prefer[::-1])
+        return found._replace(pairs=found.pairs[::-1])
 
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
 
@@ -90,13 +90,14 @@ class ThreeParallel:
         past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
         R23 = L2[:3, :3] @ L3[:3, :3]
         self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
+        self.height4 = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3])[2])
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
         self.turned = [float(R23[0, 0]), float(R23[1, 0])]
-        self.flipped = self.sense4
         fore = L2[:3, :3] @ L3[:3, 3]
         self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
 
-    def solve(self, goal: Pose, prefer: list[Pair]) -> tuple[list[Pair], Array]:
-        """All joints for a pose: six pairs on branch axes (shoulder, elbow, wrist, N), and doubt (N,)."""
+    def solve(self, goal: Pose, prefer: list[Pair]) -> Candidates:
+        """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
         D = soa.times(soa.times(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
         n, o = self.shoulder[6:9], self.shoulder[9:12]
         g = soa.combine(1.0, D[9:12], self.height6, D[6:9])
@@ -130,7 +131,18 @@ class ThreeParallel:
             c, s = c * pair.c + sense * s * pair.s, s * pair.c - sense * c * pair.s
         fourth = Pair(c, self.sense4 * s)
         doubt = any_branch(doubt1) | any_branch(doubt5) | any_branch(doubt6) | doubt23
-        return [first, second, third, fourth, fifth, sixth], doubt
+        # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, its x
+        # axis, and the common direction
+        reached = spin(*second, self.two_link.reach(third))
+        miss = distance2(reached, p[:2]) + (p[2] - self.height4) ** 2
+        miss = miss * (1.0 / self.reach**2)
+        x2 = [tx, ty]
+        for pair, sense in ((fourth, self.sense4), (third, self.sense3), (second, 1.0)):
+            x2 = spin(pair.c, soa.mul(sense, pair.s), [*x2, 0.0])[:2]
+        miss = miss + distance2([*x2, 0.0], x)
+        along = soa.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
+        miss = miss + distance2(along, [0.0, 0.0, self.sense4])
+        return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
 
 
 def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
