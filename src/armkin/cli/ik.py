@@ -56,15 +56,15 @@ def ik(
     from armkin.ik.tasks import task_for
 
     arm = inputs.load(robot)
-    held = solving.holds(arm, lock or (), sweep or ())
     what = task_for(arm, task)
+    held = solving.locks(arm, lock)
     request = solving.Request(
         arm=arm,
         task=what.name,
         near=None if near is None else inputs.joint_list(arm, near, "--near"),
         branch=branch,
-        holds=held,
-        swept=bool(sweep),
+        held=held,
+        swept=solving.sweeps(arm, sweep, held),
     )
     if batch is not None:
         inputs.no_numbers(target)
@@ -102,9 +102,8 @@ def _answers(
 ) -> Iterator[dict[str, Any]]:
     arm = request.arm
     targets = units.targets_in(task.labels, chunk.values)
-    for values, goal, found in zip(
-        chunk.values.tolist(), targets, solving.solve(request, targets), strict=True
-    ):
+    answers = solving.solve(request, targets)
+    for values, goal, found in zip(chunk.values.tolist(), targets, answers, strict=True):
         listed, best = found.branches, found.best
         if not all_branches:
             listed, best = ([], None) if best is None else ([listed[best]], 0)
@@ -165,7 +164,7 @@ def _branches(
         if turns:
             near = units.joints_in(arm, request.near_out)
             copies = armkin.turns(arm, branch.q, near=near)
-            held = [arm.joint_names.index(name) for hold in request.holds[:1] for name in hold]
+            held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
             same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
             row["turns"] = units.joints_out(arm, copies[same]).tolist()
         rows.append(row)
@@ -213,4 +212,4 @@ def _summary(answer: dict[str, Any]) -> str:
     if count > len(answer["branches"]):
         text += " (--all-branches lists all)"
     sure = "no real branch is missing" if answer["complete"] else "there may be more"
-    return f"{text}\nsolved as {answer['method']} ({answer['why']}): {sure}"
+    return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")

@@ -1,12 +1,9 @@
 """`armkin info` for people: the tables as papers print them, from the same object as the JSON."""
 
 from collections.abc import Sequence
-from textwrap import fill
 from typing import Any
 
-from armkin.cli.render import short, table
-
-_WIDTH = 90
+from armkin.cli.render import short, table, wrapped
 
 
 def text(answer: dict[str, Any]) -> str:
@@ -19,9 +16,10 @@ def text(answer: dict[str, Any]) -> str:
         "screws": "screw axes at the zero pose",
     }[answer["convention"]]
     head = [f"{answer['robot']}: {len(joints)} joint{'s' * (len(joints) != 1)} ({kinds}), {form}"]
-    head += [fill(" ".join(answer[key].split()), _WIDTH) for key in ("description",) if answer[key]]
+    if answer["description"]:
+        head.append(wrapped(answer["description"]))
     if answer["source"]:
-        head.append(fill("Source: " + " ".join(answer["source"].split()), _WIDTH))
+        head.append(wrapped(f"Source: {answer['source']}"))
     parts = [
         "\n".join(head),
         _screws(joints) if answer["convention"] == "screws" else _dh(joints),
@@ -183,11 +181,7 @@ def _solver(answer: dict[str, Any]) -> str:
         lines.append(f"  task     {answer['task']}: target {wanted}{offset}")
     if solver := answer["solver"]:
         sure = "no real branch is missing" if solver["complete"] else "branches may be missing"
-        lines.append(_indented("  ik       ", f"{solver['method']} ({solver['why']}): {sure}"))
+        lines.append(wrapped(f"{solver['method']} ({solver['why']}): {sure}", "  ik       ", " " * 11))
     if answer["ik_refuses"]:
-        lines.append(_indented("  ik       ", answer["ik_refuses"]))
+        lines.append(wrapped(answer["ik_refuses"], "  ik       ", " " * 11))
     return "\n".join(lines)
-
-
-def _indented(head: str, words: str) -> str:
-    return fill(words, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head))

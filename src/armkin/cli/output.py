@@ -52,7 +52,7 @@ def _coloured(stream: TextIO) -> bool:
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A counter on stderr, if that is a terminal, while a long command runs; call it with the count so far."""
+    """A counter on stderr, if that is a terminal, for long commands; call it with the count so far."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda done: None
         return

@@ -91,6 +91,13 @@ def pose_line(arm: Arm, values: Sequence[float]) -> str:
     return f"{arm.name}: {labelled(arm.joint_names, values, units.names(arm))}"
 
 
+def wrapped(text: str, first: str = "", rest: str = "") -> str:
+    """Running text in lines of a page's width; first, rest: what the first and the other lines begin with."""
+    from textwrap import fill
+
+    return fill(" ".join(text.split()), 90, initial_indent=first, subsequent_indent=rest)
+
+
 def labelled(names: Sequence[str], values: Sequence[float], each_unit: Sequence[str]) -> str:
     """``x = 390, y = 80, z = 300 mm``: a unit where the next number's differs."""
     parts = []
@@ -133,6 +140,5 @@ def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:
 def warn_of_rows(tally: Tally) -> None:
     """Say how many rows of a batch are outside the limits."""
     if tally.outside:
-        output.warn(
-            f"{tally.outside} of {tally.rows} rows are outside the limits; the first is row {tally.first_outside}"
-        )
+        first = f"the first is row {tally.first_outside}"
+        output.warn(f"{tally.outside} of {tally.rows} rows are outside the limits; {first}")

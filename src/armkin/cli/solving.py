@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import units
@@ -28,8 +28,8 @@ class Request:
     task: str | None = None
     near: Sequence[float] | None = None  # [deg | mm], by default home
     branch: str | None = None  # name of the branch wanted
-    holds: Sequence[dict[str, float]] = ()  # joint name -> value [deg | mm]; several: all are tried
-    swept: bool = False
+    held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
+    swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
 
     @property
     def near_out(self) -> list[float]:
@@ -70,10 +70,9 @@ def solve(request: Request, targets: Array) -> list[Answer]:
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     parts: list[list[tuple[int, Answer, set[str]]]] = [[] for _ in targets]
-    for held in _holds_in(request):
-        kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
+    for held in _holds(request):
         one = armkin.lock(arm, held) if held else arm
-        s = armkin.ik(one, targets, request.task, near=near[kept])
+        s = armkin.ik(one, targets, request.task, near=near[_kept(arm, held)])
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
@@ -83,44 +82,44 @@ def solve(request: Request, targets: Array) -> list[Answer]:
 
 
 def closest(request: Request, target: Array) -> Closest:
-    """The pose within limits nearest to one target [mm, rad], over all locked values."""
+    """The pose within limits nearest to one target [mm, rad], with swept joints free."""
     from dataclasses import replace
 
     import armkin
 
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
-    found = []
-    for held in _holds_in(request):
-        kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
-        one = armkin.lock(arm, held) if held else arm
-        nearest = armkin.closest(one, target, request.task, near=near[kept])
-        found.append(replace(nearest, q=armkin.unlock(arm, held, nearest.q) if held else nearest.q))
-    return min(found, key=lambda c: (c.distance, c.angle))
+    held = _in(arm, request.held)
+    one = armkin.lock(arm, held) if held else arm
+    nearest = armkin.closest(one, target, request.task, near=near[_kept(arm, held)])
+    return replace(nearest, q=armkin.unlock(arm, held, nearest.q)) if held else nearest
 
 
-def holds(arm: Arm, locks: Sequence[str], sweeps: Sequence[str]) -> list[dict[str, float]]:
-    """What `--lock J=V` and `--sweep J=LOW:HIGH:COUNT` hold: every combination [deg | mm]."""
-    values: dict[str, list[float]] = {}
-    for text in locks:
-        name, value = _named(arm, text, "--lock", "J3=20", values)
-        values[name] = [number(value, f"--lock {name}")]
-    for text in sweeps:
-        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", values)
+def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
+    """`--lock J=V`: joint name -> value [deg | mm]."""
+    found: dict[str, float] = {}
+    for text in words or ():
+        name, value = _named(arm, text, "--lock", "J3=20", found)
+        found[name] = number(value, f"--lock {name}")
+    return found
+
+
+def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
+    """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
+    found: dict[str, list[float]] = {}
+    total = 1
+    for text in words or ():
+        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", {**held, **found})
         parts = value.split(":")
         if len(parts) != 3:
             raise UsageError(f"--sweep {text}: write JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16")
         low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
         count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
-        values[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
-    if not values:
-        return []
-    total = 1
-    for choices in values.values():
-        total *= len(choices)
+        found[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
+        total *= count
     if total > MOST_SWEEPS:
         raise UsageError(f"--sweep: {total} combinations; at most {MOST_SWEEPS} are tried")
-    return [dict(zip(values, choice, strict=True)) for choice in itertools.product(*values.values())]
+    return found
 
 
 def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
@@ -135,13 +134,20 @@ def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]
     return name, value
 
 
-def _holds_in(request: Request) -> Iterator[dict[str, float]]:
-    """The held joints [rad | mm]; one empty hold if there are none."""
-    arm = request.arm
-    for held in request.holds or [{}]:
-        full = [held.get(name, 0.0) for name in arm.joint_names]
-        inside = dict(zip(arm.joint_names, units.joints_in(arm, full).tolist(), strict=True))
-        yield {name: inside[name] for name in held}
+def _holds(request: Request) -> Iterator[dict[str, float]]:
+    """Every combination of held and swept joints [rad | mm]; one empty one if there are none."""
+    for choice in itertools.product(*request.swept.values()):
+        yield _in(request.arm, {**request.held, **dict(zip(request.swept, choice, strict=True))})
+
+
+def _in(arm: Arm, held: Mapping[str, float]) -> dict[str, float]:
+    """Joint name -> value, from [deg | mm] to [rad | mm]."""
+    values = units.joints_in(arm, [held.get(name, 0.0) for name in arm.joint_names]).tolist()
+    return {name: value for name, value in zip(arm.joint_names, values, strict=True) if name in held}
+
+
+def _kept(arm: Arm, held: Mapping[str, float]) -> list[int]:
+    return [i for i, name in enumerate(arm.joint_names) if name not in held]
 
 
 def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
