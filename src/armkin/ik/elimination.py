@@ -231,7 +231,9 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
     # A move of the pose may turn two close real roots into such a pair.
     unsure = good & (seed.tilt > 0) & (seed.tilt < 1e-4 + 10 * np.sqrt(shake))
-    unsettled[seed.pose[missed | unsure]] = True
+    # A real root that was far from the answer it led to may have stood for another one.
+    strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
+    unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
