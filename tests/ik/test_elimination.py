@@ -32,15 +32,21 @@ def rigid(rng: np.random.Generator, count: int) -> Array:
     return T
 
 
-def smallest_singular_value(arm: Arm, q: Array) -> Array:
-    """Of the Jacobian by central differences, lengths in metres; (N, 6) -> (N,)."""
+def jacobian(arm: Arm, q: Array) -> Array:
+    """Jacobians (N, 6, 6) by central differences, lengths in metres: linear rows in the base's axes, angular
+    ones in the tool's."""
     T, columns = forward(arm, q), []
     for i in range(6):
         h = 1e-5 * np.eye(6)[i] * np.where(arm[1], 1000, 1)
         D = (forward(arm, q + h) - forward(arm, q - h)) / 2e-5
         spin = np.swapaxes(T[:, :3, :3], 1, 2) @ D[:, :3, :3]
         columns.append(np.concatenate([D[:, :3, 3] / 1000, spin[:, [2, 0, 1], [1, 2, 0]]], axis=1))
-    return np.linalg.svd(np.stack(columns, axis=-1), compute_uv=False)[:, -1]
+    return np.stack(columns, axis=-1)
+
+
+def smallest_singular_value(arm: Arm, q: Array) -> Array:
+    """Of the Jacobian, (N, 6) -> (N,)."""
+    return np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1]
 
 
 def solve(arm: Arm, T: Array) -> tuple[Array, Array]:
@@ -277,13 +283,7 @@ def singular_joints(arm: Arm, count: int) -> Array:
     """Joint values (<= count, 6) with the fifth joint where the Jacobian loses rank, by bisection."""
 
     def determinant(q: Array) -> Array:
-        T, columns = forward(arm, q), []
-        for i in range(6):
-            h = 1e-4 * np.eye(6)[i]
-            D = (forward(arm, q + h) - forward(arm, q - h)) / 2e-4
-            spin = np.swapaxes(T[:, :3, :3], 1, 2) @ D[:, :3, :3]
-            columns.append(np.concatenate([D[:, :3, 3] / 1000, spin[:, [2, 0, 1], [1, 2, 0]]], axis=1))
-        return np.linalg.det(np.stack(columns, axis=-1))
+        return np.linalg.det(jacobian(arm, q))
 
     low = random_joints(arm, 4 * count, 13)
     high = low.copy()
@@ -306,6 +306,28 @@ def test_double_root_on_the_singularity_is_one_answer() -> None:
     assert doubtful.all()
     for branches, generating in zip(found, q, strict=True):
         assert (distance(arm, branches, generating) < 1e-3).sum() == 1
+
+
+def test_targets_just_beyond_the_boundary_are_answered() -> None:
+    """Poses with a single double root, moved by 1e-10 m both ways along the direction the arm cannot go."""
+    arm = random_arm(3)
+    plan = elimination.prepare(*arm)
+    q = singular_joints(arm, 60)
+    found, _ = elimination.solve(plan, forward(arm, q))
+    q = q[(~np.isnan(found[..., 0])).sum(axis=1) == 1]
+    assert len(q) >= 3
+    T = forward(arm, q)
+    left, _, _ = np.linalg.svd(jacobian(arm, q))
+    for way in (1e-10, -1e-10):
+        beyond = T.copy()
+        beyond[:, :3, 3] += way * 1000 * left[:, :3, 5]
+        found, doubtful = elimination.solve(plan, beyond)
+        assert (~np.isnan(found[..., 0])).sum(axis=1).min() >= 1
+        assert doubtful.all()
+        assert pose_residual(arm, found, beyond) < 1e-9
+        beyond[:, :3, 3] += 1e5 * way * 1000 * left[:, :3, 5]  # and 1e-5 m: inside two answers, outside none
+        found, _ = elimination.solve(plan, beyond)
+        assert set((~np.isnan(found[..., 0])).sum(axis=1)) <= {0, 2}
 
 
 # ---- the interface -----------------------------------------------------------------------------------------

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from armkin.ik import line_features
 from armkin.ik.chain import inverse
+from armkin.ik.ends import eliminate
 from armkin.ik.nudge import nudged
-from armkin.ik.pencil import Bool, Pencil, end_monomials
+from armkin.ik.pencil import Pencil
 from armkin.ik.polish import advance, turn
+from armkin.ik.roles import Bool
 from armkin.soa import Array
 
 Int = NDArray[np.int64]
@@ -63,33 +65,17 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
 
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
-    """The pencil's twelve rows (N, 12, c) and the factors (N or 1, 5, 15) of back substitution."""
-    count, slot = Y.shape[0], pencil.role.slot
-    if slot in (0, 5):
-        N, recover = _eliminate_ends(pencil, Y)
+    """The twelve rows of (4), (N, 12, c), and the factors (N or 1, 5, 15) of back substitution."""
+    N, recover = eliminate(pencil.ends, Y)
+    if pencil.role.at_an_end:
         rows = N @ pencil.columns
     else:
-        recover = pencil.recover[None]
         rows = pencil.left @ line_features.rep(Y)
-        if slot > 1:
-            rows = (rows @ pencil.right).reshape(count, -1, 27)
+        if pencil.right.size:
+            rows = (rows @ pencil.right).reshape(Y.shape[0], -1, 27)
         rows = rows @ pencil.columns
-    rows = rows.reshape(count, 2 * rows.shape[1], -1)
+    rows = rows.reshape(Y.shape[0], 2 * rows.shape[1], -1)
     return (rows if pencil.mix is None else pencil.mix @ rows), recover
-
-
-def _eliminate_ends(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
-    """Left null space (N, m, 15) of (3) and the factors (N, 5, 15) from features to end monomials."""
-    Q = end_monomials(pencil.role, pencil.ends, Y)
-    if pencil.rank < 9:
-        basis, size, vectors = np.linalg.svd(Q)
-        kept = np.maximum(size[:, : pencil.rank, None], 1e-300)
-        factors = np.swapaxes(vectors[:, : pencil.rank] / kept, 1, 2)
-        recover = factors @ np.swapaxes(basis[:, :, : pencil.rank], 1, 2)
-        return np.swapaxes(basis[:, :, pencil.rank :], 1, 2), recover[:, 4:]
-    basis, triangle = np.linalg.qr(Q, mode="complete")
-    transposed = np.swapaxes(basis, 1, 2)
-    return transposed[:, 9:], nudged(np.linalg.solve, triangle[:, 4:9, 4:9], transposed[:, 4:9])
 
 
 def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
@@ -97,7 +83,8 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
     x = x[:, None]
-    flat = np.where(np.abs(x) > 1, y / np.where(x == 0, 1.0, x), low)  # y = x w: take the safer one
+    large = np.abs(x) > 1
+    flat = np.where(large, y / np.where(large, x, 1.0), low)  # y = x w: take the safer one
     v = flat @ pencil.W.T
     if r:
         square = x * x + 1
@@ -110,7 +97,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
     hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
     value = np.empty((3, v.shape[0]))
     if pencil.prismatic[hidden]:
-        value[pencil.role.hidden] = pencil.psi + 1 / np.where(x[:, 0] == 0, 1e-300, x[:, 0])
+        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x[:, 0]) < 1e-100, 1e-100, x[:, 0])
     else:
         value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x[:, 0])
     if pencil.prismatic[dialytic]:
@@ -120,7 +107,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
     if pencil.prismatic[third]:
         value[pencil.role.third] = _ratio(three)
     else:
-        sign = np.sign(three[:, 0])
+        sign = np.where(three[:, 0] < 0, -1.0, 1.0)
         value[pencil.role.third] = np.arctan2(sign * three[:, 2], sign * three[:, 1])
     return value
 
