@@ -10,7 +10,9 @@ merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +21,7 @@ from numpy.typing import ArrayLike
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.soa import Array, Entry, Pose
+from armkin.straight import Straight
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -35,13 +38,10 @@ def fk(arm: Arm, q: ArrayLike) -> Array:
     [258.0, 10.0, 367.0]
     """
 
-    def tip(q: list[Entry], out: Array) -> None:
-        P = soa.constant(arm.link[0])
-        for i in range(arm.n):
-            P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
-        soa.write(P, out)
-
-    return _batched(arm, q, (4, 4), tip)
+    values = as_joints(arm, q)
+    if values.ndim == 1:
+        return _single(arm, values)
+    return _batched(arm, values, (4, 4), _tip)
 
 
 def position(arm: Arm, q: ArrayLike) -> Array:
@@ -78,16 +78,7 @@ def frames(arm: Arm, q: ArrayLike) -> Array:
     on the joint's axis with the base's axes when all joints are zero.
     """
 
-    def all_frames(q: list[Entry], out: Array) -> None:
-        out[..., 0, :, :] = arm.base
-        P = soa.constant(arm.link[0])
-        for i in range(arm.n):
-            P = _move(arm, P, i, q[i])
-            soa.write(soa.times(P, soa.constant(arm.frame[i])), out[..., i + 1, :, :])
-            P = soa.times(P, soa.constant(arm.link[i + 1]))
-        soa.write(P, out[..., arm.n + 1, :, :])
-
-    return _batched(arm, q, (arm.n + 2, 4, 4), all_frames)
+    return _batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames)
 
 
 def jacobian(arm: Arm, q: ArrayLike) -> Array:
@@ -97,20 +88,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Array:
     (Siciliano et al., Robotics, eq. 3.30).
     """
 
-    def columns(q: list[Entry], out: Array) -> None:
-        P = soa.constant(arm.link[0])
-        axes = []
-        for i in range(arm.n):
-            axes.append((P[6:9], P[9:12]))
-            P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
-        for i, (z, origin) in enumerate(axes):
-            lever = soa.combine(1.0, P[9:12], -1.0, origin)
-            linear = z if arm.prismatic[i] else soa.cross(z, lever)
-            angular = [0.0, 0.0, 0.0] if arm.prismatic[i] else z
-            for row, entry in enumerate([*linear, *angular]):
-                out[..., row, i] = entry
-
-    return _batched(arm, q, (6, arm.n), columns)
+    return _batched(arm, as_joints(arm, q), (6, arm.n), _jacobian)
 
 
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
@@ -162,15 +140,77 @@ def as_joints(arm: Arm, q: ArrayLike) -> Array:
     return values
 
 
-def _batched(arm: Arm, q: ArrayLike, shape: tuple[int, ...], kernel: Callable[[list[Entry], Array], None]) -> Array:
-    """Run a kernel over the batch axes of q in chunks that stay in the cache."""
-    values = as_joints(arm, q)
+def _tip(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The tool's pose, row by row: 16 entries."""
+    P = soa.constant(arm.link[0])
+    for i in range(arm.n):
+        P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
+    return _rows(P)
+
+
+def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """All frames, row by row: 16 (n + 2) entries."""
+    out = _rows(soa.constant(arm.base))
+    P = soa.constant(arm.link[0])
+    for i in range(arm.n):
+        P = _move(arm, P, i, q[i])
+        out += _rows(soa.times(P, soa.constant(arm.frame[i])))
+        P = soa.times(P, soa.constant(arm.link[i + 1]))
+    return out + _rows(P)
+
+
+def _jacobian(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The Jacobian, row by row: 6 n entries."""
+    P = soa.constant(arm.link[0])
+    axes = []
+    for i in range(arm.n):
+        axes.append((P[6:9], P[9:12]))
+        P = soa.times(_move(arm, P, i, q[i]), soa.constant(arm.link[i + 1]))
+    columns = []
+    for i, (z, origin) in enumerate(axes):
+        lever = soa.combine(1.0, P[9:12], -1.0, origin)
+        columns.append([*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*soa.cross(z, lever), *z])
+    return [column[row] for row in range(6) for column in columns]
+
+
+def _rows(P: Pose) -> list[Entry]:
+    """A pose as the 16 entries of its matrix, row by row."""
+    return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
+
+
+def _single(arm: Arm, q: Array) -> Array:
+    """The tool's pose for one set of joint values, by matrix products: shorter than any batch of one."""
+    T = arm.link[0]
+    for i in range(arm.n):
+        Z = np.eye(4)
+        if arm.prismatic[i]:
+            Z[2, 3] = q[i]
+        else:
+            c, s = math.cos(q[i]), math.sin(q[i])
+            Z[0, 0], Z[0, 1], Z[1, 0], Z[1, 1] = c, -s, s, c
+        T = T @ Z @ arm.link[i + 1]
+    return np.asarray(T)
+
+
+Formula = Callable[["Arm", list[Entry]], list[Entry]]
+
+
+@lru_cache(maxsize=128)
+def _recorded(arm: Arm, formula: Formula) -> Straight:
+    """A formula of an arm's joint values as straight-line code."""
+    return Straight(lambda q: formula(arm, q), arm.n)
+
+
+def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
+    """Run a formula over the batch axes of q in chunks that stay in the cache."""
     out = np.empty(values.shape[:-1] + shape)
-    if values.ndim == 1:
-        kernel([float(v) for v in values], out)
-        return out
-    flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, *shape)
+    flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
+    straight = _recorded(arm, formula)
+    workspace = straight.workspace(min(len(flat_q), soa.CHUNK))
     for start in range(0, len(flat_q), soa.CHUNK):
         columns = np.ascontiguousarray(flat_q[start : start + soa.CHUNK].T)
-        kernel(list(columns), flat_out[start : start + soa.CHUNK])
+        if columns.shape[1] < soa.CHUNK <= len(flat_q):
+            workspace = straight.workspace(columns.shape[1])
+        for k, entry in enumerate(straight.run(columns, workspace)):
+            flat_out[start : start + soa.CHUNK, k] = entry
     return out

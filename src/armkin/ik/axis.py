@@ -13,7 +13,7 @@ import numpy as np
 from armkin import soa
 from armkin.arm import from_links
 from armkin.ik.geometry import Geometry
-from armkin.ik.subproblems import Candidates, Pair
+from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task, task_for
 from armkin.soa import Array, Entry
 
@@ -35,11 +35,11 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if inner.pairs is not None:
         solve = inner.pairs
 
-        def pairs(goal: list[Entry], prefer: list[Pair]) -> Candidates:
+        def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
             found = solve(_pose(goal), [*prefer, Pair(1.0, 0.0)])
             return found._replace(pairs=found.pairs[:5])
 
-        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels)
+        return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels)
     solve_rows = inner.rows
     assert solve_rows is not None
 

@@ -14,7 +14,7 @@ import numpy as np
 from armkin import soa
 from armkin.ik.chain import FLIP, Chain, inverse, is_parallel
 from armkin.ik.geometry import EXACT, Geometry
-from armkin.ik.subproblems import Candidates, Pair, linear, rotation_between, spin
+from armkin.ik.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -43,7 +43,7 @@ class Elbow:
         self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
 
     def solve(
-        self, p: list[Entry], past: list[Entry], prefer: list[Pair]
+        self, p: list[Entry], past: list[Entry], prefer: Prefer
     ) -> tuple[list[Pair], Array]:
         """Angles of the three joints that bring the tip to p.
 
@@ -70,7 +70,7 @@ class Elbow:
         rx = soa.sub(soa.dot(self.shoulder[0:3], lever), past[0])
         ry = soa.sub(soa.dot(self.shoulder[3:6], lever), past[1])
         second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2])
-        return [first, second, third], any_branch(doubt1) | doubt23
+        return [first, second, third], doubt1 | doubt23
 
 
 class TwoLink:
@@ -82,7 +82,7 @@ class TwoLink:
         self.sense = sense
         self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
 
-    def solve(self, rx: Entry, ry: Entry, prefer2: Pair, prefer3: Pair) -> tuple[Pair, Pair, Array]:
+    def solve(self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None) -> tuple[Pair, Pair, Array]:
         """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,)."""
         lx, ly, mx, my = self.lx, self.ly, self.mx, self.my
         # |r|^2 = |l + Rz(q3) m|^2
@@ -97,18 +97,13 @@ class TwoLink:
         third = third if self.sense > 0 else Pair(third.c, -third.s)
         ux, uy, _ = self.reach(third)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
-        doubt = any_branch(doubt2) | any_branch(doubt3)
+        doubt = doubt2 | doubt3
         return second, third, doubt
 
     def reach(self, third: Pair) -> list[Entry]:
         """``l + Rz(q3) m``, before joint 2 turns it."""
         x, y, _ = spin(third.c, soa.mul(self.sense, third.s), [self.mx, self.my, 0.0])
         return [soa.add(self.lx, x), soa.add(self.ly, y), 0.0]
-
-
-def any_branch(doubt: Array) -> Array:
-    """Whether any branch of a pose is in doubt: (b0, b1, b2, N) -> (N,)."""
-    return np.asarray(doubt.reshape(-1, doubt.shape[-1]).any(axis=0)) if doubt.ndim > 1 else doubt
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -128,10 +123,10 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if n == 3:
         elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
 
-        def xyz(goal: list[Entry], prefer: list[Pair]) -> Candidates:
+        def xyz(goal: list[Entry], prefer: Prefer) -> Candidates:
             return Candidates(*elbow.solve(goal, [0.0, 0.0, 0.0], prefer))
 
-        return Geometry("elbow", why, True, xyz, labels=labels)
+        return Geometry("elbow", why, True, xyz, labels=labels, straight=True)
 
     elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
@@ -140,7 +135,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     sense = [float(v) for v in task.sums[0][1:4] / task.sums[0][1]]
     turned = soa.constant(link[2] @ link[3])
 
-    def pitch(goal: list[Entry], prefer: list[Pair]) -> Candidates:
+    def pitch(goal: list[Entry], prefer: Prefer) -> Candidates:
         total = (goal[3] - task.offsets[0]) / task.sums[0][1]
         c, s = soa.cos_sin(total)
         if n == 5:
@@ -161,4 +156,4 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         fourth = Pair(c4, sense[2] * s4)
         return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
 
-    return Geometry("elbow with pitch", why, True, pitch, labels=labels)
+    return Geometry("elbow with pitch", why, True, pitch, labels=labels, straight=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.errors import UsageError
-from armkin.ik.subproblems import Candidates, Pair
+from armkin.ik.subproblems import Candidates, Prefer
 from armkin.ik.tasks import Task, default_task, task_for
 from armkin.soa import Array, Entry
 
@@ -41,9 +41,10 @@ class Geometry:
     name: str
     why: str
     complete: bool
-    pairs: Callable[[list[Entry], list[Pair]], Candidates] | None = None
+    pairs: Callable[[list[Entry], Prefer], Candidates] | None = None
     rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
-    labels: tuple[tuple[str, ...], ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
+    straight: bool = False  # `pairs` is made of numpy's elementwise functions alone: `armkin.straight` can record it
+    labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
 
 
 @lru_cache(maxsize=64)

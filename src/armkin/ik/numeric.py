@@ -59,9 +59,11 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tu
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         q[active] += step * unit
         now = missing(arm, task, q[active], target[active])
-        better = now < best_size[active]
+        before = best_size[active]
+        better = now < before
         best[active[better]], best_size[active[better]] = q[active[better]], now[better]
-        active = active[np.isfinite(now) & (now > 1e-16)]
+        # done when rounding is all that is left
+        active = active[np.isfinite(now) & (now > 1e-15) & ((now > 1e-11) | (now < 0.5 * before))]
     return best, best_size
 
 

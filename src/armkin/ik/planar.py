@@ -18,14 +18,14 @@ from armkin.ik.chain import FLIP, Chain, axes, inverse, reverse
 from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Candidates, Pair
+from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
-Solve = Callable[[list[Entry], list[Pair]], tuple[list[Pair], Array]]
+Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Array]]
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -49,7 +49,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     fixed = [soa.constant(L) for L in arm.link]
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> Candidates:
+    def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
         pairs, doubt = solve_plane(goal, [prefer[i] for i in kept])
         if lift is None:
             return Candidates(pairs, doubt)
@@ -61,15 +61,15 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
                 pair = next(rest)
                 P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, *pair)
             P = soa.times(P, fixed[i + 1])
-        value = np.atleast_1d(np.asarray((goal[2] - P[11]) * float(np.sign(w[lift, 2]))))
+        value = (goal[2] - P[11]) * float(np.sign(w[lift, 2]))
         pairs.insert(lift, Pair(value, None))
         return Candidates(pairs, doubt)
 
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name = "SCARA" if lift is not None else "planar"
     why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
-    labels = ("", "elbow", "") if (~arm.prismatic).sum() == task.constraints - (lift is not None) else ()
-    return Geometry(name, why, True, solve, labels=labels)
+    turning = not prismatic.any()
+    return Geometry(name, why, True, solve, straight=turning, labels=("", "elbow", "") if turning else ())
 
 
 def _two(chain: Chain) -> Solve:
@@ -83,7 +83,7 @@ def _two(chain: Chain) -> Solve:
     virtual = Chain(np.array([np.eye(4), *chain.link]), np.array([True, *chain.prismatic]))
     position = Position(virtual, chain.link[2][:3, 3])
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         pairs, doubt = position.solve([goal[0], goal[1], 0.0 * goal[0]], [Pair(0.0, None), *prefer])
         return pairs[1:], doubt
 
@@ -99,7 +99,7 @@ def _two_turning(chain: Chain) -> Solve:
     two_link = TwoLink(L1[:2, 3], (L1[:3, :3] @ tip)[:2], float(sense2))
     start = soa.constant(inverse(base))
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         # height does not matter: any point above or below the target will do
         p = soa.apply(start, [goal[0], goal[1], 0.0])
         first, second, doubt = two_link.solve(p[0], p[1], *prefer)
@@ -147,7 +147,7 @@ def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
     back = soa.constant(inverse(chain.link[3]))
     two = _two(Chain(chain.link[:3], chain.prismatic[:2]))
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         R = _direction(goal, task, chain)
         x, y, _ = soa.turn(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
@@ -164,7 +164,7 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
     two = _two(Chain(back.link[:3], back.prismatic[:2]))
     axis = [float(v) for v in chain.link[0][:2, 3]]
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         c, s = soa.cos_sin(goal[-1] - task.offsets[0])
         x, y = axis[0] - goal[0], axis[1] - goal[1]
         (third, second), doubt = two([c * x + s * y, c * y - s * x], [prefer[2], prefer[1]])
@@ -177,7 +177,7 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joints 1 and 3 slide, joint 2 turns: its angle is given, two equations linear in the slides."""
     link = [soa.constant(L) for L in chain.link]
 
-    def solve(goal: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         second = _rest(goal, task, weights, [None, None, None], 1)
         P = soa.times(link[0], link[1])
         a = link[0][6:8]
@@ -187,9 +187,9 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = soa.sub(soa.mul(a[0], b[1]), soa.mul(a[1], b[0])) + 0.0 * x
         doubt = np.abs(det) < 1e-9
-        inverse_det = 1.0 / np.where(doubt, 1.0, det)
+        inverse_det = np.sign(det) / np.maximum(np.abs(det), 1e-9)
         d1 = (soa.mul(x, b[1]) - soa.mul(y, b[0])) * inverse_det
         d3 = (soa.mul(a[0], y) - soa.mul(a[1], x)) * inverse_det
-        return [Pair(np.atleast_1d(d1), None), second, Pair(np.atleast_1d(d3), None)], doubt
+        return [Pair(d1, None), second, Pair(d3, None)], doubt
 
     return solve

@@ -22,9 +22,8 @@ import numpy as np
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
-from armkin.ik.elbow import any_branch
 from armkin.ik.geometry import Geometry
-from armkin.ik.subproblems import Candidates, Pair, linear, quadratic, rotation_between, trig_quadratic
+from armkin.ik.subproblems import Candidates, Pair, Prefer, linear, quadratic, rotation_between, trig_quadratic
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -89,7 +88,7 @@ class Position:
         """Quadratic form G with ``b^T G b = |rows b|^2`` (3 x 3); prismatic powers above two stay inside."""
         return np.asarray(rows.T @ rows)
 
-    def solve(self, p: list[Entry], prefer: list[Pair]) -> tuple[list[Pair], Array]:
+    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
         p1 = [np.atleast_1d(np.asarray(v, dtype=float)) for v in soa.apply(self.from_base, p)]
         p1 = list(np.broadcast_arrays(*p1))
@@ -114,7 +113,7 @@ class Position:
             first = Pair(p1[2] - x[2], None)
         else:
             first, doubt1 = rotation_between(x[0], x[1], p1[0], p1[1], self.scale, prefer[0])
-            doubt = doubt | any_branch(doubt1)
+            doubt = doubt | doubt1
         return [first, second, third], doubt
 
     def _tip(self, third: Pair) -> list[Array]:
@@ -141,7 +140,7 @@ class Position:
             six[5] = 0.0
         return six
 
-    def _quartic(self, known: Array, prefer: list[Pair]) -> tuple[Pair, Pair, Array]:
+    def _quartic(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
         inverse_A = np.linalg.inv(self.A)
         g = [self._affine(row, known) for row in inverse_A]  # coefficients of gx, gy
         if self.prismatic[2]:
@@ -154,7 +153,7 @@ class Position:
                         k[i + j] = k[i + j] + quad[i] * quad[j]
             if self.prismatic[0]:  # nothing beyond d^2
                 d, doubt = quadratic(k[2], k[1], k[0], 0, self.scale)
-                return self._turn(g, Pair(d, None), any_branch(doubt), prefer)
+                return self._turn(g, Pair(d, None), doubt, prefer)
             k0, k1, k2, k3, k4 = (v * self.scale**i for i, v in enumerate(k))
             ecc = (k4 + k0 - k2) / 4
             form = [k2 / 2 + ecc, (k0 - k4) / 2, (k1 + k3) / 4, ecc, (k1 - k3) / 4, 0.0 * k0]
@@ -165,7 +164,7 @@ class Position:
         return self._turn(g, Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :]), doubt, prefer)
 
     def _turn(
-        self, g: list[Array], third: Pair, doubt: Array, prefer: list[Pair]
+        self, g: list[Array], third: Pair, doubt: Array, prefer: Prefer
     ) -> tuple[Pair, Pair, Array]:
         """Joint 2 from the known g, given as six coefficients each."""
         last = 2 if third.s is not None else 3
@@ -173,9 +172,9 @@ class Position:
         gx, gy = (six[0] + six[1] * third.c + six[last] * b2 for six in g)
         y = self._tip(third)
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, self.scale, prefer[1])
-        return third, second, doubt | any_branch(doubt2)
+        return third, second, doubt | doubt2
 
-    def _rank_one(self, known: Array, prefer: list[Pair]) -> tuple[Pair, Pair, Array]:
+    def _rank_one(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
             d, doubt = quadratic(alone[3], alone[1], alone[0], 0, self.scale)
@@ -192,9 +191,9 @@ class Position:
         second, doubt2 = linear(
             ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1]
         )
-        return third, second, any_branch(doubt) | any_branch(doubt2)
+        return third, second, doubt | doubt2
 
-    def _slide(self, known: Array, prefer: list[Pair]) -> tuple[Pair, Pair, Array]:
+    def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
         """Joint 2 prismatic: g = y + d2 z."""
         across = [
             [known[k] - self.rows[k] @ self.Y[:, 0], -(self.rows[k] @ self.Y[:, 1]), -(self.rows[k] @ self.Y[:, 2])]
@@ -224,7 +223,7 @@ class Position:
                 rest = rest - curved * third.c**2
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
             d, doubt2 = quadratic(0.5, y[2] + z1, -rest, 1, self.scale)
-            return third, Pair(d, None), any_branch(doubt) | any_branch(doubt2)
+            return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [v / z0 + zero for v in across[0]]
         yz = [self.Y[2, j] + zero for j in range(3)]
@@ -243,9 +242,9 @@ class Position:
         else:
             q, doubt = trig_quadratic(list(six))
             third = Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :])
-        return third, Pair(self._at(d2, third), None), any_branch(doubt)
+        return third, Pair(self._at(d2, third), None), doubt
 
-    def _one_unknown(self, coefficients: list[Array], prefer: list[Pair]) -> tuple[Pair, Array]:
+    def _one_unknown(self, coefficients: list[Array], prefer: Prefer) -> tuple[Pair, Array]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         if self.prismatic[2]:
             slope = coefficients[1]

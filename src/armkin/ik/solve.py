@@ -6,6 +6,7 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `e
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,9 +19,10 @@ from armkin.ik.geometry import Geometry, solver
 from armkin.ik.limits import SLACK, nearest_copy, nearest_row
 from armkin.ik.names import branch_names
 from armkin.ik.solutions import Solutions, Status
-from armkin.ik.subproblems import Pair, distance2, spin
+from armkin.ik.subproblems import Pair, Prefer, distance2, spin
 from armkin.ik.tasks import Task, read_targets
 from armkin.soa import Array, Entry
+from armkin.straight import Straight
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -100,55 +102,118 @@ def _empty(N: int, B: int, n: int) -> _Out:
 
 def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
     """Closed forms: chunks of poses that stay in the cache, entry by entry."""
-    assert geometry.pairs is not None
     link = [soa.constant(L) for L in arm.link]
     out: _Out | None = None
+    runner = _runner(arm, task, geometry)
+    straight = runner.get(len(target))
+    workspace: list[NDArray[np.generic]] = []
     for start in range(0, max(len(target), 1), soa.CHUNK):
         rows = slice(start, start + soa.CHUNK)
         goal = target[rows]
-        entries = soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
-        close: list[Entry] = list(one) if one is not None else list(np.ascontiguousarray(near[rows].T))
-        prefer = [
-            Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(close, arm.prismatic, strict=True)
-        ]
-        pairs, doubt, miss = geometry.pairs(entries, prefer)
-        if miss is None:
-            miss = _miss(arm, task, link, pairs, entries)
-        values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
-        if len(task.sums):
-            miss = np.maximum(miss, _sum_miss(task, values, entries))
-        shape = np.broadcast_shapes((1, 1, 1, len(goal)), *(np.shape(v) for v in values))
-        miss = np.broadcast_to(miss, shape)
+        N = len(goal)
+        entries = _entries(task, goal)
+        if straight is None:
+            *values, miss, doubt = _candidates(arm, task, geometry, link, entries, _prefer(arm, near[rows], one))
+        else:
+            if not workspace or workspace[-1].shape[-1] != N:
+                workspace = straight.workspace(N)
+            *values, miss, doubt = straight.run(entries, workspace)
+        shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))
+        B = int(np.prod(shape[:-1]))
+        miss = np.broadcast_to(miss, shape).reshape(B, N)
         valid = miss <= ACCEPTED**2
-        B, N = int(np.prod(shape[:-1])), len(goal)
         if out is None:
             out = _empty(len(target), B, arm.n)
         part = out.part(rows)
         if N == 0:
             break
-        within = valid
+        within: Bool = valid.reshape(shape)
         for i in range(arm.n):
-            lower, upper = float(arm.lower[i]), float(arm.upper[i])
-            value, inside = values[i], True
-            if arm.prismatic[i]:
-                if np.isfinite([lower, upper]).any():
-                    inside = (value >= lower - SLACK) & (value <= upper + SLACK)
-            else:
-                v = float(close[i]) if one is not None else close[i]
-                value, inside = nearest_copy(value, v, lower, upper)
+            value, inside = _legal(arm, i, values[i], near[rows] if one is None else one)
             part.q[:, :, i] = np.broadcast_to(value, shape).reshape(B, N).T
             if inside is not True:
                 within = within & inside
-        part.valid[...] = valid.reshape(B, N).T
+        part.valid[...] = valid.T
         part.within[...] = within.reshape(B, N).T
         part.branch[...] = np.arange(B, dtype=np.int8)
-        count = part.valid.sum(axis=1)
+        count = valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE
-        worth = (miss <= NEARBY**2) & ~valid
-        doubt = doubt | worth.reshape(B, N).any(axis=0)
-        _tidy(arm, task, part, goal, near[rows], np.flatnonzero(doubt), count < B)
+        edge = np.broadcast_to(doubt, shape).reshape(B, N) | ((miss <= NEARBY**2) & ~valid) | np.isnan(miss)
+        doubtful = np.flatnonzero(edge.any(axis=0))
+        if len(doubtful) and straight is not None:
+            # again, with the preferred values for joints that are free
+            again = _candidates(
+                arm, task, geometry, link, _entries(task, goal[doubtful]), _prefer(arm, near[rows][doubtful], one)
+            )
+            few = (*shape[:-1], len(doubtful))
+            for i in range(arm.n):
+                part.q[doubtful, :, i] = np.broadcast_to(again[i], few).reshape(B, -1).T
+        _tidy(arm, task, part, goal, near[rows], doubtful, count < B)
     assert out is not None
     return out
+
+
+def _entries(task: Task, goal: Array) -> list[Entry]:
+    """Targets (N, m) or (N, 4, 4) as arrays of length N."""
+    return soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+
+
+def _prefer(arm: Arm, near: Array, one: Array | None) -> list[Pair]:
+    """What a free joint is given: near (N, n), or one (n,) for all."""
+    values = list(one) if one is not None else list(np.ascontiguousarray(near.T))
+    return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
+
+
+def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
+    """A joint's values at their nearest legal copies, and whether they are within limits."""
+    lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
+    if not arm.prismatic[joint]:
+        close = float(near[joint]) if near.ndim == 1 else near[:, joint]
+        return nearest_copy(value, close, lower, upper)
+    if lower == -np.inf and upper == np.inf:
+        return value, True
+    return value, (value >= lower - SLACK) & (value <= upper + SLACK)
+
+
+def _candidates(
+    arm: Arm, task: Task, geometry: Geometry, link: list[soa.Pose], goal: list[Entry], prefer: Prefer
+) -> list[Entry]:
+    """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
+    assert geometry.pairs is not None
+    pairs, doubt, miss = geometry.pairs(goal, prefer)
+    if miss is None:
+        miss = _miss(arm, task, link, pairs, goal)
+    values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
+    if len(task.sums):
+        miss = np.maximum(miss, _sum_miss(task, values, goal))
+    return [*values, miss, doubt]
+
+
+class _Runner:
+    """Records the candidates' formula as straight-line code once that pays: it takes some milliseconds."""
+
+    def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
+        self.what = (arm, task, geometry)
+        self.calls = 0
+        self.straight: Straight | None = None
+
+    def get(self, batch: int) -> Straight | None:
+        arm, task, geometry = self.what
+        self.calls += 1
+        if self.straight is None and geometry.straight and (batch >= 64 or self.calls > 4):
+            link = [soa.constant(L) for L in arm.link]
+            inputs = 12 if task.orientation == "full" else len(task.labels)
+
+            def formula(goal: list[Entry]) -> list[Entry]:
+                return _candidates(arm, task, geometry, link, goal, [None] * arm.n)
+
+            self.straight = Straight(formula, inputs)
+        return self.straight
+
+
+@lru_cache(maxsize=64)
+def _runner(arm: Arm, task: Task, geometry: Geometry) -> _Runner:
+    return _Runner(arm, task, geometry)
 
 
 def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
@@ -219,7 +284,7 @@ def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: l
     return total
 
 
-def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Array:
+def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Entry:
     """Squared residual of the sums of joint values, modulo whole turns."""
     total: Entry = 0.0
     for k, weights in enumerate(task.sums):
@@ -228,4 +293,4 @@ def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Array:
             angle = soa.sub(angle, soa.mul(float(w), value))
         angle = angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
         total = soa.add(total, angle * angle)
-    return np.asarray(total)
+    return total

@@ -13,10 +13,10 @@ import numpy as np
 
 from armkin import soa
 from armkin.ik.chain import Chain, inverse, is_parallel, reverse
-from armkin.ik.elbow import Elbow, any_branch
+from armkin.ik.elbow import Elbow
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Candidates, Pair, distance2, linear, rotation_between, spin
+from armkin.ik.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Pose
 
@@ -33,18 +33,19 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if centre is not None:
         wrist = SphericalWrist(chain, *centre)
         why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
-        return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels)
+        return Geometry("spherical wrist", why, True, wrist.solve, straight=wrist.straight, labels=wrist.labels)
     chain = reverse(chain)
     centre = wrist_centre(chain, EXACT * arm.reach)
     if centre is None:
         return None
     shoulder = SphericalWrist(chain, *centre)
 
-    def solve(goal: Pose, prefer: list[Pair]) -> Candidates:
+    def solve(goal: Pose, prefer: Prefer) -> Candidates:
         found = shoulder.solve(soa.inverse(goal), prefer[::-1])
         return found._replace(pairs=found.pairs[::-1])
 
-    return Geometry("spherical shoulder", f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}", True, solve)
+    why = f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}"
+    return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight)
 
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
@@ -74,10 +75,12 @@ class SphericalWrist:
             elbow = Elbow(chain, after3)
             self.place = lambda p, prefer: elbow.solve(p, [0.0, 0.0, 0.0], prefer)
             self.why = "axes 2 and 3 are parallel"
+            self.straight = True
             self.labels = ("shoulder", "elbow", "wrist")
         else:
             position = Position(chain, after3)
             self.place = position.solve
+            self.straight = False
             self.why = f"joints 1, 2 and 3: {position.why}"
         self.links = [soa.constant(L) for L in chain.link[:4]]
         self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
@@ -95,7 +98,7 @@ class SphericalWrist:
         self.rest5 = float(A[2, 2] * b[2])
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
 
-    def solve(self, goal: Pose, prefer: list[Pair]) -> Candidates:
+    def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
         centre = soa.apply(goal, self.centre)
         pairs, doubt = self.place(centre, prefer[:3])
@@ -117,7 +120,7 @@ class SphericalWrist:
         # what is left is Rz(q6): its first column
         back = soa.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
         c6, s6, _ = soa.turn_back(self.B, back)
-        doubt = doubt | any_branch(doubt5) | any_branch(doubt4)
+        doubt = doubt | doubt5 | doubt4
         # the centre is where it must be, and so are the wrist's first and last columns
         column = soa.turn(turn5, soa.combine(c6, self.B[0:3], s6, self.B[3:6]))
         miss = miss + distance2(spin(c4, s4, u), z)

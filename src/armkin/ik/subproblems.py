@@ -11,6 +11,7 @@ The caller says which axis by the shape of `signs`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +30,14 @@ class Pair(NamedTuple):
     s: Entry
 
 
+# What to give a joint that a target leaves free, or None.
+Prefer = Sequence[Pair | None]
+
+
 class Candidates(NamedTuple):
     """What a closed form returns: candidate branches, not yet told from false ones.
 
-    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: (N,) targets on an edge. miss:
+    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these, branches on an edge. miss:
     squared residual of every branch (lengths in units of the reach), recomputed from the
     pairs, if the geometry has a shorter way than the whole chain; else None.
     """
@@ -65,49 +70,57 @@ def signs(axis: int) -> Array:
 
 
 def linear(
-    a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair, disc: Entry | None = None
+    a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair | None, disc: Entry | None = None
 ) -> tuple[Pair, Array]:
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
     a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
     length that makes a and b dimensionless; prefer: the angle to give where the equation
-    leaves it free; disc: ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a boolean array: True where the roots are
+    leaves it free, or None to do without (such targets are in doubt and looked at again); disc: ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a boolean array: True where the roots are
     about to merge or the angle is free. Without a real root the pair is that of the closest
     angle, not normalised; the caller finds by its residual that it is no solution.
     """
     sign = signs(axis)
     h2 = soa.add(soa.mul(a, a), soa.mul(b, b))
-    free = h2 < FREE * scale * scale
     if disc is None:
         disc = h2 - c * c
-    doubt = (np.abs(disc) < TANGENT * h2) | free
+    doubt = np.abs(disc) < TANGENT * h2
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
+    least = FREE * scale * scale
     if isinstance(h2, float):
-        inverse = 1.0 / h2 if h2 > 0.0 else 0.0
+        if h2 < least:
+            doubt = (c == c) | doubt  # the equation says nothing about the angle, whatever the target
+        inverse: Entry = 1.0 / max(h2, least)
     else:
-        inverse = 1.0 / np.where(free, 1.0, h2)
+        doubt = doubt | (h2 < least)
+        inverse = 1.0 / np.maximum(h2, least)
     ci, ri = c * inverse, root * inverse
     cos = soa.sub(soa.mul(a, ci), soa.mul(b, ri))
     sin = soa.add(soa.mul(b, ci), soa.mul(a, ri))
-    if np.any(free):
-        cos, sin = np.where(free, prefer.c, cos), np.where(free, prefer.s, sin)
-    return Pair(cos, sin), doubt
+    return _prefer(Pair(cos, sin), h2 < least, prefer), doubt
 
 
-def rotation_between(ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: float, prefer: Pair) -> tuple[Pair, Array]:
+def rotation_between(
+    ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: float, prefer: Pair | None
+) -> tuple[Pair, Array]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
     Returns the pair and doubt: True where u or v vanishes, so that the angle is free.
     """
     c = soa.add(soa.mul(ux, vx), soa.mul(uy, vy))
     s = soa.sub(soa.mul(ux, vy), soa.mul(uy, vx))
-    h2 = c * c + s * s
-    free = h2 < (FREE * scale * scale) ** 2
-    inverse = 1.0 / np.sqrt(np.where(free, 1.0, h2)) if np.any(free) else 1.0 / np.sqrt(h2)
-    c, s = c * inverse, s * inverse
-    if np.any(free):
-        c, s = np.where(free, prefer.c, c), np.where(free, prefer.s, s)
-    return Pair(c, s), free
+    h2 = soa.add(soa.mul(c, c), soa.mul(s, s))
+    least = (FREE * scale * scale) ** 2
+    free = h2 < least
+    inverse = 1.0 / np.sqrt(np.maximum(h2, least))
+    return _prefer(Pair(c * inverse, s * inverse), free, prefer), free
+
+
+def _prefer(pair: Pair, free: Array, prefer: Pair | None) -> Pair:
+    """The pair, with the preferred angle where it is free."""
+    if prefer is None or not np.any(free):
+        return pair
+    return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
 
 
 def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Array, Array]:
@@ -120,7 +133,7 @@ def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Ar
     size = soa.add(soa.add(abs(a), abs(b)), abs(c))
     inverse = 1.0 / np.maximum(size, 1e-300)
     a, b, c = a * inverse, b * inverse, c * inverse
-    pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, Pair(1.0, 0.0))
+    pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, None)
     with np.errstate(divide="ignore", invalid="ignore"):
         # tan(q/2) = s / (1 + c) = (1 - c) / s: the form without cancellation
         t = np.where(pair.c > 0.0, pair.s / (1.0 + pair.c), (1.0 - pair.c) / pair.s)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
+from armkin import soa
 from armkin.ik.chain import Chain, axes
 from armkin.soa import Array
 
@@ -121,10 +122,18 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
             raise UsageError("a target's axis ax ay az has no length; give the direction of the tool's z axis")
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
     if task.orientation == "full":
-        R = flat[:, :3, :3]
-        if np.abs(np.einsum("nij,nkj->nik", R, R) - np.eye(3)).max(initial=0.0) > 1e-6 or (np.linalg.det(R) < 0).any():
-            raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
+        for start in range(0, len(flat), soa.CHUNK):
+            if not _are_rotations(soa.read(flat[start : start + soa.CHUNK])):
+                raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
     return flat, lead
+
+
+def _are_rotations(P: soa.Pose) -> bool:
+    """Whether the columns x and z are unit vectors at right angles and y = z x x, to 1e-6."""
+    x, y, z = P[0:3], P[3:6], P[6:9]
+    off = [soa.dot(x, x) - 1.0, soa.dot(z, z) - 1.0, soa.dot(x, z)]
+    off += [a - b for a, b in zip(soa.cross(z, x), y, strict=True)]
+    return all(float(np.abs(e).max(initial=0.0)) <= 1e-6 for e in off)
 
 
 def residual(task: Task, T: Array, q: Array, target: Array) -> Array:

@@ -15,9 +15,9 @@ import numpy as np
 
 from armkin import soa
 from armkin.ik.chain import Chain, inverse, is_parallel, reverse
-from armkin.ik.elbow import TwoLink, any_branch
+from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import EXACT, Geometry
-from armkin.ik.subproblems import Candidates, Pair, distance2, linear, rotation_between, spin
+from armkin.ik.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Pose
 
@@ -32,17 +32,17 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     chain = Chain(arm.link, arm.prismatic)
     if fits(chain, EXACT * arm.reach):
         why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
-        return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=("shoulder", "elbow", "wrist"))
+        return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, straight=True, labels=("shoulder", "elbow", "wrist"))
     chain = reverse(chain)
     if not fits(chain, EXACT * arm.reach):
         return None
     solver = ThreeParallel(chain)
 
-    def solve(goal: Pose, prefer: list[Pair]) -> Candidates:
+    def solve(goal: Pose, prefer: Prefer) -> Candidates:
         found = solver.solve(soa.inverse(goal), prefer[::-1])
         return found._replace(pairs=found.pairs[::-1])
 
-    return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
+    return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve, straight=True)
 
 
 def fits(chain: Chain, tolerance: float) -> bool:
@@ -96,7 +96,7 @@ class ThreeParallel:
         fore = L2[:3, :3] @ L3[:3, 3]
         self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
 
-    def solve(self, goal: Pose, prefer: list[Pair]) -> Candidates:
+    def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
         D = soa.times(soa.times(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
         n, o = self.shoulder[6:9], self.shoulder[9:12]
@@ -130,7 +130,7 @@ class ThreeParallel:
         for pair, sense in ((second, 1.0), (third, self.sense3)):
             c, s = c * pair.c + sense * s * pair.s, s * pair.c - sense * c * pair.s
         fourth = Pair(c, self.sense4 * s)
-        doubt = any_branch(doubt1) | any_branch(doubt5) | any_branch(doubt6) | doubt23
+        doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, its x
         # axis, and the common direction
         reached = spin(*second, self.two_link.reach(third))

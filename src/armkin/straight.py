@@ -1,0 +1,125 @@
+"""Straight-line numpy code from formulas: a formula is run once on symbols and its operations recorded.
+
+The closed forms and the forward kinematics are written as ordinary functions of arrays.
+Called on arrays they spend much of their time in Python: one call for every product of two
+numbers of which one is a known zero. Called once on `Node` symbols they leave behind the
+list of what really has to be computed; equal operations are found to be equal, and what is
+left runs as a flat sequence of numpy calls into buffers that are used again and again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.soa import Array
+
+_BOOL = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "logical_or", "equal"}
+
+
+class Node(np.lib.mixins.NDArrayOperatorsMixin):
+    """An array that is not there yet: what numpy is asked to do with it is recorded.
+
+    axes: lengths of the branch axes in front of the batch axis, () for a plain (N,) array.
+    """
+
+    def __init__(self, trace: _Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...]) -> None:
+        self.trace, self.op, self.args, self.axes = trace, op, args, axes
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Node:
+        if method != "__call__" or options:
+            raise TypeError(f"{ufunc.__name__}.{method} cannot be recorded")
+        return self.trace.record(ufunc.__name__, inputs)
+
+
+class _Trace:
+    """The operations recorded so far, equal ones once."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.known: dict[tuple[Any, ...], Node] = {}
+
+    def record(self, op: str, inputs: Sequence[Any]) -> Node:
+        key = (op, *(id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs))
+        if key not in self.known:
+            axes = np.broadcast_shapes(*(_axes(x) for x in inputs))
+            self.known[key] = Node(self, op, tuple(inputs), axes)
+            self.nodes.append(self.known[key])
+        return self.known[key]
+
+
+def _constant_key(x: Any) -> tuple[Any, ...]:
+    return ("constant", np.shape(x), np.asarray(x).tobytes())
+
+
+def _axes(x: Any) -> tuple[int, ...]:
+    if isinstance(x, Node):
+        return x.axes
+    return np.shape(x)[:-1] if np.ndim(x) else ()
+
+
+class Straight:
+    """A recorded formula. Call it with its input arrays, all (N,)."""
+
+    def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
+        """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
+        trace = _Trace()
+        symbols = [Node(trace, "input", (), ()) for _ in range(inputs)]
+        outputs = formula(list(symbols))
+        names: dict[int, str] = {id(node): f"i{k}" for k, node in enumerate(symbols)}
+        constants: dict[str, Any] = {}
+        wanted = _needed(trace.nodes, outputs)
+        last = {id(x): k for k, node in enumerate(wanted) for x in node.args}
+        last |= {id(x): len(wanted) for x in outputs}
+        self._buffers: list[tuple[tuple[int, ...], type]] = []
+        free: dict[tuple[tuple[int, ...], type], list[str]] = {}
+        kinds: dict[int, tuple[tuple[int, ...], type]] = {}
+        lines, used = [], set()
+
+        def name(x: Any) -> str:
+            if isinstance(x, Node):
+                return names[id(x)]
+            if np.ndim(x) == 0:
+                return repr(float(x))
+            constants[f"k{len(constants)}"] = x
+            return f"k{len(constants) - 1}"
+
+        for k, node in enumerate(wanted):
+            arguments = [name(x) for x in node.args]
+            for x in {id(x): x for x in node.args}.values():
+                if isinstance(x, Node) and x.op != "input" and last[id(x)] == k:
+                    free.setdefault(kinds[id(x)], []).append(names[id(x)])
+            kind = kinds[id(node)] = (node.axes, bool if node.op in _BOOL else float)
+            if free.get(kind):
+                names[id(node)] = free[kind].pop()
+            else:
+                names[id(node)] = f"b{len(self._buffers)}"
+                self._buffers.append(kind)
+            used.add(node.op)
+            lines.append(f"{node.op}({', '.join(arguments)}, {names[id(node)]})")
+        parameters = [f"i{k}" for k in range(inputs)] + [f"b{k}" for k in range(len(self._buffers))]
+        source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(map(name, outputs))},)"])
+        scope: dict[str, Any] = {**constants, **{op: getattr(np, op) for op in used}}
+        exec(source, scope)  # the text is made above, of operation names and numbers alone
+        self._run = scope["run"]
+
+    def workspace(self, length: int) -> list[NDArray[Any]]:
+        """Buffers for batches of that length, to be passed to `run`; one set for each thread."""
+        return [np.empty((*axes, length), dtype) for axes, dtype in self._buffers]
+
+    def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
+        """The formula's outputs; they stand in the workspace until its next use."""
+        result: tuple[Any, ...] = self._run(*inputs, *workspace)
+        return result
+
+
+def _needed(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
+    """The operations that the outputs depend on, in order."""
+    needed = {id(x) for x in outputs if isinstance(x, Node)}
+    for node in reversed(nodes):
+        if id(node) in needed:
+            needed |= {id(x) for x in node.args if isinstance(x, Node)}
+    return [node for node in nodes if id(node) in needed]
