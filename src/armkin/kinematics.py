@@ -49,25 +49,7 @@ def position(arm: Arm, q: ArrayLike) -> Array:
 
     q: (..., n) [rad | mm]. Returns (..., 3) [mm].
     """
-
-    def point(q: list[Entry], out: Array) -> None:
-        p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
-        for i in reversed(range(arm.n)):
-            if arm.prismatic[i]:
-                p = [p[0], p[1], soa.add(p[2], q[i])]
-            else:
-                c, s = soa.cos_sin(q[i])
-                x, y = p[0], p[1]
-                p = [
-                    soa.sub(soa.mul(c, x), soa.mul(s, y)),
-                    soa.add(soa.mul(s, x), soa.mul(c, y)),
-                    p[2],
-                ]
-            p = soa.apply(soa.constant(arm.link[i]), p)
-        for row, entry in enumerate(p):
-            out[..., row] = entry
-
-    return _batched(arm, q, (3,), point)
+    return _batched(arm, as_joints(arm, q), (3,), _point)
 
 
 def frames(arm: Arm, q: ArrayLike) -> Array:
@@ -176,6 +158,20 @@ def _jacobian(arm: Arm, q: list[Entry]) -> list[Entry]:
 def _rows(P: Pose) -> list[Entry]:
     """A pose as the 16 entries of its matrix, row by row."""
     return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
+
+
+def _point(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The tool's position, from the tool back to the base: a point is cheaper to carry than a pose."""
+    p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
+    for i in reversed(range(arm.n)):
+        if arm.prismatic[i]:
+            p = [p[0], p[1], soa.add(p[2], q[i])]
+        else:
+            c, s = soa.cos_sin(q[i])
+            x, y, z = p
+            p = [soa.sub(soa.mul(c, x), soa.mul(s, y)), soa.add(soa.mul(s, x), soa.mul(c, y)), z]
+        p = soa.apply(soa.constant(arm.link[i]), p)
+    return p
 
 
 def _single(arm: Arm, q: Array) -> Array:
