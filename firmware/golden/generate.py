@@ -9,6 +9,10 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 AXES = 5  # uno_cnc_shield: X Y Z A and a servo
+BOARDS = {  # id, axes, servos, switches, rows, queue, frame
+    "uno_cnc_shield": (1, 5, 0x10, 3, 5, 32, 160),
+    "uno_servos": (3, 6, 0x3F, 0, 6, 32, 160),
+}
 
 
 def cobs(data: bytes) -> bytes:
@@ -87,15 +91,15 @@ def ack(next_: int, error: int = 0, detail: int = 0, state: int = 0, free: int =
     return struct.pack("<6BH", 0x80, next_, error, detail, state, free, queued)
 
 
-def info(tag: int, nonce: int, config_crc: int, known: int, flags: int) -> str:
-    head = struct.pack("<BBB", 0x81, tag, 1).hex() + "????" + struct.pack("<IBBHBBBB", nonce, 1, 5, 16, 3, 5, 32, 160).hex()
+def info(tag: int, nonce: int, config_crc: int, known: int, flags: int, board: str = "uno_cnc_shield") -> str:
+    head = struct.pack("<BBB", 0x81, tag, 1).hex() + "????" + struct.pack("<IBBHBBBB", nonce, *BOARDS[board]).hex()
     return head + "????" + struct.pack("<IIHB", 16_000_000, config_crc, known, flags).hex() + "??????"
 
 
 def report(tag: int, next_: int, error: int, detail: int, state: int, flags: int, known: int, counts: list[int],
            free: int = 32, queued: int = 0, page: int = 0, bad: str = "00") -> str:
     head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
-    return head + "??00" + bad + struct.pack(f"<B{AXES}i", page, *counts).hex()
+    return head + "??00" + bad + struct.pack(f"<B{len(counts)}i", page, *counts).hex()
 
 
 def steps_of(segments: list[Segment]) -> list[int]:
@@ -165,8 +169,8 @@ def frames() -> str:
 class Talk:
     """Collects the lines of a conversation; `tag` counts the sequence."""
 
-    def __init__(self, title: str) -> None:
-        self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", "board uno_cnc_shield"]
+    def __init__(self, title: str, board: str = "uno_cnc_shield") -> None:
+        self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", f"board {board}"]
 
     def note(self, text: str) -> None:
         self.lines.append(f"# {text}")
@@ -314,6 +318,47 @@ def talks() -> None:
     t.write("noise.talk")
 
 
+def servo_talk() -> None:
+    """Two joints of a servo arm: the count is the pulse width."""
+    board, crc_of = "uno_servos", zlib.crc32
+    img = struct.pack("<8BI", 1, 6, 0, 0, 0, 0, 0, 0, 7)
+    img += struct.pack("<BiiiHI", 1, 500, 2500, 1500, 1000, 4000) * 2
+    img += struct.pack("<BiiiHI", 0, 0, 0, 0, 0, 0) * 4
+    t = Talk("Servos: a start pose and consent before the first pulse, then motion like any other", board)
+    t.say(hello(1, 1), info(1, 1, 0, 0, 0, board))
+    t.say(config(0, 0, img), ack(1))
+    t.say(commit(1, img), ack(2))
+    t.note("nobody has said where the servos stand, then nobody has consented to pulses")
+    move: list[Segment] = [(100, 16000, 0, [50, -100]), (100, 32000, 0, [0, -50])]
+    t.say(motion(2, 3, 3, [1500, 1500], [1550, 1350], move), ack(2, 9, 0))
+    t.say(hello(1, 2), info(1, 2, crc_of(img), 0, 4, board))
+    t.say(set_position(0, 3, [1500, 2501]), ack(0, 5, 1))
+    t.say(hello(1, 3), info(1, 3, crc_of(img), 0, 4, board))
+    t.say(set_position(0, 3, [1500, 1500]), ack(1))
+    t.say(motion(1, 3, 3, [1500, 1500], [1550, 1350], move), ack(1, 11, 0))
+    t.say(hello(1, 4), info(1, 4, crc_of(img), 3, 4, board))
+    t.say(enable(0, 2), ack(1))
+    t.say(motion(1, 3, 3, [1500, 1500], [1550, 1350], move), ack(2, 0, 0, 1, 30, units(move)))
+    t.raw("wait 400")
+    t.say(status(5), report(5, 2, 0, 0, 0, 6, 3, [1550, 1350, 0, 0, 0, 0]))
+    t.note("beyond the pulse that the joint may have")
+    t.say(motion(2, 3, 3, [1550, 1350], [2501, 1350], [(951, 16000, 0, [951, 0])]), ack(2, 17, 0))
+    t.note("after a reset at rest the position is retained, the pulses wait for consent")
+    t.raw("reset")
+    t.say(hello(1, 5), info(1, 5, crc_of(img), 3, 0b1100, board))
+    t.say(motion(0, 1, 3, [1550], [1560], [(10, 16000, 0, [10])]), ack(0, 11, 0))
+    t.say(hello(1, 6), info(1, 6, crc_of(img), 3, 0b1100, board))
+    t.say(enable(0, 2), ack(1))
+    t.say(motion(1, 1, 3, [1550], [1560], [(10, 16000, 0, [10])]), ack(2, 0, 0, 1, 31, units([(10, 16000, 0, [10])])))
+    t.raw("wait 50")
+    t.say(status(6), report(6, 2, 0, 0, 0, 0b1110, 3, [1560, 1350, 0, 0, 0, 0]))
+    t.note("pulses off: the servos may go anywhere, so they are lost")
+    t.say(enable(2, 0), ack(3))
+    t.say(status(7), report(7, 3, 0, 0, 0, 4, 0, [1560, 1350, 0, 0, 0, 0]))
+    t.write("servos.talk")
+
+
 if __name__ == "__main__":
     (HERE / "frames.txt").write_text(frames())
     talks()
+    servo_talk()

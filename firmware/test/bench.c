@@ -82,6 +82,9 @@ static void tick(void) {
         }
     }
     bench_ticks++;
+    if (bench_on_tick) {
+        bench_on_tick();
+    }
     if (dda.probe) {
         dda_probe((bench_switches >> probe_input & 1) == probe_high);
     }
@@ -92,9 +95,6 @@ static void tick(void) {
         next_tick += interval;
     } else {
         timer_on = false;
-    }
-    if (bench_on_tick) {
-        bench_on_tick();
     }
 }
 

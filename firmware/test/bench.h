@@ -21,4 +21,4 @@ extern bool bench_abort;           // level
 extern uint64_t bench_cycles;
 extern uint64_t bench_ticks;
 extern bool bench_drivers_on;
-extern void (*bench_on_tick)(void);  // after each tick
+extern void (*bench_on_tick)(void);  // with each tick, once its edges are out

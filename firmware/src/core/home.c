@@ -10,6 +10,7 @@ struct home home;
 bool home_finished;
 
 static enum phase phase;
+static uint32_t overshoot;  // leader counts from the edge to where the first approach came to rest
 static bool reached;      // this phase has what it wanted: come to rest, then go on
 static uint8_t steady;    // ms that the switch has said the same
 static uint16_t seen_left;
@@ -66,7 +67,7 @@ static void look(void) {
             }
             break;
         case BACK_OFF:
-            reached = covered + cruise_brake() >= home.backoff;
+            reached = covered + cruise_brake() >= overshoot + home.backoff;
             break;
         case TOUCH:
             reached = steady >= DEBOUNCE_MS;
@@ -85,9 +86,12 @@ static void next_phase(void) {
         case RELEASE:
             enter(APPROACH, 1, 1);
             break;
-        case APPROACH:
+        case APPROACH: {
+            const int32_t past = motion.plan[cruise.leader] - motion.latch[cruise.leader];
+            overshoot = past < 0 ? -past : past;
             enter(BACK_OFF, -1, 1);
             break;
+        }
         case BACK_OFF:
             if (pressed()) {
                 session_end(E_SWITCH, 0);

@@ -175,6 +175,14 @@ static enum error enable_frame(const uint8_t *p, uint8_t length) {
     return OK;
 }
 
+// A stepper may stand beyond its limits (at its switch); a servo has no place there.
+static bool possible(uint8_t axis, int32_t count) {
+    if (axis < STEPPERS) {
+        return count >= -FARTHEST && count <= FARTHEST;
+    }
+    return count >= memory.image.axis[axis].lower && count <= memory.image.axis[axis].upper;
+}
+
 static enum error position_frame(const uint8_t *p, uint8_t length) {
     if (length < 4) {
         return E_LENGTH;
@@ -200,8 +208,7 @@ static enum error position_frame(const uint8_t *p, uint8_t length) {
         }
         const int32_t count = (int32_t)get32(next);
         next += 4;
-        if (i >= AXES || !(limits.used >> i & 1) || count < -FARTHEST || count > FARTHEST ||
-            (i >= STEPPERS && !within(memory.image.axis[i].lower, memory.image.axis[i].upper, count, count))) {
+        if (i >= AXES || !(limits.used >> i & 1) || !possible(i, count)) {
             return fault(E_VALUE, i);
         }
         if (memory.known >> i & 1) {
