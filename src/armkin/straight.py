@@ -32,7 +32,7 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Node:
         if method != "__call__" or options:
             raise TypeError(f"{ufunc.__name__}.{method} cannot be recorded")
-        return self.trace.record(ufunc.__name__, inputs)
+        return self.trace.simplify(ufunc.__name__, inputs)
 
 
 class _Trace:
@@ -42,6 +42,35 @@ class _Trace:
         self.nodes: list[Node] = []
         self.known: dict[tuple[Any, ...], Node] = {}
 
+    def simplify(self, op: str, inputs: Sequence[Any]) -> Any:
+        """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards."""
+        if op == "negative":
+            x = inputs[0]
+            return x.args[0] if x.op == "negative" else self.record(op, inputs)
+        if op in ("multiply", "add", "subtract"):
+            a, b = inputs
+            minus_a, minus_b = _is_negative(a), _is_negative(b)
+            a, b = (a.args[0] if minus_a else a), (b.args[0] if minus_b else b)
+            if op == "multiply":
+                for x, y in ((a, b), (b, a)):
+                    if np.ndim(x) == 0 and not isinstance(x, Node) and abs(x) in (0.0, 1.0):
+                        if x == 0.0:
+                            return 0.0
+                        return self._signed(y, (x < 0) != (minus_a != minus_b))
+                return self._signed(self.record(op, (a, b)), minus_a != minus_b)
+            minus_b ^= op == "subtract"
+            if _is_zero(b):
+                return self._signed(a, minus_a)
+            if _is_zero(a):
+                return self._signed(b, minus_b)
+            if minus_a == minus_b:
+                return self._signed(self.record("add", (a, b)), minus_a)
+            return self.record("subtract", (b, a) if minus_a else (a, b))
+        return self.record(op, inputs)
+
+    def _signed(self, x: Any, minus: bool) -> Any:
+        return self.simplify("negative", (x,)) if minus and isinstance(x, Node) else -x if minus else x
+
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
         key = (op, *(id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs))
         if key not in self.known:
@@ -49,6 +78,14 @@ class _Trace:
             self.known[key] = Node(self, op, tuple(inputs), axes)
             self.nodes.append(self.known[key])
         return self.known[key]
+
+
+def _is_negative(x: Any) -> bool:
+    return isinstance(x, Node) and x.op == "negative"
+
+
+def _is_zero(x: Any) -> bool:
+    return not isinstance(x, Node) and np.ndim(x) == 0 and x == 0.0
 
 
 def _constant_key(x: Any) -> tuple[Any, ...]:
