@@ -123,7 +123,9 @@ def test_polish_keeps_the_best_point_and_says_how_far_it_is() -> None:
 def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Array]:
     """Solve for the poses of q: the generating joints are found, every branch is exact, none comes twice."""
     T = forward(arm, q)
-    found, doubtful = solve(arm, T)
+    plan = elimination.prepare(*arm)
+    assert plan.complete
+    found, doubtful = elimination.solve(plan, T)
     lost = miss(arm, q, found) > within
     assert not lost.any(), f"{lost.sum()} of {len(q)} lost, the first: {q[lost][0]}"
     assert pose_residual(arm, found, T) < 1e-10
@@ -349,10 +351,16 @@ def test_no_targets_unreachable_targets_and_targets_that_are_no_numbers() -> Non
     np.testing.assert_allclose(found[2], alone[0], atol=1e-11)
 
 
-def test_a_pose_has_the_same_branches_in_any_batch() -> None:
+def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     arm = ARMS["CRX"]
     plan = elimination.prepare(*arm)
     T = forward(arm, random_joints(arm, 600, 15))
+    whole, doubt = elimination.solve(plan, T)
+    monkeypatch.setattr(elimination, "BLOCK", 512)
+    together, doubtful = elimination.solve(plan, T)
+    np.testing.assert_array_equal(np.isnan(together), np.isnan(whole))
+    np.testing.assert_allclose(together, whole, atol=1e-9)
+    np.testing.assert_array_equal(doubtful, doubt)
     together, _ = elimination.solve(plan, T)
     for i in (0, 255, 256, 599):
         alone, _ = elimination.solve(plan, T[i : i + 1])
@@ -377,7 +385,9 @@ def test_base_and_tool_anywhere() -> None:
 def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     """Joints 1 and 2 on one line: every solution lies on a curve of solutions."""
     arm = dh([0, 90, 90, 60, 60, 0], [0, 300, 0, 50, 0, 0], [100, 50, 20, 250, 80, 100], [0.0] * 6)
-    found, doubtful = solve(arm, forward(arm, random_joints(arm, 20, 18)))
+    plan = elimination.prepare(*arm)
+    assert not plan.complete
+    found, doubtful = elimination.solve(plan, forward(arm, random_joints(arm, 20, 18)))
     assert found.shape[1] <= 16
     assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
 

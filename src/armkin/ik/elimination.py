@@ -49,6 +49,7 @@ Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
 CHUNK = 256  # poses worked on at once: more of them leave the cache
+BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
 ACCEPTED = 1e-10  # residual of an answer, lengths scaled
 TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
@@ -70,6 +71,11 @@ class Elimination:
     loop: Loop
     plans: tuple[Pencil, ...]
     score: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether the completeness argument of the module's text holds: a regular pencil was found."""
+        return self.score < HEALTHY
 
 
 def prepare(link: Array, prismatic: Bool) -> Elimination:
@@ -180,6 +186,18 @@ def solve(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
         doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
         answers that were merged across more than rounding, or with two roots that just touch or just miss.
     """
+    count = T.shape[0]
+    parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
+    q = np.full((count, max((part.shape[1] for part, _ in parts), default=0), 6), np.nan)
+    doubtful = np.zeros(count, dtype=np.bool_)
+    for number, (branches, doubt) in enumerate(parts):
+        rows = slice(number * BLOCK, number * BLOCK + len(doubt))
+        q[rows, : branches.shape[1]], doubtful[rows] = branches, doubt
+    return q, doubtful
+
+
+def _solve_block(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
+    """`solve` for as many targets as one should keep intermediate results of."""
     closed, count = elimination.loop, T.shape[0]
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
     goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))

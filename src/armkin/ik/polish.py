@@ -115,7 +115,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         index = active[better]
         best[:, index], residual[index] = value[:, better], size[better]
         # While the residual falls steeply the last inverse Jacobian is good for one more step.
-        stale = np.flatnonzero(size > 1e-3 * last)
+        stale = np.flatnonzero((size > 1e-3 * last) & (size > CONVERGED)) if step else active
         last = size
         if stale.size:
             chosen = slice(None) if stale.size == active.size else stale
