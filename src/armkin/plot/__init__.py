@@ -1,0 +1,14 @@
+"""Pictures (extra ``armkin[plot]``): the arm in one or many poses, and the cloud of its workspace.
+
+    skeleton.py  an arm's pose as lines and points; numpy only
+    canvas.py    matplotlib: figures, axes in true proportion, files
+    poses.py     `plot_poses`: branches, a path, a single pose
+    cloud.py     `plot_workspace`: the cloud and its projections
+
+The same input gives the same file, to the byte.
+"""
+
+from armkin.plot.cloud import plot_workspace
+from armkin.plot.poses import plot_poses
+
+__all__ = ["plot_poses", "plot_workspace"]
