@@ -25,7 +25,7 @@ struct image host_image(void) {
     return image;
 }
 
-// The next answer of this type; ACKs that come unasked are passed over when a STATUS or INFO is awaited.
+// The next answer of this type; CREDIT that comes unasked is passed over.
 static size_t answer(uint8_t type, uint8_t *payload) {
     for (;;) {
         const size_t length = bench_answer(payload, 300);
@@ -33,7 +33,7 @@ static size_t answer(uint8_t type, uint8_t *payload) {
         if (payload[0] == type) {
             return length;
         }
-        CHECK(payload[0] == 0x80);
+        CHECK(payload[0] == 0x83);
     }
 }
 
@@ -41,12 +41,9 @@ static struct ack read_ack(const uint8_t *p) {
     return (struct ack){p[0], p[1], p[2], p[3], p[4], get16(p + 5)};
 }
 
-// The last ACK there is: an unasked one may stand before it.
 static struct ack await_ack(void) {
     uint8_t payload[300];
     CHECK(answer(0x80, payload) == 8);
-    while (bench_answer(payload, sizeof payload)) {
-    }
     return read_ack(payload + 1);
 }
 

@@ -276,7 +276,7 @@ static void free_slots_are_told_unasked(void) {
     for (int ms = 0; ms < 2000 && session.state != IDLE; ms++) {
         bench_run(1000);
         if (bench_answer(answer, sizeof answer)) {
-            CHECK(answer[0] == 0x80 && answer[5] >= before + QUEUE_SLOTS / 4);
+            CHECK(answer[0] == 0x83 && answer[5] >= before + QUEUE_SLOTS / 4);
             before = answer[5];
             told++;
         }

@@ -14,6 +14,7 @@ from armkin import protocol
 from armkin.protocol import Ack, Info, Segment, State, Status
 
 CLOCK = 16_000_000
+CREDIT = 0x83  # an ACK that comes unasked
 AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6}
 STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0}
 WIDE = protocol.AxisImage(True, False, -(1 << 30), 1 << 30, 0, 40_000, 400_000)
@@ -81,7 +82,13 @@ class BareHost:
             self._line_free = max(self._line_free, self.time) + 10 * len(data) / self.baud
         out = self.board.run(seconds, data, until=until)
         self.time += seconds  # an upper bound if `until` ended it early
-        return [r for p in self._splitter.feed(out) if (r := protocol.parse(p)) is not None]
+        replies = []
+        for payload in self._splitter.feed(out):
+            if payload[0] == CREDIT:
+                payload = bytes([protocol.Type.ACK]) + payload[1:]
+            if (reply := protocol.parse(payload)) is not None:
+                replies.append(reply)
+        return replies
 
     def ask(self, payload: bytes, tries: int = 1) -> protocol.Reply:
         """The answer to one frame; sent again if there is none within 50 ms."""

@@ -12,7 +12,7 @@
 
 enum { HELLO = 0x01, STATUS_ASK, HOLD };
 enum { CONFIG = 0x10, COMMIT, ENABLE, SET_POSITION, MOTION, HOME, JOG };
-enum { ACK = 0x80, INFO, STATUS };
+enum { ACK = 0x80, INFO, STATUS, CREDIT };
 enum { SEQUENCED = 0x10, REPLIES = 0x80 };
 enum { SILENCE_MS = 500, ABORT_MS = 3, SLOW_WHILE_LOST = 8 };
 enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32 };  // flags
@@ -54,8 +54,8 @@ static uint8_t *put_credit(uint8_t *p) {
     return put16(p, motion_queued());
 }
 
-static void send_ack(void) {
-    uint8_t reply[8] = {ACK};
+static void send_ack(uint8_t type) {
+    uint8_t reply[8] = {type};
     put_credit(put_head(reply + 1));
     link_send(reply, sizeof reply);
 }
@@ -354,7 +354,7 @@ static void in_sequence(const uint8_t *p, uint8_t length) {
             session.next++;
         }
     }
-    send_ack();
+    send_ack(ACK);
 }
 
 // ---- frames that need no session
@@ -386,7 +386,7 @@ void frame_received(const uint8_t *payload, uint8_t length) {
     } else if (payload[0] == HOLD && length == 2) {
         session.silent = 0;
         session_end(E_HELD, 0);
-        send_ack();
+        send_ack(ACK);
     }
 }
 
@@ -422,7 +422,7 @@ void protocol_millisecond(void) {
 void protocol_poll(void) {
     motion_poll();
     if (session.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4) {
-        send_ack();
+        send_ack(CREDIT);
     }
     if (session.state == HOMING) {
         home_poll();
