@@ -9,6 +9,7 @@ left runs as a flat sequence of numpy calls into buffers that are used again and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -99,22 +100,48 @@ def _axes(x: Any) -> tuple[int, ...]:
 
 
 class Straight:
-    """A recorded formula. Call it with its input arrays, all (N,)."""
+    """A recorded formula, as code for batches and as code for one pose."""
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
         trace = _Trace()
-        symbols = [Node(trace, "input", (), ()) for _ in range(inputs)]
-        outputs = formula(list(symbols))
-        names: dict[int, str] = {id(node): f"i{k}" for k, node in enumerate(symbols)}
-        constants: dict[str, Any] = {}
-        wanted = _needed(trace.nodes, outputs)
-        last = {id(x): k for k, node in enumerate(wanted) for x in node.args}
-        last |= {id(x): len(wanted) for x in outputs}
+        self._inputs = [Node(trace, "input", (), ()) for _ in range(inputs)]
+        self._outputs = list(formula(list(self._inputs)))
+        self._nodes = _needed(trace.nodes, self._outputs)
         self._buffers: list[tuple[tuple[int, ...], type]] = []
+        self._run = self._batch_code()
+        self._run_single: Callable[..., tuple[Any, ...]] | None = None
+
+    def workspace(self, length: int) -> list[NDArray[Any]]:
+        """Buffers for batches of that length, to be passed to `run`; one set for each thread."""
+        return [np.empty((*axes, length), dtype) for axes, dtype in self._buffers]
+
+    def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
+        """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
+        return self._run(*inputs, *workspace)
+
+    def single(self, inputs: Sequence[float]) -> list[Array]:
+        """The formula's outputs for one pose, as arrays (*branch axes, 1).
+
+        In plain Python numbers: for one pose a call of numpy costs more than what it computes.
+        """
+        if self._run_single is None:
+            self._run_single = self._single_code()
+        values = self._run_single(*inputs)
+        return [
+            np.array(v).reshape(*_axes(x), 1) if isinstance(v, tuple) else np.array([v])
+            for x, v in zip(self._outputs, values, strict=True)
+        ]
+
+    def _batch_code(self) -> Callable[..., tuple[Any, ...]]:
+        """One numpy call a line, its result in a buffer that is free again after its last use."""
+        names = {id(node): f"i{k}" for k, node in enumerate(self._inputs)}
+        constants: dict[str, Any] = {}
+        last = {id(x): k for k, node in enumerate(self._nodes) for x in node.args}
+        last |= {id(x): len(self._nodes) for x in self._outputs}
         free: dict[tuple[tuple[int, ...], type], list[str]] = {}
         kinds: dict[int, tuple[tuple[int, ...], type]] = {}
-        lines, used = [], set()
+        lines = []
 
         def name(x: Any) -> str:
             if isinstance(x, Node):
@@ -124,7 +151,7 @@ class Straight:
             constants[f"k{len(constants)}"] = x
             return f"k{len(constants) - 1}"
 
-        for k, node in enumerate(wanted):
+        for k, node in enumerate(self._nodes):
             arguments = [name(x) for x in node.args]
             for x in {id(x): x for x in node.args}.values():
                 if isinstance(x, Node) and x.op != "input" and last[id(x)] == k:
@@ -135,22 +162,64 @@ class Straight:
             else:
                 names[id(node)] = f"b{len(self._buffers)}"
                 self._buffers.append(kind)
-            used.add(node.op)
             lines.append(f"{node.op}({', '.join(arguments)}, {names[id(node)]})")
-        parameters = [f"i{k}" for k in range(inputs)] + [f"b{k}" for k in range(len(self._buffers))]
-        source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(map(name, outputs))},)"])
-        scope: dict[str, Any] = {**constants, **{op: getattr(np, op) for op in used}}
-        exec(source, scope)  # the text is made above, of operation names and numbers alone
-        self._run = scope["run"]
+        parameters = [names[id(x)] for x in self._inputs] + [f"b{k}" for k in range(len(self._buffers))]
+        scope = {**constants, **{node.op: getattr(np, node.op) for node in self._nodes}}
+        return _compiled(parameters, lines, list(map(name, self._outputs)), scope)
 
-    def workspace(self, length: int) -> list[NDArray[Any]]:
-        """Buffers for batches of that length, to be passed to `run`; one set for each thread."""
-        return [np.empty((*axes, length), dtype) for axes, dtype in self._buffers]
+    def _single_code(self) -> Callable[..., tuple[Any, ...]]:
+        """One Python expression a line and branch, branch axes unrolled."""
+        names = {id(node): {(): f"i{k}"} for k, node in enumerate(self._inputs)}
+        lines = []
 
-    def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
-        """The formula's outputs; they stand in the workspace until its next use."""
-        result: tuple[Any, ...] = self._run(*inputs, *workspace)
-        return result
+        def name(x: Any, index: tuple[int, ...]) -> str:
+            axes = _axes(x)
+            at = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
+            if isinstance(x, Node):
+                return names[id(x)][at]
+            return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
+
+        for k, node in enumerate(self._nodes):
+            names[id(node)] = {}
+            for b, index in enumerate(np.ndindex(*node.axes)):
+                names[id(node)][index] = f"t{k}_{b}"
+                lines.append(f"t{k}_{b} = " + _PYTHON[node.op].format(*(name(x, index) for x in node.args)))
+        outputs = []
+        for x in self._outputs:
+            every = [name(x, index) for index in np.ndindex(*_axes(x))]
+            outputs.append(f"({', '.join(every)},)" if _axes(x) else every[0])
+        return _compiled([names[id(x)][()] for x in self._inputs], lines, outputs, {"math": math})
+
+
+# Operations on single numbers.
+_PYTHON = {
+    "multiply": "{} * {}",
+    "add": "{} + {}",
+    "subtract": "{} - {}",
+    "divide": "{} / {}",
+    "negative": "-{}",
+    "absolute": "abs({})",
+    "maximum": "max({}, {})",
+    "square": "{0} * {0}",
+    "power": "{} ** {}",
+    "sqrt": "math.sqrt({})",
+    "tan": "math.tan({})",
+    "arctan2": "math.atan2({}, {})",
+    "rint": "float(round({}))",
+    "sign": "math.copysign(1.0, {0}) if {0} else 0.0",
+    "copysign": "math.copysign({}, {})",
+    "less": "{} < {}",
+    "equal": "{} == {}",
+    "bitwise_or": "{} or {}",
+}
+
+
+def _compiled(parameters: list[str], lines: list[str], outputs: list[str], scope: dict[str, Any]) -> Callable[..., tuple[Any, ...]]:
+    """A function made of these lines. They consist of names and numbers written by this module alone."""
+    source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(outputs)},)"])
+    exec(source, scope)
+    run: Callable[..., tuple[Any, ...]] = scope["run"]
+    return run
 
 
 def _needed(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:

@@ -102,9 +102,9 @@ def _empty(N: int, B: int, n: int) -> _Out:
 
 def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
     """Closed forms: chunks of poses that stay in the cache, entry by entry."""
-    link = [soa.constant(L) for L in arm.link]
     out: _Out | None = None
     runner = _runner(arm, task, geometry)
+    link = runner.link
     straight = runner.get(len(target))
     workspace: list[NDArray[np.generic]] = []
     for start in range(0, max(len(target), 1), soa.CHUNK):
@@ -114,6 +114,8 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         entries = _entries(task, goal)
         if straight is None:
             *values, miss, doubt = _candidates(arm, task, geometry, link, entries, _prefer(arm, near[rows], one))
+        elif N == 1:
+            *values, miss, doubt = straight.single([float(e[0]) for e in entries])
         else:
             if not workspace or workspace[-1].shape[-1] != N:
                 workspace = straight.workspace(N)
@@ -128,9 +130,10 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         if N == 0:
             break
         within: Bool = valid.reshape(shape)
+        grid = np.moveaxis(part.q.reshape(N, *shape[:-1], arm.n), 0, -2)  # the branch axes in front of the poses
         for i in range(arm.n):
             value, inside = _legal(arm, i, values[i], near[rows] if one is None else one)
-            part.q[:, :, i] = np.broadcast_to(value, shape).reshape(B, N).T
+            grid[..., i] = value
             if inside is not True:
                 within = within & inside
         part.valid[...] = valid.T
@@ -194,6 +197,7 @@ class _Runner:
 
     def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
         self.what = (arm, task, geometry)
+        self.link = [soa.constant(L) for L in arm.link]
         self.calls = 0
         self.straight: Straight | None = None
 
@@ -201,7 +205,7 @@ class _Runner:
         arm, task, geometry = self.what
         self.calls += 1
         if self.straight is None and geometry.straight and (batch >= 64 or self.calls > 4):
-            link = [soa.constant(L) for L in arm.link]
+            link = self.link
             inputs = 12 if task.orientation == "full" else len(task.labels)
 
             def formula(goal: list[Entry]) -> list[Entry]:

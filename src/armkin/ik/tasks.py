@@ -10,6 +10,7 @@ Every task is a choice of four kinds of constraints:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin import soa
 from armkin.ik.chain import Chain, axes
-from armkin.soa import Array
+from armkin.soa import Array, Entry
+from armkin.straight import Straight
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -123,17 +125,35 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
     if task.orientation == "full":
         for start in range(0, len(flat), soa.CHUNK):
-            if not _are_rotations(soa.read(flat[start : start + soa.CHUNK])):
+            if not _are_rotations(flat[start : start + soa.CHUNK]):
                 raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
     return flat, lead
 
 
-def _are_rotations(P: soa.Pose) -> bool:
-    """Whether the columns x and z are unit vectors at right angles and y = z x x, to 1e-6."""
-    x, y, z = P[0:3], P[3:6], P[6:9]
-    off = [soa.dot(x, x) - 1.0, soa.dot(z, z) - 1.0, soa.dot(x, z)]
-    off += [a - b for a, b in zip(soa.cross(z, x), y, strict=True)]
-    return all(float(np.abs(e).max(initial=0.0)) <= 1e-6 for e in off)
+@cache
+def _rotation_check() -> Straight:
+    """How far the columns x and z are from unit vectors at right angles, and y from z x x."""
+
+    def formula(P: soa.Pose) -> list[Entry]:
+        x, y, z = P[0:3], P[3:6], P[6:9]
+        off = [soa.dot(x, x) - 1.0, soa.dot(z, z) - 1.0, soa.dot(x, z)]
+        off += [soa.sub(a, b) for a, b in zip(soa.cross(z, x), y, strict=True)]
+        worst = np.abs(off[0])
+        for e in off[1:]:
+            worst = np.maximum(worst, np.abs(e))
+        return [worst]
+
+    return Straight(formula, 12)
+
+
+def _are_rotations(T: Array) -> bool:
+    """Whether (N, 4, 4) hold rotations to 1e-6."""
+    check, entries = _rotation_check(), soa.read(T)
+    if len(T) == 1:
+        worst = check.single([float(e[0]) for e in entries])
+    else:
+        worst = check.run(entries, check.workspace(len(T)))[:1]
+    return bool(worst[0].max(initial=0.0) <= 1e-6)
 
 
 def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
