@@ -90,8 +90,8 @@ def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any
         axis.pane.set_edgecolor(FAINT)
         axis._axinfo["grid"].update(color=FAINT, linewidth=0.6)
         axis.line.set_color(SOFT)
-        getattr(axes, f"set_{name}label")(f"{name} / mm", labelpad=5)
-        axes.tick_params(axis=name, pad=1, colors=SOFT)
+        getattr(axes, f"set_{name}label")(f"{name} / mm", labelpad=8 if name == "z" else 5)
+        axes.tick_params(axis=name, pad=4 if name == "z" else 1, colors=SOFT)
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90)
     return axes

@@ -57,10 +57,10 @@ def plot_poses(
     if names is not None:
         legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
     with picture(out, 8.0, 5.8) as figure:
-        drawing = _Drawing(arm, figure, bones, view)
+        drawing = _Drawing(arm, figure, bones, view, aside=0.0 if alone else 0.16)
         # Branches may lie on each other: each one is drawn wider than those that follow on top of it,
         # and the first one, which is the best, comes last.
-        widths = np.linspace(2.4, 5.5, len(poses))
+        widths = 2.6 + np.minimum(0.9, 4.0 / len(poses)) * np.arange(len(poses))
         several = list(enumerate(bones)) if names is None else list(enumerate(bones))[::-1]
         for k, bone in several:
             if alone:
@@ -69,7 +69,7 @@ def plot_poses(
                 label = legend[k] if k < 1 else legend[1] if k == len(poses) - 1 else None
                 drawing.arm(bone, _along(k / (len(poses) - 1)), label, 2.6, dashed=not legal[k])
             else:
-                drawing.arm(bone, PALETTE[k % len(PALETTE)], legend[k], widths[k], dashed=not legal[k])
+                drawing.arm(bone, _apart(k, len(poses)), legend[k], widths[k], dashed=not legal[k])
         if not alone and names is None:
             drawing.track(np.array([bone.tip for bone in bones]))
         if with_frames:
@@ -90,7 +90,7 @@ class _Drawing:
     """Axes in space, or in a plane for an arm that moves in the xy plane."""
 
     def __init__(
-        self, arm: Arm, figure: Any, bones: list[Skeleton], view: tuple[float, float] | None
+        self, arm: Arm, figure: Any, bones: list[Skeleton], view: tuple[float, float] | None, aside: float
     ) -> None:
         self.robot, self.figure = arm, figure
         self.points = np.concatenate([*(bone.path for bone in bones), arm.base[None, :3, 3]])
@@ -102,7 +102,9 @@ class _Drawing:
             self.axes = flat(figure, (0.11, 0.1, 0.86, 0.76), ("x / mm", "y / mm"))
         else:
             self.dimensions = 3
-            self.axes = space(figure, (0.02, 0.0, 0.96, 0.9), view or self._from_the_side(bones))
+            self.axes = space(
+                figure, (0.02 + aside, 0.0, 0.96 - aside, 0.9), view or self._from_the_side(bones)
+            )
             self.floor = min(float(self.points[:, 2].min()), float(arm.base[2, 3]))
 
     def _from_the_side(self, bones: list[Skeleton]) -> tuple[float, float]:
@@ -186,17 +188,14 @@ class _Drawing:
         self.figure.text(0.03, 0.97, title, fontsize=13, va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
         if order is not None:
-            top = 0.935 if not note else 0.895
             handles, texts = self.axes.get_legend_handles_labels()
             rank = {text: k for k, text in enumerate(order)}
             pairs = sorted(zip(handles, texts, strict=True), key=lambda pair: rank.get(pair[1], len(rank)))
-            self.axes.legend(
-                *zip(*pairs, strict=True),
-                loc="upper left",
-                bbox_to_anchor=(0.02, top),
-                bbox_transform=self.figure.transFigure,
-                handlelength=2.6,
-            )
+            place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 0.895 if note else 0.935)}
+            place |= {"bbox_transform": self.figure.transFigure}
+            if self.dimensions == 2:
+                place = {"loc": "best", "frameon": True, "facecolor": "white", "edgecolor": FAINT}
+            self.axes.legend(*zip(*pairs, strict=True), handlelength=2.6, **place)
 
 
 def _along(share: float) -> Any:
@@ -204,3 +203,12 @@ def _along(share: float) -> Any:
     import matplotlib as mpl
 
     return mpl.colormaps["viridis"](0.9 * share)
+
+
+def _apart(k: int, count: int) -> Any:
+    """A colour for one of several branches."""
+    if count <= len(PALETTE):
+        return PALETTE[k]
+    import matplotlib as mpl
+
+    return mpl.colormaps["turbo"]((k + 0.5) / count)
