@@ -65,7 +65,7 @@ def joint_index(arm: Arm, name: str) -> int:
     if name in arm.joint_names:
         return arm.joint_names.index(name)
     close = get_close_matches(name, arm.joint_names, 1, 0.5)
-    hint = f"; did you mean {close[0]}?" if close else ""
+    hint = f" (did you mean {close[0]}?)" if close else ""
     raise UsageError(f"{arm.name} has no joint '{name}'{hint}; its joints are {', '.join(arm.joint_names)}")
 
 

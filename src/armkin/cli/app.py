@@ -106,7 +106,7 @@ def armkin(
 ) -> None:
     """Robot arms from a YAML table to real motion. Millimetres and degrees throughout."""
     if ctx.invoked_subcommand is None:
-        raise errors.UsageError(f"which command? {', '.join(COMMANDS)}; see armkin --help")
+        raise errors.UsageError("a command is missing; armkin --help lists them")
 
 
 def run(arguments: list[str]) -> int:
@@ -165,10 +165,12 @@ def _os_error(error: OSError) -> int:
 def _unexpected(error: Exception) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
-        message = str(error.format_message())
+        message = str(error.format_message()).rstrip(".")
+        if possible := getattr(error, "possibilities", None):
+            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
         context = getattr(error, "ctx", None)
         if context is not None:
-            message = f"{message.rstrip('.')}\nsee {context.command_path} --help"
+            message = f"{message}\nsee {context.command_path} --help"
         output.error(message[:1].lower() + message[1:])
         return int(getattr(error, "exit_code", USAGE))
     if os.environ.get("ARMKIN_TRACEBACK"):

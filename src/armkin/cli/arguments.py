@@ -25,7 +25,10 @@ def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
         else:
             options.append(word)
             if word in takes_value:
-                options.extend(value for value in [next(rest, None)] if value is not None)
+                value = next(rest, None)
+                if value is None:
+                    return options  # the parser complains; "--" would be taken for the value
+                options.append(value)
     return [*options, "--", *words] if words else options
 
 

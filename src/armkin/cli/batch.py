@@ -43,13 +43,27 @@ def batch_rows(source: str, names: Sequence[str], what: str) -> Iterator[Chunk]:
     lines, comments (#) and a heading of names are skipped. A malformed row raises UsageError that names
     its number (from 1, as an editor counts lines), after the complete rows before it were given out.
     """
-    first = 1
+    first, empty = 1, True
     with _opened(source) as file:
         while lines := _lines(file, source):
-            yield from _chunk(lines, first, names, what, source)
+            for chunk in _chunk(lines, first, names, what, source):
+                empty = False
+                yield chunk
             first += len(lines)
-    if first == 1:
+    if empty:
         raise UsageError(f"{_name(source)} is empty; it needs one row of {','.join(names)} per pose")
+
+
+def streamed_rows(source: str, names: Sequence[str], what: str) -> Iterator[tuple[int, list[float]]]:
+    """The same row by row, each as soon as it is there: its number and its values."""
+    with _opened(source) as file:
+        for number, line in enumerate(iter(lambda: file.readline(LONGEST), b""), 1):
+            try:
+                row = _row(line, number, names, what)
+            except UsageError as error:
+                raise UsageError(f"{_name(source)}: row {number}: {error}") from None
+            if row is not None:
+                yield number, row
 
 
 @dataclass
@@ -84,10 +98,10 @@ def run_batch(
     """Answer all chunks: each row's answer as a line of JSON, or its `records` as CSV under a `heading`."""
     tally = Tally()
     with output.destination(out) as write, output.progress("rows") as tick:
-        if not as_json:
-            write(csv_line(heading) + "\n")
         for chunk in chunks:
             lines: list[str] = []
+            if not as_json and not tally.rows:  # nothing is written before the first row is read
+                lines.append(csv_line(heading))
             for number, answer in zip(chunk.numbers, answers(chunk), strict=True):
                 tally.add(number, answer)
                 lines += [to_json(answer)] if as_json else map(csv_line, records(number, answer))
@@ -128,7 +142,7 @@ def _opened(source: str) -> Iterator[IO[bytes]]:
     try:
         file = open(source, "rb")  # noqa: SIM115
     except (OSError, ValueError) as error:
-        raise FileError(f"{source!r}: cannot read: {getattr(error, 'strerror', None) or error}") from None
+        raise FileError(f"{source}: cannot read: {getattr(error, 'strerror', None) or error}") from None
     with file:
         yield file
 

@@ -17,6 +17,8 @@ def load(robot: str) -> Arm:
     """The arm of a robot file."""
     from armkin.arm import load
 
+    if not robot:
+        raise UsageError("the robot file's name is empty; name a file, for example robots/three_dof.yaml")
     return load(robot)
 
 

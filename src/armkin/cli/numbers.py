@@ -46,6 +46,8 @@ def listed(text: str, names: Sequence[str], what: str) -> list[float]:
     words = text.split(",")
     if len(words) == 1 and len(names) > 1 and len(text.split()) == len(names):
         raise UsageError(f"{what}: separate the numbers with commas: {','.join(text.split())}")
+    if len(words) == len(names):
+        names = [f"{what}: {name}" for name in names]
     return numbers(words, names, what)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TextIO
 
-from armkin.errors import FileError
+from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
 
@@ -14,6 +14,8 @@ Write = Callable[[str], object]
 @contextmanager
 def destination(path: str | None) -> Iterator[Write]:
     """The function that writes a command's data: to stdout, or to a file that appears whole or not at all."""
+    if path == "":
+        raise UsageError("--out needs the name of a file")
     if path is not None:
         from armkin.files import whole
 
@@ -30,6 +32,11 @@ def warn(message: str) -> None:
     _say("warning", "33", message)
 
 
+def note(message: str) -> None:
+    """Say something on stderr that is good to know."""
+    _say("note", "36", message)
+
+
 def error(message: str) -> None:
     """Say on stderr why the command fails."""
     _say("error", "31", message)
@@ -39,11 +46,17 @@ def _say(word: str, colour: str, message: str) -> None:
     if sys.stderr is None:
         return
     head = f"\x1b[{colour}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
-    # A file's name may hold what is no text, or a line feed: one or two lines whatever it is.
-    lines = [line for line in message.splitlines() if line.strip()]
+    # A file's name may hold anything: two lines of printable text, whatever it is.
+    lines = [_plain(line) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
     with suppress(OSError, UnicodeError):  # nobody listens: the exit code still tells
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
+
+
+def _plain(line: str) -> str:
+    """Without control characters, which a terminal would obey, and not longer than people read."""
+    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+    return text if len(text) <= 240 else f"{text[:150]} ... {text[-80:]}"
 
 
 def _coloured(stream: TextIO) -> bool:

@@ -119,7 +119,9 @@ def unsolved(arm: Arm, answer: dict[str, Any]) -> NoSolutionError:
     if answer["status"] == "unreachable":
         return NoSolutionError(f"{arm.name} cannot reach this target; {away}")
     if answer["branches_within_limits"]:
-        return NoSolutionError("the branch of that name is not within limits; others are: see --all-branches")
+        return NoSolutionError(
+            "no branch of that name is within limits, but others are: --all-branches lists them"
+        )
     return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
 
 

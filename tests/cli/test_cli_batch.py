@@ -1,0 +1,186 @@
+"""Batches: order, formats, malformed rows, bounded memory, files that appear whole or not at all."""
+
+import csv
+import io
+import json
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.cli.batch import Chunk, batch_rows, run_batch
+from armkin.errors import UsageError
+from command_line import ROOT, THREE_DOF, run
+
+GOOD = b"-30,5,-5\n0,90,-90\n1.5,2e1,-.5\n"
+
+
+def rows_of(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_fk_in_the_order_of_the_input() -> None:
+    q = np.random.default_rng(1).uniform(-100, 100, (10_000, 3)).round(3)
+    result = run("fk", THREE_DOF, "--batch", "-", stdin="\n".join(f"{a},{b},{c}" for a, b, c in q).encode())
+    rows = rows_of(result.out)
+    assert result.code == 0
+    T = armkin.fk(armkin.load(ROOT / THREE_DOF), np.deg2rad(q))
+    assert np.array_equal([[float(row[name]) for name in ("q1", "q2", "q3")] for row in rows], q)
+    assert np.allclose([[float(row[axis]) for axis in "xyz"] for row in rows], T[:, :3, 3], atol=1e-9)
+    outside = sum(row["within_limits"] == "false" for row in rows)
+    assert f"{outside} of 10000 rows are outside the limits" in result.err
+
+
+def test_json_lines_are_what_single_commands_say() -> None:
+    lines = run("fk", THREE_DOF, "--batch", "-", "--json", "--frames", stdin=GOOD).lines
+    assert lines[0] == run("fk", THREE_DOF, -30, 5, -5, "--json", "--frames").json
+    pulses = run("pulses", THREE_DOF, "--batch", "-", "--json", "--best", stdin=GOOD).lines
+    assert pulses[0] == run("pulses", THREE_DOF, -30, 5, -5, "--json", "--best").json
+    branches = run("ik", THREE_DOF, "--batch", "-", "--json", "--all-branches", stdin=b"390,80,300").lines
+    assert branches == [run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches").json]
+
+
+def test_ik_exits_3_after_all_rows() -> None:
+    result = run("ik", THREE_DOF, "--batch", "-", stdin=b"390,80,300\n900,0,0\n0,400,200\n")
+    assert result.code == 3
+    assert "1 of 3 rows have no branch within limits; the first is row 2" in result.err
+    rows = rows_of(result.out)
+    assert [row["row"] for row in rows] == ["1", "2", "3"]
+    assert [row["status"] for row in rows] == ["exact", "unreachable", "exact"]
+    assert rows[1]["q1"] == rows[1]["branch"] == ""
+    lines = run("ik", THREE_DOF, "--batch", "-", "--json", stdin=b"390,80,300\n900,0,0\n").lines
+    assert [line["best"] for line in lines] == [0, None]
+    assert lines[1]["closest"]["distance_mm"] > 400
+
+
+def test_ik_all_branches_have_a_row_each() -> None:
+    rows = rows_of(run("ik", THREE_DOF, "--batch", "-", "--all-branches", stdin=b"390,80,300\n0,400,200").out)
+    assert [row["row"] for row in rows] == ["1"] * 4 + ["2"] * 4
+    assert rows[0]["branch"] == "left, elbow up"
+
+
+def test_pulses() -> None:
+    rows = rows_of(run("pulses", THREE_DOF, "--batch", "-", stdin=GOOD).out)
+    assert [rows[0][f"pulses_{name}"] for name in ("q1", "q2", "q3")] == ["-1067", "-10144", "5667"]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (b"1,2,3\n4,5\n6,7,8\n", "row 2: three_dof takes 3 numbers (q1 q2 q3), got 2"),
+        (b"1,2,3\n4,x,6\n", "row 2: q2: 'x' is not a number"),
+        (b"1,2,3\n4,nan,6\n", "row 2: q2: 'nan' is not finite"),
+        (b"1,2,3\n4,1e999,6\n", "row 2: q2: '1e999' is too large"),
+        (b"1,2,3\n4,,6\n", "row 2: q2: a number is missing"),
+        (b"1,2,3\n4,5,6,7\n", "got 4"),
+        (b"1,2,3\n\xff\xfe,5,6\n", "row 2: this is no UTF-8 text"),
+        (b"1,2,3\n4,5,6\0\n", "row 2: this is no CSV of numbers"),
+        (b"1,2,3\n1;2;3\n", "row 2: separate the numbers with commas, not with ';'"),
+        (b"1,2,3\n1 2 3\n", "with commas, not with ' '"),
+        (b"1,2,3\nq1,q2,q3\n", "row 2: q1: 'q1' is not a number"),
+        (b"1,2,3\n" + b"9" * 300_000, "row 2"),
+    ],
+)
+def test_a_malformed_row_stops_the_run(text: bytes, complaint: str, tmp_path: Path) -> None:
+    result = run("fk", THREE_DOF, "--batch", "-", stdin=text)
+    assert result.code == 2
+    assert complaint in result.err
+    assert len(rows_of(result.out)) == 1  # the complete rows before it stand
+    file = run("fk", THREE_DOF, "--batch", "-", "--out", tmp_path / "out.csv", stdin=text)
+    assert file == (2, "", result.err)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_malformed_row_far_down_is_named_by_its_line() -> None:
+    text = b"# poses\n\n" + b"1,2,3\n" * 9000 + b"1,2\n"
+    result = run("fk", THREE_DOF, "--batch", "-", stdin=text)
+    assert "row 9003:" in result.err
+    assert len(rows_of(result.out)) == 9000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        GOOD.replace(b"\n", b"\r\n"),
+        GOOD.rstrip(),
+        b"\xef\xbb\xbf" + GOOD,
+        b"q1,q2,q3\n" + GOOD,
+        b"\xef\xbb\xbfq1, q2, q3\n" + GOOD,
+        b"# a comment\n" + GOOD + b"\n\n",
+        b'"-30","5","-5"\n0 , 90 , -90\n1.5,2e1,-.5',
+    ],
+)
+def test_dialects(text: bytes) -> None:
+    assert (
+        run("fk", THREE_DOF, "--batch", "-", stdin=text).out
+        == run("fk", THREE_DOF, "--batch", "-", stdin=GOOD).out
+    )
+
+
+def test_an_empty_batch_is_an_error() -> None:
+    result = run("fk", THREE_DOF, "--batch", "-")
+    assert (result.code, result.out) == (2, "")
+    assert "is empty" in result.err
+
+
+def test_out_replaces_a_file_only_when_all_is_well(tmp_path: Path) -> None:
+    path, source = tmp_path / "poses.csv", tmp_path / "in.csv"
+    path.write_text("before")
+    path.chmod(0o640)
+    source.write_bytes(b"1,2,3\n4,5\n")
+    assert run("fk", THREE_DOF, "--batch", source, "--out", path).code == 2
+    assert path.read_text() == "before"
+    source.write_bytes(GOOD)
+    assert run("fk", THREE_DOF, "--batch", source, "--out", path) == (0, "", "")
+    assert len(rows_of(path.read_text())) == 3
+    assert path.stat().st_mode & 0o777 == 0o640
+    # reading and writing the same file is safe, too
+    assert run("fk", THREE_DOF, "--batch", source, "--out", source).code == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in.csv", "poses.csv"]
+
+
+def test_out_follows_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").write_text("")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    assert run("fk", THREE_DOF, 1, 2, 3, "--out", tmp_path / "link").code == 0
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_text()
+
+
+def test_memory_does_not_grow_with_the_rows(tmp_path: Path) -> None:
+    def chunks() -> Iterator[Chunk]:
+        for first in range(0, 2_000_000, 4096):
+            yield Chunk(range(first, first + 4096), np.zeros((4096, 1)))
+
+    def peak(limit: int) -> int:
+        tracemalloc.start()
+        some = (chunk for i, chunk in enumerate(chunks()) if i < limit)
+        run_batch(
+            some, str(tmp_path / "out"), False, lambda c: ({} for _ in c.values), ["n"], lambda n, _: [[n]]
+        )
+        size = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return size
+
+    assert peak(12) < 1.2 * peak(3) + 100_000
+
+
+def test_rows_are_read_as_they_are_needed(tmp_path: Path) -> None:
+    path = tmp_path / "in.csv"
+    path.write_bytes(b"1,2\n" * 5000 + b"bad\n")
+    chunks = batch_rows(str(path), ["a", "b"], "test")
+    assert len(next(chunks).values) == 4096
+    assert next(chunks).numbers[-1] == 5000
+    with pytest.raises(UsageError, match=r"in\.csv: row 5001"):
+        next(chunks)
+
+
+def test_json_has_no_nan() -> None:
+    for line in run(
+        "ik", THREE_DOF, "--batch", "-", "--json", "--all-branches", stdin=b"900,0,0\n0,0,625\n0,10,367"
+    ).out.splitlines():
+        json.loads(line, parse_constant=lambda name: pytest.fail(name))

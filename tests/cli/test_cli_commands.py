@@ -1,0 +1,236 @@
+"""What each command prints, for programs and for people."""
+
+import inspect
+import json
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.cli import COMMANDS
+from command_line import ROOT, THREE_DOF, run
+
+ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
+    function = getattr(import_module(f"armkin.cli.{name}"), name)
+    assert inspect.getdoc(function).splitlines()[0] == COMMANDS[name]
+    assert name in run("--help").out
+    result = run(name, "--help")
+    assert result.code == 0
+    assert COMMANDS[name] in result.out
+    assert "<" not in result.out.replace("<=", "")  # no names of Python types
+
+
+def test_version() -> None:
+    assert run("--version") == (0, f"armkin {armkin.__version__}\n", "")
+
+
+def test_fk() -> None:
+    result = run("fk", THREE_DOF, -30, 5, -5, "--json")
+    arm = armkin.load(ROOT / THREE_DOF)
+    T = armkin.fk(arm, np.deg2rad([-30, 5, -5]))
+    answer = result.json
+    assert (result.code, result.err) == (0, "")
+    assert (answer["robot"], answer["robot_file"]) == ("three_dof", THREE_DOF)
+    assert answer["robot_sha256"] == arm.sha256
+    assert answer["joint_units"] == ["deg"] * 3
+    assert np.allclose(answer["position_mm"], T[:3, 3], rtol=1e-15, atol=0)  # full precision
+    assert np.allclose(answer["rotation"], T[:3, :3], rtol=0, atol=1e-15)
+    assert answer["rpy_deg"] == pytest.approx([90, 0, -30])
+    w, x, y, z = answer["quaternion_wxyz"]
+    assert T[0, 0] == pytest.approx(1 - 2 * (y * y + z * z))
+    assert T[1, 0] == pytest.approx(2 * (x * y + w * z))
+    assert answer["within_limits"] is True
+    assert answer["violations"] == []
+    assert "frames" not in answer
+
+
+def test_fk_for_people() -> None:
+    out = run("fk", THREE_DOF, -30, 5, -5).out
+    assert out.startswith("three_dof: q1 = -30, q2 = 5, q3 = -5 deg\n")
+    for word in ("398.3923", "-218.4649", "187.1697", "mm", "deg"):
+        assert word in out
+    assert "-0.0000" not in out
+
+
+def test_fk_outside_limits_warns_and_is_done() -> None:
+    result = run("fk", THREE_DOF, 0, 130, 0, "--json")
+    assert result.code == 0
+    assert result.err == "warning: q2 = 130 deg is outside -20 to 120 deg\n"
+    assert result.json["violations"] == [{"joint": "q2", "value": 130, "lower": -20, "upper": 120}]
+    on_the_limit = run("fk", THREE_DOF, -120, 120, 120, "--json")
+    assert on_the_limit.json["within_limits"] is True
+
+
+def test_fk_frames() -> None:
+    answer = run("fk", THREE_DOF, -30, 5, -5, "--json", "--frames").json
+    assert [frame["name"] for frame in answer["frames"]] == ["base", "q1", "q2", "q3", "tool"]
+    assert answer["frames"][-1]["position_mm"] == answer["position_mm"]
+    assert "tool" in run("fk", THREE_DOF, -30, 5, -5, "--frames").out
+
+
+def test_ik_lists_the_best_branch_or_all() -> None:
+    one = run("ik", THREE_DOF, 390, 80, 300, "--json").json
+    all_of_them = run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches").json
+    assert (one["status"], one["complete"], one["best"], one["closest"]) == ("exact", True, 0, None)
+    assert one["branches"] == all_of_them["branches"][:1]
+    assert len(all_of_them["branches"]) == one["branch_count"] == 4
+    legal = [branch["within_limits"] for branch in all_of_them["branches"]]
+    assert legal == sorted(legal, reverse=True)
+    for part in (True, False):
+        motion = [b["motion"] for b in all_of_them["branches"] if b["within_limits"] is part]
+        assert motion == sorted(motion)
+    for branch in all_of_them["branches"]:
+        assert branch["residual_mm"] < 1e-9
+        assert bool(branch["violations"]) is not branch["within_limits"]
+        assert branch["motion"] == pytest.approx(np.abs(np.subtract(branch["joints"], [0, 90, -90])).sum())
+
+
+def test_ik_near_chooses() -> None:
+    near = run("ik", THREE_DOF, 390, 80, 300, "--near", "0,-10,50", "--json").json
+    assert near["branches"][0]["name"] == "left, elbow down"
+
+
+def test_ik_branch_chooses() -> None:
+    answer = run("ik", THREE_DOF, 390, 80, 300, "--branch", "left elbow down", "--json").json
+    assert answer["branches"][answer["best"]]["name"] == "left, elbow down"
+    every = run("ik", THREE_DOF, 390, 80, 300, "--branch", "lower elbow", "--json", "--all-branches").json
+    assert every["branches"][every["best"]]["name"] == "left, elbow down"
+    outside = run("ik", THREE_DOF, 390, 80, 300, "--branch", "right", "--json")
+    assert outside.code == 3
+    assert outside.json["best"] is None
+    unknown = run("ik", THREE_DOF, 390, 80, 300, "--branch", "rihgt")
+    assert (unknown.code, unknown.out) == (2, "")
+    assert "left, elbow up" in unknown.err
+
+
+def test_ik_without_a_solution_shows_the_closest_pose() -> None:
+    result = run("ik", THREE_DOF, 900, 0, 0, "--json")
+    answer = result.json
+    assert result.code == 3
+    assert "cannot reach" in result.err
+    assert (answer["status"], answer["best"], answer["branches"]) == ("unreachable", None, [])
+    nearest = answer["closest"]
+    T = armkin.fk(armkin.load(ROOT / THREE_DOF), np.deg2rad(nearest["joints"]))
+    assert nearest["position_mm"] == pytest.approx(T[:3, 3].tolist())
+    assert nearest["distance_mm"] == pytest.approx(np.linalg.norm(T[:3, 3] - [900, 0, 0]))
+    assert "closest" in run("ik", THREE_DOF, 900, 0, 0).out
+
+
+def test_ik_turns() -> None:
+    answer = run("ik", "robots/ur5e.yaml", 400, 100, 400, 180, 0, 0, "--turns", "--json").json
+    [branch] = answer["branches"]
+    assert branch["turns"][0] == pytest.approx(branch["joints"])
+    assert len(branch["turns"]) > 1
+    for copy in branch["turns"]:
+        turns = (np.array(copy) - branch["joints"]) / 360
+        assert np.abs(turns - np.rint(turns)).max() < 1e-12
+
+
+def test_ik_locked_and_swept() -> None:
+    target = (400, 0, 400, 180, 0, 0)
+    locked = run("ik", "robots/panda.yaml", *target, "--lock", "J3=-6", "--json").json
+    assert locked["branches"][0]["joints"][2] == pytest.approx(-6)
+    swept = run("ik", "robots/panda.yaml", *target, "--sweep", "J3=-18:18:4", "--json").json
+    assert swept["complete"] is False
+    assert min(abs(swept["branches"][0]["joints"][2] - v) for v in (-18, -6, 6, 18)) < 1e-9
+    assert swept["branches"][0]["motion"] <= locked["branches"][0]["motion"] + 1e-9
+    q = np.deg2rad(swept["branches"][0]["joints"])
+    assert armkin.fk(armkin.load(ROOT / "robots/panda.yaml"), q)[:3, 3] == pytest.approx([400, 0, 400])
+    free = run("ik", "robots/panda.yaml", *target)
+    assert free.code == 2
+    assert "--lock" in free.err
+
+
+def test_ik_lets_another_task_be_asked_for() -> None:
+    xy = run("fk", "robots/planar_3dof.yaml", 20, 50, -30, "--json").json["position_mm"][:2]
+    result = run("ik", "robots/planar_3dof.yaml", *xy, "--task", "xy")
+    assert result.code == 2
+    assert "degree of freedom" in result.err
+
+
+def test_pulses() -> None:
+    answer = run("pulses", THREE_DOF, -30, 5, -5, "--json").json
+    assert answer["motors"] == ["q1", "q2", "q3"]
+    assert answer["pulse_units"] == ["step"] * 3
+    assert answer["resolution"] == pytest.approx([0.028125, 360 / 42962, 0.015])
+    difference = np.abs(np.subtract(answer["position_mm"]["actual"], answer["position_mm"]["theoretical"]))
+    assert np.allclose(difference, answer["position_mm"]["difference"], atol=1e-12)
+    assert answer["error_mm"] == pytest.approx(np.linalg.norm(difference))
+
+
+def test_pulses_from() -> None:
+    answer = run("pulses", THREE_DOF, -30, 5, -5, "--from", "0,0,0", "--json").json
+    zero = run("pulses", THREE_DOF, 0, 0, 0, "--json").json
+    assert answer["moves"] == [a - b for a, b in zip(answer["pulses"], zero["pulses"], strict=True)]
+
+
+def test_pulses_best() -> None:
+    answer = run("pulses", THREE_DOF, -30, 5, -5, "--best", "--json").json
+    assert answer["rounded"]["pulses"] == [-1067, -10144, 5667]
+    assert answer["gain_mm"] == pytest.approx(answer["rounded"]["error_mm"] - answer["error_mm"])
+    assert answer["gain_mm"] > 0
+    assert "nearer than" in run("pulses", THREE_DOF, -30, 5, -5, "--best").out
+
+
+def test_pulses_of_servos() -> None:
+    answer = run("pulses", "robots/planar_2dof.yaml", 0, 50, "--json").json
+    assert answer["pulse_units"] == ["us", "us"]
+    result = run("pulses", "robots/planar_2dof.yaml", 0, 500)
+    assert result.code == 0
+    assert "the servo of q2 cannot turn that far" in result.err
+
+
+def test_pulses_of_a_differential() -> None:
+    answer = run(
+        "pulses", "tests/robots/differential_wrist.yaml", *_zeros("differential_wrist"), "--json"
+    ).json
+    assert all(count == 0 for count in answer["pulses"])
+    out = run("info", "tests/robots/differential_wrist.yaml").out
+    assert "2 " in out.partition("motor ")[2]
+
+
+def _zeros(robot: str) -> list[float]:
+    return [joint.home for joint in armkin.load(ROOT / f"tests/robots/{robot}.yaml").file.joints]
+
+
+@pytest.mark.parametrize("robot", ALL_ROBOTS)
+def test_info_of_every_arm(robot: str) -> None:
+    result = run("info", f"robots/{robot}", "--json")
+    assert (result.code, result.err) == (0, "")
+    answer = result.json
+    arm = armkin.load(ROOT / "robots" / robot)
+    assert [joint["name"] for joint in answer["joints"]] == list(arm.joint_names)
+    assert (answer["solver"] is None) == (answer["ik_refuses"] is not None)
+    text = run("info", f"robots/{robot}").out
+    for name in arm.joint_names:
+        assert name in text
+    assert "-0 " not in text
+    if answer["solver"]:
+        assert answer["solver"]["method"] in text
+
+
+def test_info_says_the_step_chain() -> None:
+    out = run("info", THREE_DOF).out
+    for word in ("42962", "26.85125", "0.028125", "-120 .. 120", "-90", "uno_cnc_shield", "xyz"):
+        assert word in out
+
+
+def test_schema(tmp_path: Path) -> None:
+    shipped = json.loads((ROOT / "robots/robot.schema.json").read_text())
+    assert run("schema").json == shipped
+    assert run("schema", "--out", tmp_path / "s.json").out == ""
+    assert json.loads((tmp_path / "s.json").read_text()) == shipped
+
+
+def test_out_writes_what_stdout_would_get(tmp_path: Path) -> None:
+    for words in (["--json"], [], ["--frames"]):
+        path = tmp_path / "out"
+        assert run("fk", THREE_DOF, 1, 2, 3, *words, "--out", path) == (0, "", "")
+        assert path.read_text() == run("fk", THREE_DOF, 1, 2, 3, *words).out
+        assert [p.name for p in tmp_path.iterdir()] == ["out"]

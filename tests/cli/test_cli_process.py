@@ -1,0 +1,116 @@
+"""What only a process of its own shows: pipes, signals, full disks, exit codes of the interpreter."""
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from command_line import ROOT, THREE_DOF, process
+
+ARMKIN = [sys.executable, "-m", "armkin"]
+MANY = b"1,2,3\n" * 20_000
+
+
+def test_a_process_ends_with_the_exit_code() -> None:
+    assert process("fk", THREE_DOF, -30, 5, -5).code == 0
+    assert process("fk", THREE_DOF, -30, 5).code == 2
+    assert process("ik", THREE_DOF, 900, 0, 0).code == 3
+
+
+def test_head_has_seen_enough(tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_bytes(MANY)
+    command = [*ARMKIN, "fk", THREE_DOF, "--batch", str(tmp_path / "in.csv")]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as p:
+        assert p.stdout is not None
+        assert p.stderr is not None
+        assert p.stdout.readline().startswith(b"q1,q2,q3,x,y,z")
+        p.stdout.close()
+        assert p.wait(30) == 1
+        assert p.stderr.read() == b""
+
+
+@pytest.mark.parametrize("words", [["fk", THREE_DOF, "1", "2", "3"], ["schema"], ["--help"], ["--version"]])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk(words: list[str], unbuffered: str) -> None:
+    with open("/dev/full", "wb") as full:
+        settings = {"stdout": full, "stderr": subprocess.PIPE, "capture_output": False}
+        result = process(*words, env={**os.environ, "PYTHONUNBUFFERED": unbuffered}, **settings)
+    assert result.code == 1
+    assert result.err == "error: standard output: No space left on device\n"
+
+
+def test_a_closed_stdout() -> None:
+    result = process("fk", THREE_DOF, 1, 2, 3, preexec_fn=lambda: os.close(1))
+    assert result.code == 1
+    assert "standard output is closed" in result.err
+
+
+def test_a_closed_stderr_and_stdin() -> None:
+    def close() -> None:
+        os.close(0)
+        os.close(2)
+
+    assert process("fk", THREE_DOF, 1, 2, preexec_fn=close).code == 2
+    assert process("fk", THREE_DOF, "--batch", "-", preexec_fn=close).code == 1
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signals(number: int, code: int, tmp_path: Path) -> None:
+    command = [*ARMKIN, "fk", THREE_DOF, "--batch", "-", "--out", str(tmp_path / "out")]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as p:
+        assert p.stdin is not None
+        assert p.stderr is not None
+        p.stdin.write(MANY)
+        p.stdin.flush()
+        while not list(tmp_path.iterdir()):  # it has begun to write
+            time.sleep(0.01)
+        p.send_signal(number)
+        assert p.wait(10) == code
+        assert p.stderr.read() == b""
+        p.stdin.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def on_a_terminal(words: list[str], stdin: bytes, **environment: str) -> str:
+    """What a command writes to stderr if that is a terminal."""
+    master, slave = pty.openpty()
+    env = {**os.environ, "TERM": "xterm", **environment}
+    with subprocess.Popen(
+        [*ARMKIN, *words], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=slave, env=env
+    ) as p:
+        os.close(slave)
+        p.communicate(stdin)
+    seen = b""
+    while True:
+        try:
+            part = os.read(master, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        seen += part
+    os.close(master)
+    return seen.decode()
+
+
+def test_colours_and_progress_on_a_terminal_only() -> None:
+    batch = ["fk", THREE_DOF, "--batch", "-"]
+    plain = process(*batch, input=MANY, env={**os.environ, "NO_COLOR": ""})
+    assert plain.err == ""
+    seen = on_a_terminal(batch, MANY, NO_COLOR="")
+    assert " rows" in seen
+    assert "\x1b[31merror:" in on_a_terminal(["fk", THREE_DOF, "1"], b"", NO_COLOR="")
+    assert "\x1b[31m" not in on_a_terminal(["fk", THREE_DOF, "1"], b"", NO_COLOR="1")
+
+
+def test_an_ascii_terminal_can_show_everything() -> None:
+    env = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    assert process("info", THREE_DOF, env=env).code == 0
+    assert process("fk", "\u00e9\udcff.yaml", 1, env=env).code == 1

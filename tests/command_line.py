@@ -1,0 +1,58 @@
+"""Running the command line in tests: in this process (quick) or as a process of its own."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
+
+ROOT = Path(__file__).parent.parent
+THREE_DOF = "robots/three_dof.yaml"
+
+
+class Result(NamedTuple):
+    """What a command line came to."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """The one JSON object on stdout."""
+        return json.loads(self.out)
+
+    @property
+    def lines(self) -> list[Any]:
+        """JSON Lines on stdout."""
+        return [json.loads(line) for line in self.out.splitlines()]
+
+
+def run(*words: object, stdin: bytes = b"") -> Result:
+    """Run a command line in this process, from the project's folder."""
+    from armkin.cli.app import run as run_app
+
+    out, err, before, folder = io.StringIO(), io.StringIO(), sys.stdin, Path.cwd()
+    sys.stdin = io.TextIOWrapper(io.BytesIO(stdin))
+    os.chdir(ROOT)
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            code = run_app([str(word) for word in words])
+    finally:
+        sys.stdin = before
+        os.chdir(folder)
+    return Result(code, out.getvalue(), err.getvalue())
+
+
+def process(*words: object, **settings: Any) -> Result:
+    """Run `python -m armkin` as a process."""
+    done = subprocess.run(
+        [sys.executable, "-m", "armkin", *map(str, words)],
+        **{"cwd": ROOT, "capture_output": True, "timeout": 60, **settings},
+    )
+    return Result(done.returncode, (done.stdout or b"").decode(), (done.stderr or b"").decode())
