@@ -78,9 +78,9 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     times = np.array(tick_times(move.segments))
     assert times[-1] == move.cycles
 
-    # Every motor stays within one count of its share of one trapezoid, gentler than what was asked for.
+    # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid, gentler than what was asked for.
     ideal = trapezoid(times / CLOCK, n, move.peak * n, accel * motion._EASE) / n
-    late = 1 + 2e-3 * n  # the device's whole cycles make a cruise up to 0.2 % slower
+    late = 1.25 + 2e-3 * n  # the device's whole cycles make a cruise up to 0.2 % slower
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
         assert np.abs(made(move.segments, k) - ideal * (b - a)).max() <= late
         assert sum(s.steps[k] > 0 for s in move.segments) == 0 or b > a  # monotone

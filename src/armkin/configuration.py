@@ -46,6 +46,10 @@ class Grip:
         exact = self.at_zero + value * self.per_unit
         return int(math.copysign(math.floor(abs(exact) + 0.5 + 1e-9), exact))
 
+    def value(self, count: int) -> float:
+        """The drive's degrees (or mm) at a count."""
+        return (count - self.at_zero) / self.per_unit
+
 
 @dataclass(frozen=True)
 class Configuration:

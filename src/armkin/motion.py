@@ -44,7 +44,8 @@ _GROWTH = 1.08  # time at a ramp segment's end over time at its start, seen from
 # Inside such a segment the interval is linear, and at its fast end the acceleration is
 # 4 g^2 / (1 + g)^2 times the mean: plan the mean that much lower.
 _EASE = ((1 + _GROWTH) / (2 * _GROWTH)) ** 2
-_SHORTEST = 0.004  # [s] a segment's time at least, unless a single step is shorter
+_SHORTEST = (0.002, 0.012)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
+_AHEAD = 26  # segments that the board's queue surely holds (32, but for those under way)
 _CRUISE = 0.05  # [s] a cruise segment's time at least
 _TICK = 1300  # [cycles] slower segments are oversampled down to about this
 _LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
@@ -206,24 +207,53 @@ def line(
     top: float,
     accel: float,
     *,
+    brakes: Array | None = None,
     clock: int = CLOCK,
     min_interval: int = MIN_INTERVAL,
 ) -> Move:
     """The segments of a straight line in counts, from rest to rest.
 
-    top: [1/s] greatest speed, accel: [1/s^2] greatest acceleration, both in lines. The leader's rate must
-    be within the device's: `clock` / `min_interval`.
+    top: [1/s] greatest speed, accel: [1/s^2] greatest acceleration, both in lines. brakes: [counts/s^2] of
+    every motor's hold, see `_holds`. The leader's rate must be within the device's: `clock` / `min_interval`.
     """
     first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
     n = int(np.abs(last - first).max(initial=0))
     if n == 0:
         return Move(first, last, (), 0, 0.0)
-    ramp = _Trapezoid(n, top * n, accel * n * _EASE)
+    low, high = _SHORTEST
+    shortest = min(max(low, math.sqrt(4 / (accel * n))), high)
+    for coarse in (1, 2, 4, 8):
+        ramp = _Trapezoid(n, top * n, accel * n * _EASE, shortest * coarse)
+        segments, total = _cut(ramp, last - first, clock, min_interval)
+        if brakes is None or _holds(segments, brakes, clock):
+            break
+    return Move(first, last, tuple(segments), total, ramp.peak / n)
+
+
+def _holds(segments: list[Segment], brakes: Array, clock: int) -> bool:
+    """Whether the queue always holds the way to a stop, as the board sees it.
+
+    To the board a motor with one step in a short segment is fast, however seldom its steps are; so its
+    time to a stop, u, may be far above the plan's. It holds when the queued time falls to u / 2 + u / 16.
+    """
+    lengths = np.array([cycles_of(s) for s in segments]) / clock
+    fastest = np.array([min(s.interval, s.last_interval) * s.ticks for s in segments]) / clock
+    u = (np.abs([s.steps for s in segments]) / fastest[:, None] / brakes).max(axis=1)
+    behind = np.concatenate(
+        [np.cumsum(lengths), np.full(_AHEAD, np.inf)]
+    )  # beyond the end nothing is missing
+    queued = behind[_AHEAD : _AHEAD + len(segments)] - behind[: len(segments)]
+    return bool(np.all(queued > u * 0.5625 + 0.004))
+
+
+def _cut(ramp: _Trapezoid, span: Counts, clock: int, min_interval: int) -> tuple[list[Segment], int]:
+    """A trapezoid's segments and their cycles."""
+    n = ramp.n
     segments: list[Segment] = []
     total, carry = 0, 0.0
     bounds = list(ramp.bounds())
     for a, b in pairwise(bounds):
-        steps = _rounded(last - first, b, n) - _rounded(last - first, a, n)
+        steps = _rounded(span, b, n) - _rounded(span, a, n)
         exact = (ramp.time(b) - ramp.time(a)) * clock
         ticks, interval, add = _spacing(ramp, a, b, exact + carry, clock, min_interval)
         segments.append(Segment(ticks, interval, add, tuple(int(s) for s in steps)))
@@ -233,7 +263,7 @@ def line(
         if ramp.cruising(a, b):
             carry = 0.0
         total += cycles
-    return Move(first, last, tuple(segments), total, ramp.peak / n)
+    return segments, total
 
 
 def cycles_of(segment: Segment) -> int:
@@ -271,6 +301,7 @@ class _Trapezoid:
     n: int
     top: float
     accel: float
+    shortest: float  # [s] a ramp's segment
 
     @property
     def peak(self) -> float:
@@ -306,17 +337,23 @@ class _Trapezoid:
         whole = min(int(self.way), self.n // 2)
         while rise[-1] < whole:
             t = self.time(rise[-1])
-            t = max(t * _GROWTH, t + _SHORTEST)
+            t = max(t * _GROWTH, t + self.shortest)
             at = max(int(self.accel * t * t / 2), rise[-1] + 1)
             rise.append(whole if at + (at - rise[-1]) // 2 > whole else at)
-        yield from rise
         middle = self.n - 2 * whole
-        if middle:
+        if len(rise) > 1 and 2 * middle < rise[-1] - rise[-2]:
+            # Too short for a segment of its own: the way up takes it along.
+            yield from (*rise[:-1], whole + middle)
+            rise.pop()
+        else:
+            yield from rise
             longest = max(_CRUISE, (_GROWTH - 1) * self.peak / self.accel)
             parts = min(max(1, math.ceil(middle / (self.peak * longest))), middle)
             parts = max(parts, math.ceil(middle / 30_000))
             yield from (whole + middle * i // parts for i in range(1, parts))
-        yield from (self.n - at for at in reversed(rise) if self.n - at > whole)
+            if middle == 0:
+                rise.pop()
+        yield from (self.n - at for at in reversed(rise))
 
 
 def _spacing(
@@ -334,8 +371,9 @@ def _spacing(
     mean = cycles / ticks
     # Intervals at the two ends: right at the faster one, and at the other such that the time is right.
     fast = mean
-    corner = a < ramp.way < b or a < ramp.n - ramp.way < b
-    if not corner and not ramp.cruising(a, b):
+    inner = (b - a) * 0.2  # a corner of the trapezoid nearer than that to an end changes nothing
+    corner = any(a + inner < at < b - inner for at in (ramp.way, ramp.n - ramp.way))
+    if not corner and ramp.speed(a) != ramp.speed(b):
         fast = min(clock / (over * max(ramp.speed(a), ramp.speed(b))), mean)
     slow = 2 * mean - fast
     change = fast - slow if ramp.speed(b) > ramp.speed(a) else slow - fast
@@ -378,4 +416,7 @@ def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, 
             f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}\n"
             f"lower its max_speed, or send with --speed {math.floor(100 * speed * allowed / rates[k])}"
         )
-    return line(start.tolist(), end.tolist(), top, accel, clock=clock, min_interval=min_interval)
+    brakes = motor_accel(arm)
+    return line(
+        start.tolist(), end.tolist(), top, accel, brakes=brakes, clock=clock, min_interval=min_interval
+    )

@@ -36,9 +36,9 @@ class DeviceError(LinkError):
 
 
 class StoppedError(Exception):
-    """The operator asked to stop: the arm stands, `status` says where."""
+    """The operator asked to stop: the arm stands, `status` says where (None: it was not asked yet)."""
 
-    def __init__(self, status: Status) -> None:
+    def __init__(self, status: Status | None = None) -> None:
         super().__init__("stopped")
         self.status = status
 
@@ -294,7 +294,7 @@ class Session:
 
     def _check_stop_idle(self) -> None:
         if self._stop():
-            raise KeyboardInterrupt
+            raise StoppedError
 
     def _silent(self) -> LinkError:
         return LinkError(

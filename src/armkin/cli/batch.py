@@ -116,12 +116,10 @@ def csv_line(record: Iterable[Any]) -> str:
     >>> csv_line([1.5, "left, elbow up", True, None])
     '1.5,"left, elbow up",true,'
     """
-    return ",".join(map(_cell, record))
+    return ",".join([repr(value) if type(value) is float else _cell(value) for value in record])
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return repr(value)
     if value is None:
         return ""
     if isinstance(value, bool):

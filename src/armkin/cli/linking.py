@@ -1,0 +1,140 @@
+"""What the commands that talk to a board share: the port's options, signals, an open machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import output, render, units
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+    from armkin.configuration import Configuration
+    from armkin.machine import Machine
+
+PortName = Annotated[
+    str,
+    typer.Option(
+        "--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."
+    ),
+]
+Baud = Annotated[int, typer.Option("--baud", metavar="N", help="The firmware's rate.")]
+AssumeHome = Annotated[
+    bool,
+    typer.Option(
+        "--assume-home", help="The position is lost and the arm stands in its home pose. Refused while known."
+    ),
+]
+BAUD = 250_000
+
+
+class Stop:
+    """Whether somebody asked to stop: Ctrl-C, SIGTERM, a closed terminal."""
+
+    def __init__(self) -> None:
+        self.signal = 0
+
+    def __call__(self) -> bool:
+        return self.signal != 0
+
+    def caught(self, number: int, frame: object) -> None:
+        """The signal handler; a second Ctrl-C does not wait for the board."""
+        if self.signal:
+            raise KeyboardInterrupt
+        self.signal = number
+
+
+@contextmanager
+def stoppable() -> Iterator[Stop]:
+    """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
+    from armkin.session import StoppedError
+
+    stop = Stop()
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    before = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
+    try:
+        yield stop
+    except StoppedError:
+        raise SystemExit(128 + stop.signal) from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def machine(arm: Arm, configuration: Configuration, port: str, baud: int) -> Iterator[Machine]:
+    """The arm on the board behind a port, given back at the end; a signal stops the arm first."""
+    from armkin.link import open_port
+    from armkin.machine import Machine
+    from armkin.session import StoppedError
+
+    with stoppable() as stop:
+        link = open_port(port, board=configuration.board, baud=baud)
+        try:
+            if link.simulated:
+                output.note(
+                    "the simulated board starts with the arm in its home pose, and forgets all at the end"
+                )
+            one = Machine(link, arm, configuration, stop)
+            try:
+                yield one
+            except StoppedError as error:
+                if error.status is not None:
+                    one.status = error.status
+                    output.warn(f"stopped: {one.standing()}")
+                raise
+        finally:
+            link.close()
+
+
+def configured(arm: Arm) -> Configuration:
+    """The arm's board and configuration."""
+    from armkin.configuration import configure
+
+    return configure(arm)
+
+
+def where(machine: Machine) -> dict[str, Any]:
+    """JSON: where the arm stands."""
+    import armkin
+
+    arm = machine.arm
+    known = machine.position() != "lost"
+    q = machine.joints() if known else None
+    return {
+        "position": machine.position(),
+        "pulses": list(machine.counts()) if known else None,
+        "joints": None if q is None else units.joints_out(arm, q).tolist(),
+        "joint_units": units.names(arm),
+        "position_mm": None if q is None else (armkin.fk(arm, q)[:3, 3] + 0.0).tolist(),
+    }
+
+
+def where_text(arm: Arm, found: dict[str, Any]) -> str:
+    """The same for people."""
+    from armkin.pulses import motor_names, pulse_units
+
+    if found["joints"] is None:
+        return f"{arm.name}: its position is lost\n"
+    rows = [["", *render.joint_headings(arm)], ["joints", *map(render.fixed, found["joints"])]]
+    head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
+    pulses = [["", *head], ["pulses", *map(str, found["pulses"])]]
+    tool = [["", "x/mm", "y/mm", "z/mm"], ["tool", *map(render.fixed, found["position_mm"])]]
+    tables = [render.table(part) for part in (rows, pulses, tool)]
+    return "\n".join([f"{arm.name}: position {found['position']}", *tables, ""])
+
+
+def pid_alive(pid: int) -> bool:
+    """Whether a process exists."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -1,0 +1,94 @@
+"""Answers of `fk`, `ik` and `pulses` on standard input, as `armkin send` takes them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+from armkin.errors import NoSolutionError, UsageError
+
+_LARGEST = 100_000_000  # characters
+
+
+@dataclass(frozen=True)
+class Piped:
+    """Poses for one robot file."""
+
+    robot_file: str
+    robot_sha256: str
+    poses: list[Pose]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose in the terms of the answer: joint values [deg | mm], or pulses if it had them."""
+
+    joints: list[float]
+    pulses: list[int] | None
+
+
+def read(robot: str | None) -> Piped:
+    """What a command before the pipe has printed: one JSON object, or one a line.
+
+    robot: a robot file given as well, which must be the same. Raises UsageError if there is nothing to send,
+    NoSolutionError for an answer of ik without a best branch.
+    """
+    if sys.stdin is None or sys.stdin.isatty():
+        raise UsageError(
+            "nothing to send: give joint values, --target X,Y,Z or --batch FILE,\n"
+            "or pipe an answer in: armkin ik ROBOT 390 80 300 --json | armkin send --port PORT"
+        )
+    text = sys.stdin.read(_LARGEST)
+    if not text.strip():
+        raise UsageError("nothing to send: standard input is empty (did the command before the pipe fail?)")
+    answers = [_parsed(part) for part in _parts(text)]
+    first = answers[0]
+    for answer in answers:
+        if (answer["robot_file"], answer["robot_sha256"]) != (first["robot_file"], first["robot_sha256"]):
+            raise UsageError("the answers on standard input are of different robot files: send one at a time")
+    if robot is not None and robot != first["robot_file"]:
+        raise UsageError(
+            f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input"
+        )
+    return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
+
+
+def _parts(text: str) -> list[str]:
+    lines = [line for line in text.splitlines() if line.strip()]
+    return lines if all(line.startswith("{") and line.endswith("}") for line in lines) else [text]
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    try:
+        answer = json.loads(text)
+    except (ValueError, RecursionError):
+        raise UsageError("standard input is no JSON: give --json to the command before the pipe") from None
+    if not isinstance(answer, dict) or not all(
+        isinstance(answer.get(key), str) for key in ("robot_file", "robot_sha256")
+    ):
+        raise UsageError("standard input is no answer of armkin fk, ik or pulses: it names no robot_file")
+    return answer
+
+
+def _pose(answer: dict[str, Any]) -> Pose:
+    if "branches" in answer:
+        best = answer.get("best")
+        branches = answer["branches"]
+        if best is None:
+            raise NoSolutionError(
+                "the answer on standard input has no branch within limits: nothing was moved"
+            )
+        if not isinstance(best, int) or not isinstance(branches, list) or not 0 <= best < len(branches):
+            raise UsageError("the answer on standard input is damaged: its best branch is not there")
+        return Pose(_numbers(branches[best].get("joints")), None)
+    pulses = answer.get("pulses")
+    whole = isinstance(pulses, list) and all(type(p) is int for p in pulses)
+    return Pose(_numbers(answer.get("joints")), pulses if whole else None)
+
+
+def _numbers(values: Any) -> list[float]:
+    if not isinstance(values, list) or not values or not all(type(v) in (int, float) for v in values):
+        raise UsageError("the answer on standard input has no joints to send")
+    return [float(v) for v in values]
