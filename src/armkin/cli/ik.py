@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -37,9 +37,7 @@ def ik(
     branch: BranchName = None,
     turns: Annotated[
         bool,
-        typer.Option(
-            "--turns", help="Also the other copies of each branch, whole turns away, within limits."
-        ),
+        typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits."),
     ] = False,
     task: TaskName = None,
     lock: Lock = None,
@@ -88,9 +86,7 @@ def ik(
         if tally.unsolved:
             raise render.unsolved_rows(tally)
         return
-    [answer] = _answers(
-        request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True
-    )
+    [answer] = _answers(request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None:
@@ -120,7 +116,7 @@ def _answers(
             "joint_units": units.names(arm),
             "branch_count": len(found.branches),
             "branches_within_limits": sum(branch.within_limits for branch in found.branches),
-            "branches": _branches(request, listed, turns),
+            "branches": [_branch(request, branch, turns) for branch in listed],
             "best": best,
             "closest": None,
             "free_joints": found.free,
@@ -137,38 +133,20 @@ def _answers(
         yield answer
 
 
-def _branches(
-    request: solving.Request, branches: Sequence[solving.Branch], turns: bool
-) -> list[dict[str, Any]]:
-    import numpy as np
-
-    import armkin
-
+def _branch(request: solving.Request, branch: solving.Branch, turns: bool) -> dict[str, Any]:
     arm = request.arm
-    if not branches:
-        return []
-    q = np.array([branch.q for branch in branches])
-    joints = units.joints_out(arm, q)
-    violations = render.violations(arm, joints, q)
-    rows = []
-    for i, branch in enumerate(branches):
-        row = {
-            "joints": joints[i].tolist(),
-            "name": branch.name,
-            "within_limits": branch.within_limits,
-            "violations": violations[i],
-            "residual_mm": branch.residual_mm,
-            "residual_deg": float(units.angles_out(branch.residual_rad)),
-            "motion": branch.motion,
-        }
-        if turns:
-            near = units.joints_in(arm, request.near_out)
-            copies = armkin.turns(arm, branch.q, near=near)
-            held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
-            same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
-            row["turns"] = units.joints_out(arm, copies[same]).tolist()
-        rows.append(row)
-    return rows
+    row = {
+        "joints": branch.joints,
+        "name": branch.name,
+        "within_limits": branch.within_limits,
+        "violations": [render.violation(arm, i, branch.joints[i]) for i in branch.outside],
+        "residual_mm": branch.residual_mm,
+        "residual_deg": branch.residual_deg,
+        "motion": branch.motion,
+    }
+    if turns:
+        row["turns"] = solving.turns(request, branch)
+    return row
 
 
 def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
@@ -182,9 +160,7 @@ def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
 
 def _text(arm: Arm, answer: dict[str, Any]) -> str:
     headings = render.joint_headings(arm)
-    goal = render.labelled(
-        answer["target_labels"], answer["target"], units.label_units(answer["target_labels"])
-    )
+    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])

@@ -21,17 +21,18 @@ def head(arm: Arm) -> dict[str, Any]:
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[dict[str, Any]]]:
     """For each row, the joints outside their limits: values (N, n) [deg | mm], q the same in [rad | mm]."""
-    import numpy as np
-
     from armkin.limits import outside
 
-    found: list[list[dict[str, Any]]] = [[] for _ in values]
-    limits = units.limits_out(arm)
-    for row, i in np.argwhere(outside(arm, q)).tolist():
-        lower, upper = map(finite, limits[i])
-        value = float(values[row, i])
-        found[row].append({"joint": arm.joint_names[i], "value": value, "lower": lower, "upper": upper})
-    return found
+    return [
+        [violation(arm, i, row[i]) for i, is_outside in enumerate(flags) if is_outside] if any(flags) else []
+        for row, flags in zip(values.tolist(), outside(arm, q).tolist(), strict=True)
+    ]
+
+
+def violation(arm: Arm, joint: int, value: float) -> dict[str, Any]:
+    """A joint outside its limits, for JSON; value: [deg | mm]."""
+    lower, upper = map(finite, units.limits_out(arm)[joint])
+    return {"joint": arm.joint_names[joint], "value": value, "lower": lower, "upper": upper}
 
 
 def finite(value: float) -> float | None:
@@ -119,17 +120,14 @@ def unsolved(arm: Arm, answer: dict[str, Any]) -> NoSolutionError:
     if answer["status"] == "unreachable":
         return NoSolutionError(f"{arm.name} cannot reach this target; {away}")
     if answer["branches_within_limits"]:
-        return NoSolutionError(
-            "no branch of that name is within limits, but others are: --all-branches lists them"
-        )
+        return NoSolutionError("no branch of that name is within limits, but others are: --all-branches lists them")
     return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
 
 
 def unsolved_rows(tally: Tally) -> NoSolutionError:
     """How many rows of a batch have no best branch."""
     return NoSolutionError(
-        f"{tally.unsolved} of {tally.rows} rows have no branch within limits; "
-        f"the first is row {tally.first_unsolved}"
+        f"{tally.unsolved} of {tally.rows} rows have no branch within limits; the first is row {tally.first_unsolved}"
     )
 
 

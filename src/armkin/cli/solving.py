@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armkin.cli import units
 from armkin.cli.numbers import number, whole
@@ -37,15 +37,16 @@ class Request:
         return units.home_out(self.arm) if self.near is None else list(self.near)
 
 
-@dataclass(frozen=True)
-class Branch:
+class Branch(NamedTuple):
     """One branch of one target, as joint values of the whole arm."""
 
     q: Array  # (n,) [rad | mm]
+    joints: list[float]  # the same in [deg | mm]
     name: str
     within_limits: bool
+    outside: list[int]  # indices of the joints outside their limits
     residual_mm: float
-    residual_rad: float
+    residual_deg: float
     motion: float  # sum of |change| from near [deg | mm]
 
 
@@ -93,6 +94,19 @@ def closest(request: Request, target: Array) -> Closest:
     one = armkin.lock(arm, held) if held else arm
     nearest = armkin.closest(one, target, request.task, near=near[_kept(arm, held)])
     return replace(nearest, q=armkin.unlock(arm, held, nearest.q)) if held else nearest
+
+
+def turns(request: Request, branch: Branch) -> list[list[float]]:
+    """All copies of a branch within limits, whole turns away, the nearest first [deg | mm]; held joints stay."""
+    import numpy as np
+
+    import armkin
+
+    arm = request.arm
+    copies = armkin.turns(arm, branch.q, near=units.joints_in(arm, request.near_out))
+    held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
+    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
+    return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
 
 
 def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
@@ -159,28 +173,37 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
 
     arm = request.arm
     q = armkin.unlock(arm, held, s.q) if held else s.q
-    within = (
-        s.within_limits & ~limits.outside(arm, np.nan_to_num(q)).any(axis=-1) if held else s.within_limits
-    )
-    change = units.joints_out(arm, np.abs(q - near))
-    motion = change.sum(axis=-1)
+    outside = limits.outside(arm, q)  # nan is not outside anything
+    within = s.within_limits & ~outside.any(axis=-1)
     mm, rad = s.residual()
+    columns = (
+        units.joints_out(arm, q),
+        s.branch,
+        within,
+        mm,
+        units.angles_out(rad),
+        units.joints_out(arm, np.abs(q - near)).sum(axis=-1),
+    )
+    # From here on plain Python: numpy is slow at single numbers, and a batch has many.
+    joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     kept = [name for name in arm.joint_names if name not in held]
-    for i in range(len(s.status)):
+    for i, (valid, status) in enumerate(zip(s.valid.tolist(), s.status.tolist(), strict=True)):
         branches = [
             Branch(
                 q[i, b],
-                s.names[s.branch[i, b]],
-                bool(within[i, b]),
-                float(mm[i, b]),
-                float(rad[i, b]),
-                float(motion[i, b]),
+                joints[i][b],
+                s.names[names[i][b]],
+                legal[i][b],
+                [] if legal[i][b] else np.flatnonzero(outside[i, b]).tolist(),
+                miss[i][b],
+                turn[i][b],
+                motion[i][b],
             )
-            for b in np.flatnonzero(s.valid[i])
+            for b in range(len(valid))
+            if valid[b]
         ]
-        free = [name for name, is_free in zip(kept, s.free[i], strict=True) if is_free]
-        status = armkin.Status(int(s.status[i])).name.lower()
-        yield Answer(status, s.method, s.why, s.complete, free, branches, None)
+        free = [name for name, is_free in zip(kept, s.free[i].tolist(), strict=True) if is_free]
+        yield Answer(armkin.Status(status).name.lower(), s.method, s.why, s.complete, free, branches, None)
 
 
 def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answer:
