@@ -162,7 +162,9 @@ class Straight:
             else:
                 names[id(node)] = f"b{len(self._buffers)}"
                 self._buffers.append(kind)
-            lines.append(f"{node.op}({', '.join(arguments)}, {names[id(node)]})")
+            # numpy deprecates a positional third argument of minimum and maximum
+            out = "out=" if node.op in ("minimum", "maximum") else ""
+            lines.append(f"{node.op}({', '.join(arguments)}, {out}{names[id(node)]})")
         parameters = [names[id(x)] for x in self._inputs] + [f"b{k}" for k in range(len(self._buffers))]
         scope = {**constants, **{node.op: getattr(np, node.op) for node in self._nodes}}
         return _compiled(parameters, lines, list(map(name, self._outputs)), scope)

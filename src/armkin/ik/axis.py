@@ -36,7 +36,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         solve = inner.pairs
 
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
-            found = solve(_pose(goal), [*prefer, Pair(1.0, 0.0)])
+            virtual = None if prefer[0] is None else Pair(1.0, 0.0)
+            found = solve(_pose(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5])
 
         return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels)

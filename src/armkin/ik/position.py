@@ -23,7 +23,16 @@ from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
 from armkin.ik.geometry import Geometry
-from armkin.ik.subproblems import Candidates, Pair, Prefer, linear, quadratic, rotation_between, trig_quadratic
+from armkin.ik.subproblems import (
+    Candidates,
+    Pair,
+    Prefer,
+    linear,
+    normalised,
+    quadratic,
+    rotation_between,
+    trig_quadratic,
+)
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Entry
 
@@ -182,6 +191,7 @@ class Position:
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             third, doubt = linear(alone[1], alone[2], -alone[0], 0, self.scale, prefer[2])
+            third = normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
         b1 = third.c
@@ -191,7 +201,7 @@ class Position:
         second, doubt2 = linear(
             ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1]
         )
-        return third, second, doubt | doubt2
+        return third, normalised(second), doubt | doubt2
 
     def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -251,7 +261,8 @@ class Position:
             if np.abs(slope).max() < 1e-12:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair((-coefficients[0] / slope)[None, None, None, :], None), np.zeros(1, bool)
-        return linear(coefficients[1], coefficients[2], -coefficients[0], 0, self.scale, prefer[2])
+        third, doubt = linear(coefficients[1], coefficients[2], -coefficients[0], 0, self.scale, prefer[2])
+        return normalised(third), doubt
 
     @staticmethod
     def _at(coefficients: list[Entry], third: Pair) -> Array:

@@ -100,6 +100,12 @@ def linear(
     return _prefer(Pair(cos, sin), h2 < least, prefer), doubt
 
 
+def normalised(pair: Pair) -> Pair:
+    """The pair on the unit circle: the closest angle where `linear` found no real root."""
+    size = np.sqrt(np.maximum(pair.c * pair.c + pair.s * pair.s, 1e-300))
+    return Pair(pair.c / size, pair.s / size)
+
+
 def rotation_between(
     ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: float, prefer: Pair | None
 ) -> tuple[Pair, Array]:
