@@ -6,7 +6,7 @@ Not the one that armkin ships (that is link.py): this one can be wrong on purpos
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from emulator import EmulatedBoard
 
@@ -193,19 +193,14 @@ class BareHost:
         return status
 
 
-def cruise(axes: int, rate: float, seconds: float, signs: Sequence[int], ramp: float = 0.1, ticks: int = 100) -> list[Segment]:
-    """Up to `rate` ticks/s, all axes one step a tick, and down again: `ramp` s each way."""
+def cruise(rate: float, seconds: float, share: Sequence[float], ramp: float = 0.1, length: float = 0.01) -> list[Segment]:
+    """Up to `rate` ticks/s and down again in `ramp` s each way; axis i makes `share[i]` steps a tick."""
     segments: list[Segment] = []
-    floor = CLOCK // 65535 + 1
     time = 0.0
     while time < seconds:
         slope = min(1.0, time / ramp + 0.02, (seconds - time) / ramp + 0.02)
-        interval = round(CLOCK / max(rate * slope, floor * 4))
-        n = max(10, min(ticks, round(0.01 * CLOCK / interval)))
-        segments.append(Segment(n, interval, 0, tuple(s * n for s in signs[:axes])))
-        time += n * interval / CLOCK
+        interval = round(CLOCK / (rate * slope))
+        ticks = max(10, round(length * CLOCK / interval))
+        segments.append(Segment(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
+        time += ticks * interval / CLOCK
     return segments
-
-
-def scaled(segment: Segment, **change: int) -> Segment:
-    return replace(segment, **change)

@@ -14,7 +14,7 @@
 #define USART_UDRE_vect USART0_UDRE_vect
 #endif
 
-enum { RING = 128, MASK = RING - 1 };
+enum { RING = RAMEND > 4096 ? 256 : 128, MASK = RING - 1 };  // powers of two
 
 static uint8_t received[RING], sending[RING];
 static volatile uint8_t received_head, received_tail, sending_head, sending_tail;

@@ -8,12 +8,13 @@
 #include "../core/motion.h"
 #include "avr.h"
 
-enum { NONE = 0xFF, EARLY = STEPPERS ? 0 : 40 };  // half µs
+enum { EARLY = STEPPERS ? 0 : 40, GAP = 128 };  // half µs; GAP: between one servo's pulse and the next
 
-static uint16_t width[SERVOS];        // half µs of this frame's pulses, 0: none
-static uint8_t current = NONE;        // whose pulse is running
-static uint8_t moment;                // timer count that the compare is set for
-static uint16_t ahead;                // half µs from there to the pulse's end
+static uint16_t width[SERVOS + 1];  // half µs of this frame's pulses, 0: none
+static uint8_t current;             // whose edge is next
+static bool rising;                 // which
+static uint8_t moment;              // timer count that the compare is set for
+static uint16_t ahead;              // half µs from there to the edge
 static volatile bool busy;
 
 static inline void edge(uint8_t servo, bool high) {
@@ -28,15 +29,24 @@ static inline void edge(uint8_t servo, bool high) {
     SERVO_PINS(SERVO_EDGE)
 }
 
-static inline void next_pulse(void) {
-    do {
+// From `current` on, the first servo that has a pulse. False: none is left.
+static inline bool find_pulse(void) {
+    while (current < SERVOS && !width[current]) {
         current++;
-    } while (current < SERVOS && !width[current]);
-    if (current < SERVOS) {
-        edge(current, true);
+    }
+    return current < SERVOS;
+}
+
+static inline void after_edge(void) {
+    if (rising) {
         ahead = width[current];
-    } else {
-        current = NONE;
+        rising = false;
+        return;
+    }
+    current++;
+    rising = true;
+    ahead = GAP;
+    if (!find_pulse()) {
         TIMSK2 = 0;
         busy = false;
     }
@@ -46,14 +56,13 @@ ISR(TIMER2_COMPA_vect) {
     if (ahead == 0) {
         while (EARLY && (int8_t)(TCNT2 - moment) < 0) {
         }
-        edge(current, false);
-        next_pulse();
-        if (ahead == 0) {
-            return;
+        edge(current, rising);
+        if (STEPPERS) {
+            sei();  // a tick need not wait for the rest: the next compare is far
         }
-    }
-    if (STEPPERS) {
-        sei();  // the edges are made; the rest can wait for a tick. The next compare is far
+        after_edge();
+    } else if (STEPPERS) {
+        sei();
     }
     if (ahead >= 512) {
         ahead -= 256;  // the same compare, a turn later
@@ -75,7 +84,11 @@ void servo_frame(void) {
         const bool on = motion.pulses && memory.known >> (STEPPERS + i) & 1;
         width[i] = on ? 2 * (uint16_t)counts[STEPPERS + i] : 0;
     }
-    busy = true;
+    current = 0;
+    if (!find_pulse()) {
+        return;
+    }
+    busy = rising = true;
     ahead = 0;
     TIFR2 = 1 << OCF2A;
     moment = TCNT2 + 16 + EARLY;

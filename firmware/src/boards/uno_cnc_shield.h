@@ -6,7 +6,7 @@
 #define SWITCHES 3
 #define QUEUE_SLOTS 32  // a power of two
 #define FRAME_MAX 160
-#define MIN_INTERVAL 400  // cycles between ticks: 40 kHz
+#define MIN_INTERVAL 448  // cycles between ticks: 35.7 kHz
 
 // axis, STEP port and bit, DIR port and bit
 #define STEPPER_PINS(P) \

@@ -12,7 +12,7 @@ enum { HEAD = 6 };           // type, tag, mask, flags, n
 // Gathered once, as the loop over segments and lanes is what limits the board's segments per second.
 struct lane {
     uint8_t axis;
-    uint16_t bit;  // 1 << axis
+    axes_t bit;  // 1 << axis
     uint16_t step_time;
     int32_t lower, upper;
     int32_t at;

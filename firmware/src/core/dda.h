@@ -9,11 +9,18 @@
 
 #include "../board.h"
 
+// One bit an axis.
+#if AXES <= 8
+typedef uint8_t axes_t;
+#else
+typedef uint16_t axes_t;
+#endif
+
 struct segment {
     uint16_t ticks;
     uint16_t interval;     // cycles to the first tick
     int16_t add;           // 1/256 cycle a tick
-    uint16_t back;         // axes that count down
+    axes_t back;           // axes that count down
     uint16_t steps[AXES];  // magnitudes
     uint8_t last;          // the motion may rest after this one
 };
@@ -31,7 +38,6 @@ struct dda {
     fine_t interval;            // to the next tick, as planned
     uint16_t error[STEPPERS + 1];
     uint8_t bits;               // STEP pins of the next tick
-    uint8_t beat;               // counts ticks: whoever reads the rest looks whether it changed
     uint8_t overruns;
 
     uint16_t stretch;      // hold: intervals become `stretch`/256 times as long; 256: as planned
@@ -128,7 +134,6 @@ static inline void dda_bits(void) {
 
 // The tick interrupt has put out dda.bits: what comes next? Returns the interval to the next tick, 0 at the end.
 static inline uint16_t dda_next(void) {
-    dda.beat++;
     if (dda.left == 0) {
         queue_tail++;
         if (!dda_load()) {

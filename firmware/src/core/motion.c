@@ -41,7 +41,7 @@ static uint16_t done(const struct segment *s, uint8_t axis, uint16_t ticks) {
 }
 
 static void add_steps(int32_t counts[AXES], const struct segment *s, uint16_t ticks) {
-    uint16_t back = s->back;
+    axes_t back = s->back;
     for (uint8_t i = 0; i < AXES; i++, back >>= 1) {
         if (s->steps[i]) {
             const uint16_t n = ticks == s->ticks ? s->steps[i] : done(s, i, ticks);
@@ -75,8 +75,8 @@ static void take_latch(void) {
     add_steps(motion.latch, s, s->ticks - left);
 }
 
-static void settle(void) {
-    const uint8_t tail = queue_tail;  // before the latch: what is pressed later lies behind it
+// Counts what has been done up to the segment at `tail`. (Read the tail before: what is latched later lies behind it.)
+static void settle_to(uint8_t tail) {
     if (dda.probe) {
         take_latch();
     }
@@ -88,17 +88,21 @@ static void settle(void) {
     }
 }
 
+static void settle(void) {
+    settle_to(queue_tail);
+}
+
 // The running segment and its ticks left to compute; null at rest. Its slot stays ours until it is settled.
 static const struct segment *running(uint16_t *left, uint16_t *interval) {
     const struct segment *s;
-    uint8_t beat;
-    do {
-        beat = SHARED(dda.beat);
-        settle();
-        s = SHARED(dda.now);
-        *left = SHARED(dda.left);
-        *interval = SHARED(dda.interval) >> 8;
-    } while (beat != SHARED(dda.beat) || settled != queue_tail);
+    uint8_t tail;
+    HAL_LOCK();
+    tail = queue_tail;
+    s = SHARED(dda.now);
+    *left = SHARED(dda.left);
+    *interval = SHARED(dda.interval) >> 8;
+    HAL_UNLOCK();
+    settle_to(tail);
     return s;
 }
 

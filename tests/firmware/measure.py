@@ -1,0 +1,205 @@
+"""The quality figures of the compiled firmware, measured in the emulator in simulated time: they repeat to the cycle.
+
+`tests/bench/bench_firmware.py` prints them, `test_quality.py` holds them to their bars.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for
+from emulator import BUILD, FIRMWARE, EmulatedBoard, make
+
+from armkin import protocol
+from armkin.protocol import Segment
+
+NAMES = "XYZABCUV"  # the emulator's axes, in order
+
+
+def counts_at_home(board: str) -> dict[int, int]:
+    """Steppers at 0, servos at 1500."""
+    return {i: 0 if i < STEPPERS[board] else 1500 for i in range(AXES[board])}
+
+
+def slow_elf(board: str) -> Path:
+    """The firmware built for 115200 baud."""
+    make("-C", str(FIRMWARE), f"BOARD={board}", "BAUD=115200")
+    return BUILD / f"{board}-115200.elf"
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """A cruise of all steppers (one step a tick each) and a servo, under constant questions."""
+
+    rate: float  # [Hz] measured between steps of the cruise
+    jitter_us: float  # peak to peak, worst axis
+    high_us: float  # shortest
+    low_us: float
+    dir_setup_us: float
+    violations: int
+    overruns: int
+    exact: bool  # counts, pins and plan agree
+    error: int
+    stack_free: int
+
+
+def stepping(board: str, rate: float, seconds: float = 0.6, elf: Path | None = None) -> Stepping:
+    """Every stepper one step a tick, alternating directions and reversing half way; the first servo moves along."""
+    steppers = STEPPERS[board]
+    axes = tuple(range(steppers + 1))
+    share = [(-1.0) ** i for i in range(steppers)] + [100 / (rate * seconds)]
+    there = cruise(rate, seconds, share)
+    back = cruise(rate, seconds, [-s for s in share])
+    image = image_for(board, replace(WIDE, max_rate=60_000))
+    row = protocol.RowImage(-(1 << 28), 1 << 28, (1, 1) + (0,) * (AXES[board] - 2))
+    limit = replace(image.axes[0], lower=-(1 << 27), upper=1 << 27)
+    image = replace(image, axes=(limit, limit, *image.axes[2:]), rows=(row,))
+    with EmulatedBoard(board, speed="step", elf=elf, trace=True) as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        host.setup(image, counts_at_home(board))
+        emulated.control("clear")
+        start = [0] * steppers + [1500]
+        plan = batches(axes, start, there, 6)
+        plan += batches(axes, plan[-1].end, back, 6)
+        status = host.stream(plan, poll=0.01)
+        stats = emulated.stats()
+        named = [stats["axes"][name] for name in list(stats["axes"])[:steppers]]
+        rises = emulated.trace().rises(f"{next(iter(stats['axes']))}.STEP")
+        exact = status.counts[: steppers + 1] == plan[-1].end and len(rises) > 0 and all(
+            figures["net"] == end for figures, end in zip(named, plan[-1].end, strict=False)
+        )
+        gaps = np.diff(rises)
+        return Stepping(
+            CLOCK / float(np.median(gaps)) if len(gaps) else 0.0,
+            max(f["jitter_us"] or 0.0 for f in named),
+            min(f["high_min_us"] or 0.0 for f in named),
+            min(f["low_min_us"] or 0.0 for f in named),
+            min(f["dir_setup_min_us"] or 1e9 for f in named),
+            sum(sum(f["violations"].values()) for f in named),
+            status.overruns,
+            exact,
+            status.error,
+            stats["memory"]["stack_never_touched"],
+        )
+
+
+def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
+    """The highest of the rates at which `stepping` is still without fault."""
+    best = 0.0
+    for rate in rates:
+        got = stepping(board, rate, seconds=0.3)
+        if not got.exact or got.error or got.overruns or got.violations or got.jitter_us > jitter_us:
+            break
+        best = got.rate
+    return best
+
+
+def segments_per_second(baud: int, rate: float, batch: int, count: int = 1500, ticks: int = 16) -> tuple[float, bool]:
+    """Streams short segments of four axes; what came out at the pins, and whether it was all exact."""
+    board = "uno_cnc_shield"
+    elf = slow_elf(board) if baud == 115_200 else None
+    with EmulatedBoard(board, speed="step", elf=elf) as emulated:
+        host = BareHost(emulated, baud)
+        host.run(0.02)
+        host.setup(image_for(board, replace(WIDE, max_accel=15_000_000)), counts_at_home(board))
+        emulated.control("clear")
+        # a pause in front, so that the queue is full when it matters
+        work = [Segment(100, 9600, 0, (0, 0, 0, 0))]
+        interval = round(CLOCK / rate / ticks)
+        work += [Segment(ticks, interval, 0, (ticks // 2 + i % 3, -ticks // 2, ticks // 3, -1)) for i in range(count)]
+        plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
+        status = host.stream(plan, slice_s=0.25e-3)
+        x = emulated.stats()["axes"]["X"]
+        seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / CLOCK
+        exact = status.error == 0 and status.counts[:4] == plan[-1].end
+        return count / seconds, exact
+
+
+def first_step_ms(batch: int = 8) -> float:
+    """From the end of the first batch's last byte to the first step's edge, at rest."""
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        host.setup(image_for("uno_cnc_shield"), counts_at_home("uno_cnc_shield"))
+        work = [Segment(50, 1600, 0, (50, -50, 25, 25))] * batch
+        host.order(Batch((0, 1, 2, 3), (0, 0, 0, 0), tuple(work), at_rest=True).payload(0))
+        trace = emulated.trace()
+        arrived, _ = trace.edges("uart.in")
+        step = trace.rises("X.STEP")[0]
+        return float(step - arrived[arrived < step][-1]) / CLOCK * 1e3
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A hold from full speed."""
+
+    milliseconds: float
+    ideal: float
+    off_path: float  # [steps] the farthest that Y was from its share of X
+    exact: bool  # the board's counts are the pins'
+    known: bool
+
+
+def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold:
+    """X at `rate` counts/s, Y at half of it; then HOLD, or A0 to ground, or no more bytes from the host."""
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        image = image_for("uno_cnc_shield", replace(WIDE, max_accel=accel))
+        host.setup(image, counts_at_home("uno_cnc_shield"))
+        interval = round(CLOCK / rate)
+        long = Segment(30_000, interval, 0, (30_000, -15_000))
+        host.order(Batch((0, 1), (0, 0), (long,), at_rest=True).payload(0))
+        host.run(0.3)
+        host.status()
+        begin = emulated.control("cycles")["cycle"]
+        if cause == "hold":
+            host.run(0, protocol.wire(protocol.hold(0)))
+            begin += 10 * 8 * 64
+        elif cause == "abort":
+            emulated.control("pin A0 0")
+        for _ in range(20):
+            host.run(0.1)
+        trace = emulated.trace()
+        if cause == "silence":
+            begin = int(trace.edges("uart.in")[0][-1]) + CLOCK // 2
+        status = host.status()
+        x_cycle, x = trace.positions("X")
+        y_cycle, y = trace.positions("Y")
+        # wherever Y steps: X's count just then, and what Y's share of it is
+        x_then = x[np.searchsorted(x_cycle, y_cycle, side="right") - 1]
+        off = np.abs(y + x_then / 2).max()
+        exact = status.counts[:2] == (int(x[-1]), int(y[-1]))
+        return Hold(
+            float(x_cycle[-1] - begin) / CLOCK * 1e3, rate / accel * 1e3, float(off), exact, status.known == 0b11111
+        )
+
+
+def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, float, int]:
+    """Every segment turns every axis round, `interval` cycles a tick: shortest DIR set-up, STEP high and low [us], violations.
+
+    `high`: STEP's configured high time in 0.1 us.
+    """
+    steppers = STEPPERS[board]
+    axes = tuple(range(steppers))
+    with EmulatedBoard(board, speed="step", driver="drv8825") as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        fast = replace(WIDE, max_rate=60_000, max_accel=15_000_000)
+        image = replace(image_for(board, fast), step_high=high, step_low=19, dir_setup=7, wake=2)
+        host.setup(image, counts_at_home(board))
+        emulated.control("clear")
+        work = [Segment(20, interval, 0, ((-1) ** n * 20,) * steppers) for n in range(8)]
+        host.order(Batch(axes, (0,) * steppers, tuple(work), at_rest=True).payload(0))
+        host.run(0.1)
+        figures = list(emulated.stats()["axes"].values())[:steppers]
+        assert all(f["net"] == 0 and f["positive"] == 80 for f in figures), figures
+        return (
+            min(f["dir_setup_min_us"] for f in figures),
+            min(f["high_min_us"] for f in figures),
+            min(f["low_min_us"] for f in figures),
+            sum(sum(f["violations"].values()) for f in figures),
+        )
