@@ -41,7 +41,7 @@ class Board:
 BOARDS = {
     board.kind: board
     for board in (
-        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 160, 400),
+        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 160, 448),
         Board(
             "mega_ramps14",
             2,
@@ -50,7 +50,7 @@ BOARDS = {
             ("X_MIN", "X_MAX", "Y_MIN", "Y_MAX", "Z_MIN", "Z_MAX"),
             128,
             240,
-            480,
+            576,
         ),
         Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 160, 1600),
     )
