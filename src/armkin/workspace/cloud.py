@@ -1,6 +1,6 @@
 """A cloud of samples as a file, written chunk by chunk, whole or not at all.
 
-.csv  one row a sample: joints [deg | mm], x, y, z [mm], the measures asked for; ten digits
+.csv  one row a sample: joints [deg | mm], x, y, z [mm], the measures asked for; ten digits, nine decimals
 .npz  arrays of doubles: joints (N, n) [deg | mm], position (N, 3) [mm], one array a measure; joint_names
 .ply  a point cloud for MeshLab, CloudCompare, Blender: x, y, z and the measures as floats
 """
@@ -35,9 +35,7 @@ def check(path: str) -> str:
     """The kind of cloud that a file's name asks for."""
     end = Path(path).suffix.lower()
     if end not in _ENDS:
-        raise UsageError(
-            f"{path}: a cloud is written as {', '.join(_ENDS)}; end the file's name with one of them"
-        )
+        raise UsageError(f"{path}: a cloud is written as {', '.join(_ENDS)}; end the file's name with one of them")
     return end
 
 
@@ -65,7 +63,7 @@ def _csv(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[st
     scale = _degrees(arm)
 
     def write(q: Array, tip: Array, values: list[Array]) -> None:
-        table = np.column_stack([q * scale, tip, *values]) + 0.0  # + 0.0: no -0
+        table = np.round(np.column_stack([q * scale, tip, *values]), 9) + 0.0  # + 0.0: no -0
         for start in range(0, len(table), 4096):
             part = table[start : start + 4096]
             file.write((row * len(part) % tuple(part.ravel().tolist())).encode())

@@ -31,9 +31,7 @@ def span(arm: Arm) -> tuple[Array, Array]:
         if slides and not (math.isfinite(low) and math.isfinite(high))
     ]
     if endless:
-        raise UsageError(
-            f"prismatic joint {endless[0]} of {arm.name} has no limits; give it limits: [mm, mm]"
-        )
+        raise UsageError(f"prismatic joint {endless[0]} of {arm.name} has no limits; give it limits: [mm, mm]")
     low = np.where(np.isfinite(arm.lower), arm.lower, -math.pi)
     high = np.where(np.isfinite(arm.upper), arm.upper, math.pi)
     return low, high

@@ -125,8 +125,7 @@ class _Tally:
             reach=(self.near, self.far),
             extent=size,
             measures={
-                name: (float(low), float(high))
-                for name, low, high in zip(names, self.least, self.most, strict=True)
+                name: (float(low), float(high)) for name, low, high in zip(names, self.least, self.most, strict=True)
             },
             seconds=seconds,
             joints=kept[:, :n],
