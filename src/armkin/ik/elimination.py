@@ -99,8 +99,8 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     redundant = bool(np.all(size[:, -1] < 1e-9))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
-    for slots, hidden in _SEARCH:
-        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slots, hidden)]
+    for slot, hidden in _SEARCH:
+        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
         if _enough(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
@@ -124,14 +124,12 @@ class _Rating(NamedTuple):
     pencil: Pencil
 
 
-# Where the pose is carried (slots of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
-_SEARCH = (
-    ((1,), (0,)),
-    ((0,), (0,)),
-    ((5,), (0,)),
-    ((0, 1, 5), (1, 2)),
-    ((2, 3, 4), (0, 1, 2)),
-)
+# Where the pose is carried (slot of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
+_SEARCH: list[tuple[int, tuple[int, ...]]] = [
+    *((slot, (0,)) for slot in (1, 0, 5)),
+    *((slot, (1, 2)) for slot in (1, 0, 5)),
+    *((slot, (0, 1, 2)) for slot in (2, 3, 4)),
+]
 
 
 def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:

@@ -91,16 +91,21 @@ def joint_motion(prismatic: bool, q: float) -> Array:
 
 @cache
 def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
-    """``[U0, U1, U2]`` (3, 15, 15) of a joint, or of its inverse motion.
+    """``[U0, U1, U2]`` (3, 15, 15) of a joint, or of its inverse motion, read-only.
 
     Found by sampling: a revolute joint at 0, 120 and 240 degrees, a prismatic one at -1, 0 and 1.
     """
     if prismatic:
         back, rest, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
-        powers: Array = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
-        return powers * np.array([1.0, -1.0, 1.0])[:, None, None] if inverse else powers
-    angles = 2 * np.pi / 3 * np.arange(3)
-    samples = np.stack([rep(joint_motion(False, angle)) for angle in angles])
-    weights = np.stack([np.full(3, 1 / 3), 2 / 3 * np.cos(angles), 2 / 3 * np.sin(angles)])
-    U: Array = np.einsum("uk,kij->uij", weights, samples)
-    return U * np.array([1.0, 1.0, -1.0])[:, None, None] if inverse else U
+        U: Array = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
+        odd = 1  # the coefficient that changes its sign with q
+    else:
+        angles = 2 * np.pi / 3 * np.arange(3)
+        samples = np.stack([rep(joint_motion(False, angle)) for angle in angles])
+        weights = np.stack([np.full(3, 1 / 3), 2 / 3 * np.cos(angles), 2 / 3 * np.sin(angles)])
+        U = np.einsum("uk,kij->uij", weights, samples)
+        odd = 2
+    if inverse:
+        U[odd] *= -1
+    U.flags.writeable = False
+    return U

@@ -128,6 +128,7 @@ def _dialytic(hidden: int, dialytic: int, sliding: bool) -> Array:
     unit = np.eye(27).reshape(27, 3, 3, 3)
     unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
     products: Array = np.einsum("xhjk,sjp->hxspk", unit, multipliers).reshape(3, 27, 2, 12)
+    products.flags.writeable = False
     return products
 
 

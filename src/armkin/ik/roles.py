@@ -49,16 +49,13 @@ class Role:
         return self.slot in (0, 5)
 
 
-def roles(prismatic: Bool, slots: tuple[int, ...], hidden: tuple[int, ...]) -> list[Role]:
-    """All roles with the pose in one of ``slots`` and one of ``hidden`` (0..2) hidden; e is revolute."""
+def roles(prismatic: Bool, slot: int, hidden: tuple[int, ...]) -> list[Role]:
+    """All roles with the pose in ``slot`` and one of ``hidden`` (0..2) hidden; e is revolute."""
     found = []
-    for slot in slots:
-        for backward in (False, True):
-            order = tuple((slot - i) % 6 if backward else (_X - slot + i) % 6 for i in range(6))
-            if prismatic[order[5]]:
-                continue
-            for h in hidden:
-                found += [Role(order, backward, slot, h, j) for j in range(3) if j != h]
+    for backward in (False, True):
+        order = tuple((slot - i) % 6 if backward else (_X - slot + i) % 6 for i in range(6))
+        if not prismatic[order[5]]:
+            found += [Role(order, backward, slot, h, j) for h in hidden for j in range(3) if j != h]
     return found
 
 

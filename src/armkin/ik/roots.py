@@ -131,11 +131,8 @@ def _other_joints(
     for i in range(3):
         A = advance(turn(A, middle[i], bool(pencil.prismatic[2 + i])), links[2 + i])
     feature = line_features.features(A[:, 3].T, A[:, 2].T)
-    if recover.shape[0] == 1:
-        monomials = feature @ recover[0].T
-    else:
-        monomials = np.einsum("mij,mj->mi", recover[pose], feature)
-    one, b1, b2, a1, a2 = monomials.T
+    factors = recover[pose] if recover.shape[0] > 1 else recover
+    one, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
     sign = np.where(one < 0, -1.0, 1.0)
     safe = np.where(np.abs(one) < 1e-300, 1.0, one)
     a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
