@@ -14,9 +14,7 @@ PRISMATIC_PATTERNS = [
 ]
 
 
-def dh(
-    alpha: list[float], a: list[float], d: list[float], theta: list[float], pattern: str = "RRRRRR"
-) -> Arm:
+def dh(alpha: list[float], a: list[float], d: list[float], theta: list[float], pattern: str = "RRRRRR") -> Arm:
     """Standard DH [deg, mm] as ``link[0] Z1 link[1] ..``: link i is Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     link = np.zeros((7, 4, 4))
     link[0] = np.eye(4)

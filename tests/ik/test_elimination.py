@@ -232,9 +232,7 @@ def test_axes_that_are_almost_parallel(off: float) -> None:
 @pytest.mark.parametrize("off", [1e-6, 1e-4, 1e-2, 10.0])
 def test_axes_that_almost_meet(off: float) -> None:
     """A spherical wrist with its fifth link this long [mm]."""
-    puma = dh(
-        [90, 0, -90, 90, -90, 0], [0, 431.8, 20.3, 0, off, 0], [671.83, 0, 150.05, 431.8, 0, 0], [0.0] * 6
-    )
+    puma = dh([90, 0, -90, 90, -90, 0], [0, 431.8, 20.3, 0, off, 0], [671.83, 0, 150.05, 431.8, 0, 0], [0.0] * 6)
     check(puma, random_joints(puma, 40, 12))
 
 

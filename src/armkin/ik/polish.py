@@ -142,9 +142,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     return Polished(best.T, residual, guess, weakness)
 
 
-def polish(
-    link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False
-) -> tuple[Array, Array]:
+def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False) -> tuple[Array, Array]:
     """Move approximate solutions of a 6-joint chain onto their targets.
 
     Args:

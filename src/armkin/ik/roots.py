@@ -119,9 +119,7 @@ def _ratio(powers: Array) -> Array:
     return out
 
 
-def _other_joints(
-    pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: Array
-) -> tuple[Array, Array, Array]:
+def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: Array) -> tuple[Array, Array, Array]:
     """Values of a, b and e once the middle joints (3, M) are known."""
     links: list[Array] = list(pencil.links)
     links[pencil.role.slot] = np.ascontiguousarray(np.moveaxis(Y[pose], 0, -1))
