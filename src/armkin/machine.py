@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
-_LEAD = Segment(32, 20_000, 0, ())  # 40 ms of standing still in which the queue fills
+# Standing still while the queue fills: 40 ms, or 400 ms on a bad line.
+_LEAD = (Segment(32, 20_000, 0, ()), Segment(200, 32_000, 0, ()))
 _BATCH = (3, 6)  # segments in a frame, on a bad line and on a good one
 
 _WHY = {
@@ -129,6 +130,7 @@ class Machine:
             home = pulses(self.arm, self.arm.home).tolist()
             self.vouch(dict(zip(self.configuration.axes, home, strict=True)))
         self.enable(self.configuration.axes)
+        self.session.probe()
         return lost
 
     def configure(self) -> None:
@@ -244,7 +246,8 @@ class Machine:
         room = self.info.frame - 4
         todo = [Segment(s.ticks, s.interval, s.add, tuple(s.steps[k] for k in moving)) for s in move.segments]
         if todo and self.session.state == State.IDLE and not self.session.under_way:
-            todo.insert(0, Segment(_LEAD.ticks, _LEAD.interval, 0, (0,) * len(moving)))
+            lead = _LEAD[self.session.damaged]
+            todo.insert(0, Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
         while todo:
             most = _BATCH[0] if self.session.noisy else _BATCH[1]
             n = 1

@@ -22,6 +22,9 @@ _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
 _POLL_CREDIT = 0.01  # [s] while waiting for credit, which only answers bring
 _GIVE_UP = 1.5  # [s] without any answer
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
+_COPIES = 2  # of every frame, on a bad line
+_EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
+_PROBES = 8
 _UNDER_WAY = 16  # frames
 _BYTES = (100, 700)  # under way, on a bad line and on a good one
 
@@ -171,7 +174,7 @@ class Session:
             raise StoppedError(self.hold())
         now = self.port.now()
         self._fill()
-        if self._sent and now - self._clear > (_GAP if self._gap else _RESEND):
+        if self._sent and now - self._clear > (_EAGER if self.noisy else _GAP if self._gap else _RESEND):
             self._again()
         idle_credit = bool(self._waiting) and not self._sent
         if now - self._asked >= (_POLL_CREDIT if idle_credit else _POLL):
@@ -184,12 +187,28 @@ class Session:
 
     @property
     def noisy(self) -> bool:
-        """Whether so much had to be sent again that short frames are better."""
-        return self.resent > 0.05 * (self._written + 50)
+        """Whether the line damages so much that short frames, sent several times, get through sooner."""
+        damaged = self._splitter.bad + self.resent
+        return damaged > max(2.0, 0.03 * self._written)
+
+    @property
+    def damaged(self) -> bool:
+        """Whether anything at all was damaged or lost so far."""
+        return self._splitter.bad + self.resent > 0
+
+    def probe(self) -> None:
+        """Ask a few questions, to learn whether the line is good before anything depends on it."""
+        for _ in range(_PROBES):
+            if self.status().bad:
+                self.resent += 1
 
     def _write(self, data: bytes) -> None:
         self.port.write(data)
         self._clear = max(self._clear, self.port.now()) + len(data) * 10 / self.port.baud
+
+    def _write_frame(self, data: bytes) -> None:
+        self._written += 1
+        self._write(data * (_COPIES if self.noisy else 1))  # a copy too many moves nothing
 
     def _fill(self) -> None:
         """Send new frames as far as credit and window allow."""
@@ -202,15 +221,16 @@ class Session:
             data = protocol.wire(frame.make((self._next + len(self._sent)) & 255))
             self._sent.append((frame, data))
             credit, size = credit - frame.segments, size + len(data)
-            self._written += 1
-            self._write(data)
+            self._write_frame(data)
 
     def _again(self) -> None:
         """Go back to the first frame that was not acknowledged."""
         self._gap = False
         self._bytes = max(_BYTES[0], self._bytes // 2)
         self.resent += len(self._sent)
-        self._write(b"\0" + b"".join(data for _, data in self._sent))
+        self._write(b"\0")
+        for _, data in self._sent:
+            self._write_frame(data)
 
     def _ask(self, page: int = 0) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
@@ -249,7 +269,8 @@ class Session:
 
     def status(self, page: int = 0) -> Status:
         """Where the board stands, now; also after the session has ended."""
-        for _ in range(60):
+        for attempt in range(60):
+            self.resent += attempt > 0
             tag, end = self._ask(page), self.port.now() + 0.05
             while self.port.now() < end:
                 self._status = None
