@@ -207,7 +207,7 @@ def test_homing_finds_the_edge() -> None:
 
     host = ready(switch)
     going = protocol.home(
-        0, switch=1, closed=False, slow=32, backoff=400, travel=5000, time=100, rate=[0, -4000, 0, 0, 0]
+        0, switch=1, closed=False, slow=32, backoff=200, travel=5000, time=100, rate=[0, -4000, 0, 0, 0]
     )
     assert host.say(going) == Error.OK
     while host.status().state == State.HOMING:

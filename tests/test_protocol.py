@@ -15,6 +15,7 @@ from armkin import protocol
 
 PACK: dict[type, Callable[..., bytes]] = {
     protocol.Ack: protocol.pack_ack,
+    protocol.Credit: protocol.pack_ack,
     protocol.Info: protocol.pack_info,
     protocol.Status: protocol.pack_status,
 }
@@ -58,9 +59,7 @@ def built(name: str, field: dict[str, str]) -> bytes:
     if name == "ENABLE":
         return protocol.enable(tag, int(field["what"]))
     if name == "SET_POSITION":
-        return protocol.set_position(
-            tag, dict(zip(axes_of(field["mask"]), integers(field["counts"]), strict=True))
-        )
+        return protocol.set_position(tag, dict(zip(axes_of(field["mask"]), integers(field["counts"]), strict=True)))
     if name == "MOTION":
         segments = []
         for text in field["segments"].split(";"):
@@ -89,9 +88,9 @@ def built(name: str, field: dict[str, str]) -> bytes:
         )
     if name == "JOG":
         return protocol.jog(tag, integers(field["rate"]))
-    if name == "ACK":
+    if name in ("ACK", "CREDIT"):
         fields = (int(field[k]) for k in ("next", "error", "detail", "state", "free", "queued"))
-        return protocol.pack_ack(protocol.Ack(*fields))
+        return protocol.pack_ack((protocol.Ack if name == "ACK" else protocol.Credit)(*fields))
     if name == "INFO":
         values = {k: int(v) for k, v in field.items() if k != "firmware"}
         major, minor = integers(field["firmware"])
@@ -118,7 +117,15 @@ def test_golden_frames(name: str, fields: dict[str, str], payload: bytes, wire: 
 
 def test_the_golden_file_has_every_frame() -> None:
     types = {payload[0] for _, _, payload, _ in golden_frames()}
-    assert types == {int(t) for t in protocol.Type}
+    assert types | {protocol.Type.CREDIT} == {int(t) for t in protocol.Type}
+
+
+def test_credit_is_an_ack_that_reports_no_gap() -> None:
+    ack = bytes.fromhex("830600 00011c3901".replace(" ", ""))
+    credit = protocol.parse(ack)
+    assert credit == protocol.Credit(6, 0, 0, 1, 28, 313)
+    assert isinstance(credit, protocol.Credit)
+    assert protocol.pack_ack(credit) == ack
 
 
 def test_error_codes_are_those_of_the_text() -> None:
@@ -227,7 +234,7 @@ def test_golden_image() -> None:
 
 
 @pytest.mark.parametrize(
-    "payload", [b"\x80\0", b"\x81" + bytes(31), b"\x82" + bytes(16), b"\x83" + bytes(7), b"\x00\x00"]
+    "payload", [b"\x80\0", b"\x81" + bytes(31), b"\x82" + bytes(16), b"\x83" + bytes(8), b"\x00\x00"]
 )
 def test_replies_of_the_wrong_shape_are_none(payload: bytes) -> None:
     assert protocol.parse(payload) is None

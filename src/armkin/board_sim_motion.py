@@ -312,9 +312,14 @@ class Motors:
 
             return check
 
+        beyond = [0]  # counts past the edge that the first approach came to rest at
+
         def braking() -> bool:
             slope = min(self.image.axes[i].max_accel / abs(r) for i, r in enumerate(rate) if r)
-            return self._far + self._share**2 / (2 * slope) * max(map(abs, rate)) >= backoff
+            leader = max(range(len(rate)), key=lambda i: abs(rate[i]))
+            if self._far == 0:
+                beyond[0] = abs(self.base[leader] - self.latch[leader])
+            return self._far + self._share**2 / (2 * slope) * abs(rate[leader]) >= backoff + beyond[0]
 
         phases: list[tuple[list[int], float, Callable[[], bool], int, Error]] = []
         if pressed():

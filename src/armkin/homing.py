@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from armkin.machine import Machine
 
 _SLOW = 26  # /256: the second approach runs at a tenth
-_LATE = 0.036  # [s] from the switch to the braking: debounce, and the slices that are queued already
 _MARGIN = 1.25  # of the joint's range: how far a switch may be
 
 
@@ -140,11 +139,10 @@ def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
             f"joint {joint.name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; "
             "1 to 32767 can be"
         )
-    stop = speed * _LATE + speed**2 / (2 * float(arm.max_accel[j]))
-    backoff = math.ceil(leader * (homing.backoff * unit + stop))
+    backoff = math.ceil(leader * homing.backoff * unit)
     if backoff > 65535:
         raise UsageError(
-            f"joint {joint.name}: homing.backoff and the way to a stop are {backoff} counts; 65535 can be"
+            f"joint {joint.name}: homing.backoff {homing.backoff:g} is {backoff} counts; 65535 can be"
         )
     span = float(arm.upper[j] - arm.lower[j])
     if not math.isfinite(span):

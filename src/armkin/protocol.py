@@ -33,6 +33,7 @@ class Type(IntEnum):
     ACK = 0x80
     INFO = 0x81
     STATUS = 0x82
+    CREDIT = 0x83
 
 
 class State(IntEnum):
@@ -127,6 +128,11 @@ class Ack:
     state: int
     free: int
     queued: int  # [ms]
+
+
+@dataclass(frozen=True)
+class Credit(Ack):
+    """An ACK that comes unasked, when slots have become free; nothing was lost because of it."""
 
 
 @dataclass(frozen=True)
@@ -358,6 +364,8 @@ def parse(payload: bytes) -> Reply | None:
     kind, size = payload[0], len(payload)
     if kind == Type.ACK and size == _ACK.size:
         return Ack(*_ACK.unpack(payload)[1:])
+    if kind == Type.CREDIT and size == _ACK.size:
+        return Credit(*_ACK.unpack(payload)[1:])
     if kind == Type.INFO and size == _INFO.size:
         _, tag, version, major, minor, *rest = _INFO.unpack(payload)
         return Info(tag, version, (major, minor), *rest)
@@ -374,8 +382,9 @@ def info_version(payload: bytes) -> int | None:
 
 
 def pack_ack(ack: Ack) -> bytes:
-    """An ACK's payload (for the simulated board)."""
-    return _ACK.pack(Type.ACK, ack.next, ack.error, ack.detail, ack.state, ack.free, ack.queued)
+    """An ACK's or CREDIT's payload (for the simulated board)."""
+    kind = Type.CREDIT if isinstance(ack, Credit) else Type.ACK
+    return _ACK.pack(kind, ack.next, ack.error, ack.detail, ack.state, ack.free, ack.queued)
 
 
 def pack_info(info: Info) -> bytes:

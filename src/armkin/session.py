@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from armkin import protocol
 from armkin.errors import LinkError
 from armkin.link import Port
-from armkin.protocol import Ack, Error, Info, State, Status
+from armkin.protocol import Ack, Credit, Error, Info, State, Status
 
 _RESEND = 0.03  # [s] without progress
 _GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
@@ -260,7 +260,7 @@ class Session:
             if done:
                 self._clear, self._gap = max(self._clear, self.port.now()), False
                 self._bytes = min(_BYTES[1], self._bytes + 20)
-            elif self._sent and isinstance(reply, Ack):
+            elif self._sent and isinstance(reply, Ack) and not isinstance(reply, Credit):
                 self._gap = True  # something behind the first frame has arrived, the first has not
         if reply.error and self._error is None:
             self._error = reply
