@@ -390,7 +390,7 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
 
 
-def test_preparing_is_quick_and_time_grows_linearly() -> None:
+def test_preparing_and_solving_cost_few_eigenvalue_problems() -> None:
     """Bounds with a wide margin, in units of the eigenvalue problems that must be solved in any case."""
     arm = ARMS["JACO"]
     T = forward(arm, random_joints(arm, 512, 19))
