@@ -45,9 +45,7 @@ def check(path: str) -> str:
     """The kind of picture that a file's name asks for."""
     end = Path(path).suffix.lower()
     if end not in _ENDS:
-        raise UsageError(
-            f"{path}: a picture is written as .png or .svg; end the file's name with one of them"
-        )
+        raise UsageError(f"{path}: a picture is written as .png or .svg; end the file's name with one of them")
     return end[1:]
 
 
@@ -122,17 +120,13 @@ def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5)
     x0, y0, width, height = axes.get_position().bounds
     room = np.array([0.80 * width, 0.86 * height])
     middle = np.array([x0 + 0.5 * width, y0 + 0.52 * height])
-    corners = np.array(
-        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-    )
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     zoom = 1.0
     for _ in range(3):  # perspective: the size on paper is only nearly proportional to the zoom
         axes.set_box_aspect(high - low, zoom=zoom)
         axes.apply_aspect()
         across, up, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
-        shown = axes.figure.transFigure.inverted().transform(
-            axes.transData.transform(np.column_stack([across, up]))
-        )
+        shown = axes.figure.transFigure.inverted().transform(axes.transData.transform(np.column_stack([across, up])))
         least, greatest = shown.min(axis=0), shown.max(axis=0)
         zoom *= float((room / (greatest - least)).min())
         shift = middle - 0.5 * (least + greatest)

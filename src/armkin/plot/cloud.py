@@ -26,9 +26,7 @@ _LABELS = {
 }
 
 
-def plot_workspace(
-    workspace: Workspace, out: str, *, colour: str = "manipulability", title: str | None = None
-) -> None:
+def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulability", title: str | None = None) -> None:
     """Draw the samples that a survey kept: in space, from above (xy), and turned about the base (rz).
 
     colour: a measure of the survey ("manipulability", "step_error"), "reach" or "z". In the
@@ -70,9 +68,7 @@ def plot_workspace(
             side.set_xlim(left=min(0.0, side.get_xlim()[0]))  # the base's axis is part of the picture
             bar = figure.add_axes((0.06, 0.1, 0.44, 0.022))
         _bar(figure, bar, drawn, _LABELS[colour], upright=flat_arm)
-        figure.text(
-            0.03, 0.97, workspace.arm.name if title is None else title, fontsize=13, va="top", color=INK
-        )
+        figure.text(0.03, 0.97, workspace.arm.name if title is None else title, fontsize=13, va="top", color=INK)
         figure.text(0.03, 0.92, _caption(workspace), fontsize=10, va="top", color=SOFT)
 
 

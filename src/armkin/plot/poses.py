@@ -102,9 +102,7 @@ class _Drawing:
             self.axes = flat(figure, (0.11, 0.1, 0.86, 0.76), ("x / mm", "y / mm"))
         else:
             self.dimensions = 3
-            self.axes = space(
-                figure, (0.02 + aside, 0.0, 0.96 - aside, 0.9), view or self._from_the_side(bones)
-            )
+            self.axes = space(figure, (0.02 + aside, 0.0, 0.96 - aside, 0.9), view or self._from_the_side(bones))
             self.floor = min(float(self.points[:, 2].min()), float(arm.base[2, 3]))
 
     def _from_the_side(self, bones: list[Skeleton]) -> tuple[float, float]:
@@ -142,15 +140,11 @@ class _Drawing:
         self._dots(bone, colour, 3.0 + 0.6 * width)
         self.line(bone.tip[None], color=colour, marker="o", markersize=5, zorder=5)
 
-    def _links(
-        self, bone: Skeleton, colour: Any, width: float, name: str | None = None, style: Any = "solid"
-    ) -> None:
+    def _links(self, bone: Skeleton, colour: Any, width: float, name: str | None = None, style: Any = "solid") -> None:
         round_off = {"solid_capstyle": "round", "solid_joinstyle": "round", "dash_capstyle": "butt"}
         for slide in bone.slides:
             self.line(slide, color=colour, linewidth=2.2 * width, alpha=0.35, solid_capstyle="butt", zorder=2)
-        self.line(
-            bone.path, color=colour, linewidth=width, linestyle=style, label=name, zorder=3, **round_off
-        )
+        self.line(bone.path, color=colour, linewidth=width, linestyle=style, label=name, zorder=3, **round_off)
 
     def _dots(self, bone: Skeleton, colour: Any, size: float) -> None:
         dots = {"marker": "o", "linestyle": "none", "markeredgecolor": colour, "markeredgewidth": 1.4}
@@ -185,7 +179,7 @@ class _Drawing:
             true_proportions(self.axes, self.points, self.floor)
         else:
             self.axes.margins(0.08)
-        self.figure.text(0.03, 0.97, title, fontsize=13, va="top", color=INK)
+        self.figure.text(0.03, 0.97, title, fontsize=min(13.0, 800 / max(len(title), 1)), va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
         if order is not None:
             handles, texts = self.axes.get_legend_handles_labels()
