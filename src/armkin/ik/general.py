@@ -33,7 +33,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return Geometry(
             "general elimination",
             "no axes meet or run parallel in a way that a closed form could use: numeric elimination, up to 16 branches",
-            True,
+            prepared.complete,
             rows=lambda T: elimination.solve(prepared, T),
         )
     link, prismatic = _padded(arm)
@@ -56,7 +56,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     return Geometry(
         "general elimination",
         f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero",
-        True,
+        prepared.complete,
         rows=rows,
     )
 
