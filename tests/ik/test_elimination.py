@@ -1,6 +1,5 @@
 """The general solver: laws of its algebra, and every branch of arms with and without closed forms."""
 
-import time
 
 import numpy as np
 import pytest
@@ -388,23 +387,3 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     found, doubtful = elimination.solve(plan, forward(arm, random_joints(arm, 20, 18)))
     assert found.shape[1] <= 16
     assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
-
-
-def test_preparing_and_solving_cost_few_eigenvalue_problems() -> None:
-    """Bounds with a wide margin, in units of the eigenvalue problems that must be solved in any case."""
-    arm = ARMS["JACO"]
-    T = forward(arm, random_joints(arm, 512, 19))
-    matrices = np.random.default_rng(0).standard_normal((256, 16, 16))
-
-    def best(work: object, repeats: int = 3) -> float:
-        times = []
-        for _ in range(repeats):
-            begin = time.perf_counter()
-            work()  # type: ignore[operator]
-            times.append(time.perf_counter() - begin)
-        return min(times)
-
-    unit = best(lambda: np.linalg.eig(matrices)) / 256
-    plan = elimination.prepare(*arm)
-    assert best(lambda: elimination.prepare(*arm)) < 2000 * unit
-    assert best(lambda: elimination.solve(plan, T)) / 512 < 8 * unit
