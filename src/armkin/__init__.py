@@ -12,8 +12,8 @@ numpy and the rest are imported with the first name that needs them.
 import sys as _sys
 from importlib import import_module as _import_module
 from types import ModuleType as _ModuleType
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # type checkers know better; importing typing would double the time of this import
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:

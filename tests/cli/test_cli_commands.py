@@ -26,6 +26,12 @@ def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
     assert "<" not in result.out.replace("<=", "")  # no names of Python types
 
 
+def test_help_fits_a_line_each() -> None:
+    listed = run("--help").out.partition("Commands:\n")[2].splitlines()
+    assert [line.split()[0] for line in listed] == list(COMMANDS)
+    assert all(line.endswith(".") and not line.endswith("..") for line in listed)
+
+
 def test_version() -> None:
     assert run("--version") == (0, f"armkin {armkin.__version__}\n", "")
 
@@ -187,9 +193,7 @@ def test_pulses_of_servos() -> None:
 
 
 def test_pulses_of_a_differential() -> None:
-    answer = run(
-        "pulses", "tests/robots/differential_wrist.yaml", *_zeros("differential_wrist"), "--json"
-    ).json
+    answer = run("pulses", "tests/robots/differential_wrist.yaml", *_zeros("differential_wrist"), "--json").json
     assert all(count == 0 for count in answer["pulses"])
     out = run("info", "tests/robots/differential_wrist.yaml").out
     assert "2 " in out.partition("motor ")[2]

@@ -25,7 +25,7 @@ COMMANDS = {
     "grip": "Open or close the gripper.",
     "jog": "Move one joint at a constant speed, for a short time.",
     "ports": "Serial ports of this computer, Arduinos first.",
-    "workspace": "Where the tip can reach: bounds, volume, and a cloud of samples.",
+    "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "plot": "A picture of the arm.",
     "info": "What a robot file says, checked.",
     "schema": "JSON Schema of robot files, for editors.",

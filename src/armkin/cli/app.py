@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -70,10 +71,14 @@ class Commands(TyperGroup):
         for name, text in COMMANDS.items():
             self.add_command(TyperCommand(name, help=text, rich_markup_mode=None))
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
-        name, command, rest = super().resolve_command(ctx, args)
-        return name, None if command is None else load(str(command.name)), rest
+        name = args[0]
+        if name not in COMMANDS:
+            close = get_close_matches(name.lower(), COMMANDS, 1)
+            hint = f"did you mean {close[0]}?" if close else "armkin --help lists them"
+            raise errors.UsageError(f"there is no command '{name}'; {hint}")
+        return name, load(name), args[1:]
 
 
 def load(name: str) -> Any:
@@ -84,9 +89,7 @@ def load(name: str) -> Any:
     return typer.main.get_command(single)
 
 
-app = typer.Typer(
-    cls=Commands, add_completion=False, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin"
-)
+app = typer.Typer(cls=Commands, add_completion=False, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")
 
 
 def _version(wanted: bool) -> None:

@@ -56,7 +56,7 @@ def workspace(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Where the tip can reach: bounds, volume, and a cloud of samples.
+    """Where the tip can reach: bounds, volume, a cloud of points.
 
     Memory does not grow with the number of samples. step_error: how far the tip is off with every motor
     half a pulse off, in the worst combination.
