@@ -105,7 +105,7 @@ static void look_for_users(void) {
     poll(&now, 1, 0);
     if (now.revents & POLLHUP)
         users = 0;
-    else if (users == 0)
+    else if (users == 0 && is_open)   /* not open yet: its event comes, and on_open() with it */
         users = 1;
     if (users == 0 && is_open && !line_queued()) {
         is_open = false;

@@ -226,10 +226,14 @@ class Session:
     def _again(self) -> None:
         """Go back to the first frame that was not acknowledged."""
         self._gap = False
-        self._bytes = max(_BYTES[0], self._bytes // 2)
-        self.resent += len(self._sent)
+        self._bytes = _BYTES[0] if self.noisy else max(_BYTES[0], self._bytes // 2)
         self._write(b"\0")
+        size = 0
         for _, data in self._sent:
+            if size >= self._bytes:
+                break  # what follows it would wait for it
+            size += len(data)
+            self.resent += 1
             self._write_frame(data)
 
     def _ask(self, page: int = 0) -> int:
@@ -259,7 +263,7 @@ class Session:
             self._free = reply.free
             if done:
                 self._clear, self._gap = max(self._clear, self.port.now()), False
-                self._bytes = min(_BYTES[1], self._bytes + 20)
+                self._bytes = _BYTES[0] if self.noisy else min(_BYTES[1], self._bytes + 20)
             elif self._sent and isinstance(reply, Ack) and not isinstance(reply, Credit):
                 self._gap = True  # something behind the first frame has arrived, the first has not
         if reply.error and self._error is None:
