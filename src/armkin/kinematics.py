@@ -39,8 +39,8 @@ def fk(arm: Arm, q: ArrayLike) -> Array:
     """
 
     values = as_joints(arm, q)
-    if values.ndim == 1:
-        return _single(arm, values)
+    if values.size == arm.n:
+        return _single(arm, values.reshape(arm.n)).reshape(*values.shape[:-1], 4, 4)
     return _batched(arm, values, (4, 4), _tip)
 
 

@@ -110,7 +110,7 @@ def _self_motion(
         # where several directions are lost at once, a short step would be drawn back into the corner
         ways = (STEP, -STEP, 10 * STEP, -10 * STEP) if (nullity[who] > 1).any() else (STEP, -STEP)
         for way in ways:
-            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=8)
+            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=6)
             moved = np.abs(there - q[who]) / unit
             far = (moved.max(axis=1) > 0.3 * abs(way) * np.abs(direction).max(axis=1)) & (size < 1e-11)
             moving[who] |= far

@@ -19,7 +19,7 @@ import numpy as np
 from armkin import soa
 from armkin.soa import Array, Entry
 
-TANGENT = 1e-10  # relative discriminant below which two roots may be one: 2e-5 rad apart
+TANGENT = 1e-13  # relative discriminant below which two roots may be one: 6e-7 rad apart
 FREE = 1e-18  # relative squared amplitude below which an equation says nothing about its angle
 
 
