@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
     """Five joints of any geometry."""
-    from armkin.ik import general, spherical, three_parallel
+    from armkin.ik import general, near, spherical, three_parallel
 
     if task.name != "xyz_axis" or arm.n != 5:
         return None
     six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
     pose = task_for(six, "pose")
-    inner = spherical.recognise(six, pose) or three_parallel.recognise(six, pose) or general.recognise(six, pose)
-    assert inner is not None
+    classes = (spherical.recognise, three_parallel.recognise, near.recognise, general.recognise)
+    inner = next(found for recognise in classes if (found := recognise(six, pose)) is not None)
     why = f"with a virtual joint about the tool's axis: {inner.why}"
     if inner.pairs is not None:
         solve = inner.pairs
@@ -50,7 +50,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         q, doubt = solve_rows(T)
         return q[:, :, :5], doubt
 
-    return Geometry(inner.name, why, inner.complete, rows=rows)
+    return Geometry(inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches)
 
 
 def _pose(goal: list[Entry]) -> soa.Pose:

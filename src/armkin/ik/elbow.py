@@ -106,7 +106,7 @@ class TwoLink:
         return [soa.add(self.lx, x), soa.add(self.ly, y), 0.0]
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_pitch, xyz_pitch_roll."""
     n = {"xyz": 3, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
     if n != arm.n or arm.prismatic[1:].any():
@@ -114,7 +114,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     parallels = 2 if n == 3 else 3
     link = arm.link.copy()
     for i in range(2, parallels + 1):
-        if not is_parallel(link[i], EXACT):
+        if not is_parallel(link[i], tolerance):
             return None
     if arm.prismatic[0] and abs(link[1][2, 2]) < 1e-6:
         return None  # the slide lies in the arm's plane

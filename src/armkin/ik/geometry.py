@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from armkin.arm import Arm
 
 EXACT = 1e-12  # axes parallel [rad] or meeting [of the reach] to this count as exactly so
+NEAR = 3e-3  # and to this as nearly so: `armkin.ik.near`
 
 # Modules of `armkin.ik`, in the order in which they are asked.
-_CLASSES = ("planar", "elbow", "position", "spherical", "three_parallel", "axis", "general")
+_CLASSES = ("planar", "elbow", "position", "spherical", "three_parallel", "near", "axis", "general")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,7 @@ class Geometry:
     rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
     straight: bool = False  # `pairs` is made of numpy's elementwise functions alone: `armkin.straight` can record it
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
+    branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered
 
 
 @lru_cache(maxsize=64)

@@ -25,6 +25,7 @@ from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik import numeric
 from armkin.ik.subproblems import Pair
+from armkin.ik.tasks import targets_of
 from armkin.kinematics import fk
 from armkin.soa import Array
 
@@ -46,7 +47,8 @@ _SYNONYMS = {
 def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[str, ...]:
     """A name for each branch index; indices as flattened from the branch axes."""
     sizes = [2 if label else 1 for label in geometry.labels]
-    if not geometry.labels or int(np.prod(sizes)) != count:
+    named = int(np.prod(sizes)) if geometry.labels else 0
+    if named != (geometry.branches or count) or named > count:
         return tuple(f"branch {i + 1}" for i in range(count))
     postures, q, valid = _look(arm, task, geometry)
     shape = (len(q), *sizes)
@@ -73,7 +75,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
     for index in itertools.product(*(range(s) for s in sizes)):
         words = [WORDS[k][i ^ int(swap[k][index])] for k, i in zip(geometry.labels, index, strict=True) if k]
         names.append(", ".join(words))
-    return tuple(names)
+    return (*names, *(f"branch {i + 1}" for i in range(named, count)))
 
 
 def find(names: tuple[str, ...], wanted: str) -> list[int]:
@@ -102,20 +104,17 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
 
 def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Array]:
     """Some postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
-    assert geometry.pairs is not None
     rng = np.random.default_rng(3)
     near_home = arm.home + rng.uniform(-0.35, 0.35, (24, arm.n)) * np.where(arm.prismatic, arm.reach / 20, 1.0)
     anywhere = rng.uniform(-np.pi, np.pi, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
     postures = np.concatenate([arm.home[None], near_home, anywhere])
-    T = fk(arm, postures)
-    if task.orientation == "full":
-        goal, entries = T, soa.read(T)
-    else:
-        parts = [T[:, : task.position, 3], postures @ task.sums.T + task.offsets]
-        if task.orientation == "axis":
-            parts.append(T[:, :3, 2])
-        goal = np.concatenate(parts, axis=1)
-        entries = list(np.ascontiguousarray(goal.T))
+    goal = targets_of(task, fk(arm, postures), postures)
+    if geometry.rows is not None:
+        q, doubtful = geometry.rows(goal)
+        q = q[:, : geometry.branches]
+        return postures, q, ~np.isnan(q).any(axis=2) & ~doubtful[:, None]
+    assert geometry.pairs is not None
+    entries = soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
     pairs, doubt, _ = geometry.pairs(entries, prefer)
     values = np.broadcast_arrays(*(p.c if p.s is None else np.arctan2(p.s, p.c) for p in pairs))

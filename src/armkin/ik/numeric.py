@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.ik.nudge import nudged
 from armkin.ik.tasks import Task, axis_projected, residual, task_jacobian
 from armkin.kinematics import fk, jacobian
 from armkin.soa import Array
@@ -65,6 +66,34 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tu
         # done when rounding is all that is left
         active = active[np.isfinite(now) & (now > 1e-15) & ((now > 1e-11) | (now < 0.5 * before))]
     return best, best_size
+
+
+def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[Array, Array, Array]:
+    """Newton's method for tasks with as many constraints as joints, from starts (M, n) close to a solution.
+
+    Returns the best q met, its `missing`, and the strength of the Jacobian there: a lower
+    bound of its smallest singular value within a factor of sqrt(n).
+    """
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    q, best, best_size, strength = q.copy(), q.copy(), np.full(len(q), np.inf), np.ones(len(q))
+    active = np.arange(len(q))
+    for _ in range(steps + 1):
+        if not len(active):
+            break
+        r, J = scaled(arm, task, q[active], target[active])
+        size = np.linalg.norm(r, axis=1)
+        better = size < best_size[active]
+        gained = size < 0.5 * best_size[active]
+        rows = active[better]
+        best[rows], best_size[rows] = q[rows], size[better]
+        inverse = nudged(np.linalg.inv, J)
+        strength[active] = 1.0 / np.linalg.norm(inverse, axis=(1, 2))
+        step = np.einsum("mij,mj->mi", inverse, r)
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        q[active] += step * unit
+        # a residual of rounding's size falls no further; a step that gains nothing is the last one
+        active = active[(size > 1e-15) & (gained | (size > 1e-3))]
+    return best, best_size, strength
 
 
 def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from armkin import soa
 from armkin.ik.chain import FLIP, Chain, axes, inverse, reverse
 from armkin.ik.elbow import TwoLink
-from armkin.ik.geometry import Geometry
+from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
 from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Array]]
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Planar and SCARA arms with as many joints as constraints."""
     if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
         return None
@@ -36,7 +36,14 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
     if (task.name == "xyz_yaw") != (lift is not None):
         return None
-    if np.hypot(*w[~arm.prismatic, :2].T).max(initial=0.0) > 1e-12 or (lift is not None and np.hypot(*w[lift, :2]) > 1e-12):
+    if np.hypot(*w[~arm.prismatic, :2].T).max(initial=0.0) > tolerance:
+        return None
+    slides = arm.prismatic.copy()
+    if lift is not None:
+        slides[lift] = False
+        if np.hypot(*w[lift, :2]) > tolerance:
+            return None
+    if np.abs(w[slides, 2]).max(initial=0.0) > tolerance:
         return None
     link, prismatic, kept = arm.link, arm.prismatic, list(range(arm.n))
     if lift is not None:

@@ -22,11 +22,12 @@ import numpy as np
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
-from armkin.ik.geometry import Geometry
+from armkin.ik.geometry import EXACT, NEAR, Geometry
 from armkin.ik.subproblems import (
     Candidates,
     Pair,
     Prefer,
+    TOUCHING,
     linear,
     normalised,
     quadratic,
@@ -43,8 +44,11 @@ if TYPE_CHECKING:
 class Position:
     """``link[0] Z1 link[1] Z2 link[2] Z3 tip``, three joints, revolute or prismatic, any geometry."""
 
-    def __init__(self, chain: Chain, tip: Array) -> None:
+    def __init__(self, chain: Chain, tip: Array, tolerance: float = EXACT) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm].
+
+        tolerance: what still counts as a special case. `close` says that the arm is farther from one than that,
+        but so near that its branches lie too close together for the general case's equations.
 
         Raises UsageError if the three joints cannot place a point in space.
         """
@@ -64,6 +68,10 @@ class Position:
         self.square = self._form(self.Y)  # |y|^2
         self.rows, self.rest, self.forms = self._equations(L1)
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
+        self.tolerance = tolerance
+        self.close = False
+        # the true arm's roots may be real where these of a similar one only just miss
+        self.touching = 0.1 if tolerance >= NEAR else TOUCHING
         self.why = self._split()
 
     def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
@@ -81,17 +89,22 @@ class Position:
         scaled = self.A * weight[:, None]
         if self.prismatic[1]:
             # one unknown d2 (its square cancels in no combination): eliminate it between the rows
-            self.regular = abs(self.rows[0, 2]) > 1e-9 if not self.prismatic[0] else False
+            self.regular = not self.prismatic[0] and self._is_regular(abs(float(self.rows[0, 2])))
             if self.prismatic[0] and np.abs(self.A).max() < 1e-9:
                 raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
             return "joint 2 slides: its value is eliminated, joint 3 follows"
         U, S, _ = np.linalg.svd(scaled)
         if S[0] < 1e-9:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
-        self.regular = bool(S[1] > 1e-7 * S[0])
+        self.regular = self._is_regular(float(S[1] / S[0]))
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
         self.main = U[:, 0] * weight  # the one that gives q2
         return "general axes: a quartic in joint 3" if self.regular else "special axes: joint 3 alone, then joint 2"
+
+    def _is_regular(self, off: float) -> bool:
+        """Whether the general equations serve, off being how far the arm is from a special case."""
+        self.close = self.tolerance < off <= NEAR
+        return off > self.tolerance
 
     def _form(self, rows: Array) -> Array:
         """Quadratic form G with ``b^T G b = |rows b|^2`` (3 x 3); prismatic powers above two stay inside."""
@@ -166,10 +179,10 @@ class Position:
             k0, k1, k2, k3, k4 = (v * self.scale**i for i, v in enumerate(k))
             ecc = (k4 + k0 - k2) / 4
             form = [k2 / 2 + ecc, (k0 - k4) / 2, (k1 + k3) / 4, ecc, (k1 - k3) / 4, 0.0 * k0]
-            q, doubt = trig_quadratic(form)
+            q, doubt = trig_quadratic(form, self.touching)
             return self._turn(g, Pair(self.scale * np.tan(q / 2)[:, None, None, :], None), doubt, prefer)
         six = -_six(self.across)[:, None] + sum(_square(affine) for affine in g)
-        q, doubt = trig_quadratic(list(six))
+        q, doubt = trig_quadratic(list(six), self.touching)
         return self._turn(g, Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :]), doubt, prefer)
 
     def _turn(
@@ -250,7 +263,7 @@ class Position:
             d, doubt = quadratic(six[3], six[1], six[0], 0, self.scale)
             third = Pair(d, None)
         else:
-            q, doubt = trig_quadratic(list(six))
+            q, doubt = trig_quadratic(list(six), self.touching)
             third = Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :])
         return third, Pair(self._at(d2, third), None), doubt
 
@@ -300,10 +313,13 @@ def _expand(six: Array) -> list[Array]:
     return [six[0], six[1], six[3] + six[2], six[4], six[5]]
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Any three joints that place a point."""
     if task.name != "xyz" or arm.n != 3:
         return None
-    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3])
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance)
+    if position.close and tolerance == EXACT:
+        return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
-    return Geometry("three joints", f"{kinds}: {position.why}", True, lambda goal, prefer: Candidates(*position.solve(goal, prefer)))
+    why = f"{kinds}: {position.why}"
+    return Geometry("three joints", why, True, lambda goal, prefer: Candidates(*position.solve(goal, prefer)))

@@ -24,21 +24,25 @@ if TYPE_CHECKING:
     from armkin.arm import Arm
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Six joints and a full pose, axes 4, 5, 6 or 1, 2, 3 meeting in a point."""
     if task.name != "pose" or arm.n != 6:
         return None
     chain = Chain(arm.link, arm.prismatic)
-    centre = wrist_centre(chain, EXACT * arm.reach)
+    centre = wrist_centre(chain, tolerance * arm.reach)
     if centre is not None:
-        wrist = SphericalWrist(chain, *centre)
+        wrist = SphericalWrist(chain, *centre, tolerance)
+        if wrist.close:
+            return None
         why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
         return Geometry("spherical wrist", why, True, wrist.solve, straight=wrist.straight, labels=wrist.labels)
     chain = reverse(chain)
-    centre = wrist_centre(chain, EXACT * arm.reach)
+    centre = wrist_centre(chain, tolerance * arm.reach)
     if centre is None:
         return None
-    shoulder = SphericalWrist(chain, *centre)
+    shoulder = SphericalWrist(chain, *centre, tolerance)
+    if shoulder.close:
+        return None
 
     def solve(goal: Pose, prefer: Prefer) -> Candidates:
         found = shoulder.solve(soa.inverse(goal), prefer[::-1])
@@ -67,18 +71,20 @@ def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
 class SphericalWrist:
     """Three joints that place the wrist's centre, then three that turn the tool about it."""
 
-    def __init__(self, chain: Chain, after3: Array, after6: Array) -> None:
-        """after3, after6: (3,) the centre seen after joint 3 and after joint 6 [mm]."""
+    def __init__(self, chain: Chain, after3: Array, after6: Array, tolerance: float) -> None:
+        """after3, after6: (3,) the centre seen after joint 3 and after joint 6 [mm]; tolerance: as in `recognise`."""
         self.chain = chain
         self.labels: tuple[str, ...] = ()
-        if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], EXACT) and not chain.prismatic[0]:
+        self.close = False  # the first three joints are almost special: see `Position`
+        if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], tolerance) and not chain.prismatic[0]:
             elbow = Elbow(chain, after3)
             self.place = lambda p, prefer: elbow.solve(p, [0.0, 0.0, 0.0], prefer)
             self.why = "axes 2 and 3 are parallel"
             self.straight = True
             self.labels = ("shoulder", "elbow", "wrist")
         else:
-            position = Position(chain, after3)
+            position = Position(chain, after3, tolerance)
+            self.close = position.close
             self.place = position.solve
             self.straight = False
             self.why = f"joints 1, 2 and 3: {position.why}"

@@ -20,6 +20,7 @@ from armkin import soa
 from armkin.soa import Array, Entry
 
 TANGENT = 1e-13  # relative discriminant below which two roots may be one: 6e-7 rad apart
+TOUCHING = 1e-4  # [rad] complex roots this close to the real line may be a double root seen through rounding
 FREE = 1e-18  # relative squared amplitude below which an equation says nothing about its angle
 
 
@@ -146,11 +147,12 @@ def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Ar
     return scale * t, doubt
 
 
-def trig_quadratic(e: list[Entry]) -> tuple[Array, Array]:
+def trig_quadratic(e: list[Entry], near: float = TOUCHING) -> tuple[Array, Array]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
     e: [e0, ec, es, ecc, ecs, ess], entries broadcastable to (N,). Returns q (4, N) [rad],
-    nan where a root is not real, and doubt (N,): roots that touch or a vanishing equation.
+    nan where a root is not real, and doubt (N,): roots that touch, complex ones that miss the
+    real line by less than `near` [rad], or a vanishing equation.
     A quartic in the tangent of the half angle, its leading coefficient kept large by turning
     the angle's origin first, solved as the eigenvalues of its companion matrix.
     """
@@ -193,10 +195,10 @@ def trig_quadratic(e: list[Entry]) -> tuple[Array, Array]:
         newton = value / np.where(flat, 1.0, slope)
         extremum = slope / np.where(np.abs(curve) < 1e-12, 1.0, curve)
         q = q - np.clip(np.where(flat, extremum, newton), -0.01, 0.01) * (bend < 1e-2)
-    touching = (bend > 0) & (bend < 1e-4)
+    touching = (bend > 0) & (bend < near)
     doubt = vanishing | touching.any(axis=0)
-    ordered = np.sort(np.where(bend < 1e-4, q, np.inf), axis=0)
+    ordered = np.sort(np.where(bend < TOUCHING, q, np.inf), axis=0)
     with np.errstate(invalid="ignore"):
         doubt |= (np.diff(ordered, axis=0) < 2e-5).any(axis=0)
-    q = np.where((bend < 1e-4) & ~vanishing, q, np.nan)
+    q = np.where((bend < TOUCHING) & ~vanishing, q, np.nan)
     return q, doubt

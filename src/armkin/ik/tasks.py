@@ -35,7 +35,7 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
-PARALLEL = 1e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
+PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +154,16 @@ def _are_rotations(T: Array) -> bool:
     else:
         worst = check.run(entries, check.workspace(len(T)))[:1]
     return bool(worst[0].max(initial=0.0) <= 1e-6)
+
+
+def targets_of(task: Task, T: Array, q: Array) -> Array:
+    """The targets that poses T (M, 4, 4) of joint values q (M, n) answer: (M, m) or (M, 4, 4)."""
+    if task.orientation == "full":
+        return T
+    parts = [T[:, : task.position, 3], q @ task.sums.T + task.offsets]
+    if task.orientation == "axis":
+        parts.append(T[:, :3, 2])
+    return np.concatenate(parts, axis=1)
 
 
 def residual(task: Task, T: Array, q: Array, target: Array) -> Array:

@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from armkin.arm import Arm
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Six revolute joints and a full pose."""
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
     chain = Chain(arm.link, arm.prismatic)
-    if fits(chain, EXACT * arm.reach):
+    if fits(chain, tolerance, arm.reach):
         why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
         return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, straight=True, labels=("shoulder", "elbow", "wrist"))
     chain = reverse(chain)
-    if not fits(chain, EXACT * arm.reach):
+    if not fits(chain, tolerance, arm.reach):
         return None
     solver = ThreeParallel(chain)
 
@@ -45,14 +45,14 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve, straight=True)
 
 
-def fits(chain: Chain, tolerance: float) -> bool:
+def fits(chain: Chain, tolerance: float, reach: float) -> bool:
     """Whether axes 2, 3 and 4 are parallel, axes 1 and 5 are not, and axes 5 and 6 meet."""
     L1, L2, L3, L4, L5 = chain.link[1:6]
-    if not (is_parallel(L2, EXACT) and is_parallel(L3, EXACT)):
+    if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
         return False
-    if is_parallel(L1, 1e-6) or is_parallel(L4, 1e-6) or is_parallel(L5, 1e-6):
+    if any(is_parallel(L, max(tolerance, 1e-6)) for L in (L1, L4, L5)):
         return False
-    return float(np.hypot(*_meeting(L5)[1])) <= tolerance
+    return float(np.hypot(*_meeting(L5)[1])) <= tolerance * reach
 
 
 def _meeting(L5: Array) -> tuple[float, Array]:
