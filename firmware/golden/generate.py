@@ -96,8 +96,20 @@ def info(tag: int, nonce: int, config_crc: int, known: int, flags: int, board: s
     return head + "????" + struct.pack("<IIHB", 16_000_000, config_crc, known, flags).hex() + "??????"
 
 
-def report(tag: int, next_: int, error: int, detail: int, state: int, flags: int, known: int, counts: list[int],
-           free: int = 32, queued: int = 0, page: int = 0, bad: str = "00") -> str:
+def report(
+    tag: int,
+    next_: int,
+    error: int,
+    detail: int,
+    state: int,
+    flags: int,
+    known: int,
+    counts: list[int],
+    free: int = 32,
+    queued: int = 0,
+    page: int = 0,
+    bad: str = "00",
+) -> str:
     head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
     return head + "??00" + bad + struct.pack(f"<B{len(counts)}i", page, *counts).hex()
 
@@ -134,8 +146,10 @@ def frames() -> str:
         end = [a + b for a, b in zip(start, steps_of(segments), strict=True)]
         text = ";".join(f"{t}/{i}/{a}/" + ",".join(map(str, s)) for t, i, a, s in segments)
         commas = (",".join(map(str, v)) for v in (start, end))
-        add(f"MOTION tag={tag} mask={mask} flags={flags} start={next(commas)} end={next(commas)} segments={text}",
-            motion(tag, mask, flags, start, end, segments))
+        add(
+            f"MOTION tag={tag} mask={mask} flags={flags} start={next(commas)} end={next(commas)} segments={text}",
+            motion(tag, mask, flags, start, end, segments),
+        )
 
     add("HELLO tag=5 version=1 nonce=3735928559", hello(5, 3735928559))
     add("HELLO tag=0 version=1 nonce=0", hello(0, 0))
@@ -150,18 +164,45 @@ def frames() -> str:
     add_motion(5, 7, 3, [-40, -317, 212], BACK)
     add_motion(6, 16, 3, [1500], GRIP)
     add_motion(255, 1, 0, [-128], [(255, 400, -1, [127]), (255, 65535, 1, [-128])])
-    add("HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
-        home(7, 2, 1, 26, 200, 100000, 300, [0, -4000, 0, 0, 0]))
+    add(
+        "HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
+        home(7, 2, 1, 26, 200, 100000, 300, [0, -4000, 0, 0, 0]),
+    )
     add("JOG tag=8 rate=100,0,-100,0,0", jog(8, [100, 0, -100, 0, 0]))
     add("ACK next=6 error=0 detail=0 state=1 free=28 queued=313", ack(6, 0, 0, 1, 28, 313))
     add("ACK next=6 error=17 detail=2 state=2 free=0 queued=65535", ack(6, 17, 2, 2, 0, 65535))
-    add("INFO tag=5 version=1 firmware=1,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 queue=32 frame=160 "
-        "min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
-        struct.pack("<5BIBBHBBBBHIIHBHB", 0x81, 5, 1, 1, 0, 3735928559, 1, 5, 16, 3, 5, 32, 160, 400, 16_000_000,
-                    305441741, 23, 5, 3, 2))
-    add("STATUS tag=7 next=6 error=0 detail=0 state=1 flags=7 free=28 queued=313 known=23 switches=7 overruns=0 bad=1 page=0 "
-        "counts=-40,-317,212,0,1500",
-        struct.pack("<8BHH4B5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, -40, -317, 212, 0, 1500))
+    add(
+        "INFO tag=5 version=1 firmware=1,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 "
+        "queue=32 frame=160 min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
+        struct.pack(
+            "<5BIBBHBBBBHIIHBHB",
+            0x81,
+            5,
+            1,
+            1,
+            0,
+            3735928559,
+            1,
+            5,
+            16,
+            3,
+            5,
+            32,
+            160,
+            400,
+            16_000_000,
+            305441741,
+            23,
+            5,
+            3,
+            2,
+        ),
+    )
+    add(
+        "STATUS tag=7 next=6 error=0 detail=0 state=1 flags=7 free=28 queued=313 known=23 switches=7 "
+        "overruns=0 bad=1 page=0 counts=-40,-317,212,0,1500",
+        struct.pack("<8BHH4B5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, -40, -317, 212, 0, 1500),
+    )
     head = "# NAME field=value ... | payload | wire, written by generate.py from PROTOCOL.md\n"
     return head + "".join(f"{text} | {p.hex()} | {wire(p).hex()}\n" for text, p in lines)
 
@@ -358,7 +399,12 @@ def servo_talk() -> None:
     t.write("servos.talk")
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Write all files."""
     (HERE / "frames.txt").write_text(frames())
     talks()
     servo_talk()
+
+
+if __name__ == "__main__":
+    main()

@@ -249,7 +249,7 @@ class SimBoard:
         board, far = self.board, 2**30
         if len(image.axes) != len(board.axes) or len(image.rows) > board.rows:
             return False
-        if max(image.step_high, image.step_low) > 80 or image.dir_setup > 100:
+        if image.step_high > 80 or image.step_low > 50 or image.dir_setup > 100:
             return False
         for i, axis in enumerate(image.axes):
             servo = board.servo_mask >> i & 1

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from emulator import EmulatedBoard
 
@@ -14,6 +15,7 @@ from armkin import protocol
 from armkin.protocol import Ack, Info, Segment, State, Status
 
 CLOCK = 16_000_000
+R = TypeVar("R", Ack, Info, Status)
 CREDIT = 0x83  # an ACK that comes unasked
 AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6}
 STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0}
@@ -90,30 +92,27 @@ class BareHost:
                 replies.append(reply)
         return replies
 
-    def ask(self, payload: bytes, tries: int = 1) -> protocol.Reply:
-        """The answer to one frame; sent again if there is none within 50 ms."""
+    def ask(self, payload: bytes, kind: type[R], tries: int = 1) -> R:
+        """The answer to one frame; sent again if there is none within 20 ms."""
         for _ in range(tries):
             data = protocol.wire(payload)
             replies = self.run(10 * len(data) / self.baud + 0.02, data)
-            if replies:
-                return replies[-1]
+            answers = [r for r in replies if isinstance(r, kind)]
+            if answers:
+                return answers[-1]
         raise AssertionError(f"no answer to {payload.hex()}")
 
     def status(self, page: int = 0) -> Status:
-        answer = self.ask(protocol.status_query(0, page), tries=100)
-        assert isinstance(answer, Status), answer
-        return answer
+        return self.ask(protocol.status_query(0, page), Status, tries=100)
 
     def hello(self, nonce: int) -> Info:
-        answer = self.ask(protocol.hello(0, nonce), tries=100)
-        assert isinstance(answer, Info), answer
+        info = self.ask(protocol.hello(0, nonce), Info, tries=100)
         self.sequence = 0
-        return answer
+        return info
 
     def order(self, payload_of: bytes) -> Ack:
         """Send a frame in sequence (its tag is filled in) and demand that it is done."""
-        answer = self.ask(payload_of[:1] + bytes([self.sequence]) + payload_of[2:])
-        assert isinstance(answer, Ack)
+        answer = self.ask(payload_of[:1] + bytes([self.sequence]) + payload_of[2:], Ack)
         assert (answer.error, answer.next) == (0, (self.sequence + 1) % 256), answer
         self.sequence = answer.next
         return answer
@@ -131,8 +130,20 @@ class BareHost:
         self.order(protocol.enable(0, 3))
         self.run(0.01)
 
-    def stream(self, work: Sequence[Batch], *, poll: float = 0.1, give_up: float = 60.0, slice_s: float = 0.5e-3) -> Status:
-        """Go back N with credit until all is acknowledged and the board is at rest (or the session has ended)."""
+    def stream(
+        self,
+        work: Sequence[Batch],
+        *,
+        poll: float = 0.1,
+        give_up: float = 60.0,
+        slice_s: float = 0.5e-3,
+        resend: float = 0.03,
+        window: int = 100,
+    ) -> Status:
+        """Go back N with credit until all is acknowledged and the board is at rest (or the session has ended).
+
+        `poll`: [s] between STATUS?; `resend`: [s] without progress until all is sent again; `window`: frames.
+        """
         first = self.sequence
         done = sent = 0  # batches
         free = self.status().free
@@ -149,14 +160,14 @@ class BareHost:
                 asked = True
                 out += protocol.wire(protocol.status_query(1))
                 last_poll = self.time
-            if sent > done and self.time - last_progress > 0.03:
+            if sent > done and self.time - last_progress > resend:
                 self.resent += sent - done
                 sent = done
                 last_progress = self.time
             under_way = sum(len(b.segments) for b in work[done:sent])
             while (
                 sent < len(work)
-                and sent - done < 100
+                and sent - done < window
                 and self._line_free + 10 * len(out) / self.baud < self.time + 2 * slice_s
                 and under_way + len(work[sent].segments) <= free
             ):
@@ -193,7 +204,9 @@ class BareHost:
         return status
 
 
-def cruise(rate: float, seconds: float, share: Sequence[float], ramp: float = 0.1, length: float = 0.01) -> list[Segment]:
+def cruise(
+    rate: float, seconds: float, share: Sequence[float], ramp: float = 0.1, length: float = 0.01
+) -> list[Segment]:
     """Up to `rate` ticks/s and down again in `ramp` s each way; axis i makes `share[i]` steps a tick."""
     segments: list[Segment] = []
     time = 0.0

@@ -68,8 +68,10 @@ def stepping(board: str, rate: float, seconds: float = 0.6, elf: Path | None = N
         stats = emulated.stats()
         named = [stats["axes"][name] for name in list(stats["axes"])[:steppers]]
         rises = emulated.trace().rises(f"{next(iter(stats['axes']))}.STEP")
-        exact = status.counts[: steppers + 1] == plan[-1].end and len(rises) > 0 and all(
-            figures["net"] == end for figures, end in zip(named, plan[-1].end, strict=False)
+        exact = (
+            status.counts[: steppers + 1] == plan[-1].end
+            and len(rises) > 0
+            and all(figures["net"] == end for figures, end in zip(named, plan[-1].end, strict=False))
         )
         gaps = np.diff(rises)
         return Stepping(
@@ -97,7 +99,7 @@ def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
     return best
 
 
-def segments_per_second(baud: int, rate: float, batch: int, count: int = 1500, ticks: int = 16) -> tuple[float, bool]:
+def segments_per_second(baud: int, rate: float, batch: int, count: int = 1500, ticks: int = 12) -> tuple[float, bool]:
     """Streams short segments of four axes; what came out at the pins, and whether it was all exact."""
     board = "uno_cnc_shield"
     elf = slow_elf(board) if baud == 115_200 else None
@@ -179,9 +181,9 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
 
 
 def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, float, int]:
-    """Every segment turns every axis round, `interval` cycles a tick: shortest DIR set-up, STEP high and low [us], violations.
+    """Every segment turns every axis round, `interval` cycles a tick, DRV8825 timing.
 
-    `high`: STEP's configured high time in 0.1 us.
+    Shortest DIR set-up, STEP high and low [us], violations. `high`: STEP's configured high time in 0.1 us.
     """
     steppers = STEPPERS[board]
     axes = tuple(range(steppers))
@@ -203,3 +205,51 @@ def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, 
             min(f["low_min_us"] for f in figures),
             sum(sum(f["violations"].values()) for f in figures),
         )
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A motion of 1,000 segments over a line that flips and drops bytes in both directions."""
+
+    exact: bool  # pins, board and plan agree at the end
+    on_path: bool  # every step went the right way, within one step of the straight line
+    sessions: int  # each hold for want of segments costs one
+    resent: int  # frames
+    seconds: float  # simulated
+
+
+def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
+    """X, Y, Z along a line; `rate` of the bytes flipped and as many dropped, each way."""
+    share = (3, -5, 2)
+    with EmulatedBoard("uno_cnc_shield", speed="step", seed=seed, trace=True) as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        image = image_for("uno_cnc_shield", replace(WIDE, max_accel=1_000_000))
+        host.setup(image, counts_at_home("uno_cnc_shield"), nonce=seed + 1)
+        emulated.control(f"noise flip {rate} drop {rate} seed {seed} dir both")
+        at = (0, 0, 0)
+        end = tuple(segments * s for s in share)
+        sessions = 0
+        while at != end and sessions < 500:
+            sessions += 1
+            host.hello(1000 * (seed + 1) + sessions)
+            left = (end[0] - at[0]) // share[0]
+            work = [Segment(12, 16_000, 0, share)] * left
+            # what a hold in mid-segment left over of the one step ratio
+            rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
+            if any(rest):
+                work.append(Segment(20, 16_000, 0, rest))
+            status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
+            at = status.counts[:3]
+        emulated.control("restore")
+        trace = emulated.trace()
+        x_cycle, x = trace.positions("X")
+        on_path = True
+        for axis, ratio in (("Y", -5 / 3), ("Z", 2 / 3)):
+            cycle, count = trace.positions(axis)
+            x_then = np.concatenate([[0], x])[np.searchsorted(x_cycle, cycle, side="right")]
+            on_path &= bool((np.abs(count - ratio * x_then) <= abs(ratio) + 1.5).all())
+            on_path &= bool((np.diff(count) * np.sign(ratio) > 0).all())
+        net = emulated.stats()["axes"]
+        exact = at == end and tuple(net[a]["net"] for a in "XYZ") == end
+        return Noise(exact, on_path and bool((np.diff(x) > 0).all()), sessions, host.resent, host.time)

@@ -5,8 +5,8 @@
 
 #include "avr.h"
 
-// Bootloaders clear MCUSR. Optiboot hands its value on in r2 since version 6 (8 leaves MCUSR alone as well); the Uno's stock 4.4 and
-// the Mega's stk500v2 say nothing.
+// Bootloaders clear MCUSR. Optiboot hands its value on in r2 since version 4.6 (and from 8 on leaves MCUSR alone); the Uno's
+// stock 4.4 and the Mega's stk500v2 say nothing.
 static uint8_t seen_mcusr __attribute__((section(".noinit")));
 uint8_t seen_r2 __attribute__((used, externally_visible, section(".noinit")));  // named in assembly
 
@@ -26,8 +26,8 @@ uint8_t reset_cause(void) {
         return seen_mcusr & CAUSES;
     }
 #ifdef __AVR_ATmega328P__
-    const uint8_t optiboot = pgm_read_byte(FLASHEND);  // its major version
-    if (optiboot >= 6 && optiboot < 32) {
+    const uint16_t optiboot = pgm_read_word(FLASHEND - 1);  // its version, if it is there
+    if (optiboot >= 0x0406 && optiboot < 0x2000) {
         return seen_r2 & CAUSES;
     }
 #endif

@@ -24,7 +24,7 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
         PIN_HIGH(port, bit);         \
     }
     STEPPER_PINS(STEP_HIGH)
-    const uint8_t rise = TCNT1L;
+    const uint16_t rise = TCNT1;
 
     if (dda.probe) {
         dda_probe((*probe_port & probe_mask) == probe_level);
@@ -41,7 +41,7 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
         TIMSK1 = 0;
     }
 
-    while ((uint8_t)(TCNT1L - rise) < step_high) {
+    while ((uint16_t)(TCNT1 - rise) < step_high) {
     }
 #define STEP_LOW(i, port, bit, ...) PIN_LOW(port, bit);
     STEPPER_PINS(STEP_LOW)

@@ -60,7 +60,7 @@ static bool image_valid(uint16_t length) {
     const struct image *image = &memory.image;
     if (length < HEAD || image->layout != 1 || image->axes != AXES || image->rows > ROWS ||
         length != HEAD + AXES * sizeof image->axis[0] + image->rows * sizeof image->row[0] ||
-        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH)) || image->step_high > 80 || image->step_low > 80 ||
+        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH)) || image->step_high > 80 || image->step_low > 50 ||
         image->dir_setup > 100) {
         return false;
     }

@@ -1,0 +1,67 @@
+"""Reads the golden conversations of firmware/golden and replays them on the emulated board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from emulator import FIRMWARE, EmulatedBoard
+
+from armkin import protocol
+
+CREDIT = 0x83
+
+
+@dataclass(frozen=True)
+class Talk:
+    """One conversation (golden/README.md has the form of its lines)."""
+
+    name: str
+    board: str
+    lines: tuple[str, ...]
+
+    def replay(self, board: EmulatedBoard) -> int:
+        """Hold it with a board that has just been powered; the number of answers compared."""
+        splitter = protocol.Splitter()
+        answers: list[bytes] = []
+        compared = 0
+
+        def run(seconds: float, data: bytes = b"", until: bytes = b"") -> None:
+            payloads = splitter.feed(board.run(seconds, data, until=until))
+            answers.extend(p for p in payloads if p[0] != CREDIT)
+
+        run(0.02)
+        for number, line in enumerate(self.lines, 1):
+            word, _, rest = line.partition("#")[0].strip().partition(" ")
+            where = f"{self.name}:{number}"
+            if word == ">":
+                run(0.1, protocol.wire(bytes.fromhex(rest)), until=b"\0")
+            elif word == "wire":
+                run(0.03, bytes.fromhex(rest))
+            elif word == "<":
+                assert answers, f"{where}: no answer"
+                got = answers.pop(0).hex()
+                same = len(got) == len(rest) and all(w in ("?", g) for g, w in zip(got, rest, strict=True))
+                assert same, f"{where}\n want {rest}\n got  {got}"
+                compared += 1
+            elif word == "wait":
+                run(float(rest) / 1000)
+            elif word == "silent":
+                run(0.02)
+                assert not answers, f"{where}: {answers[0].hex()}"
+            elif word == "reset":
+                board.control("reset external")
+                run(0.02)
+            else:
+                assert word in ("", "board"), f"{where}: {line}"
+        assert not answers
+        return compared
+
+
+def talks() -> list[Talk]:
+    """All conversations of firmware/golden."""
+    out = []
+    for path in sorted((FIRMWARE / "golden").glob("*.talk")):
+        lines = tuple(path.read_text().splitlines())
+        board = next(line.split()[1] for line in lines if line.startswith("board "))
+        out.append(Talk(path.name, board, lines))
+    return out

@@ -1,0 +1,62 @@
+"""The firmware's quality bars, on the compiled program in the emulator; tests/bench/bench_firmware.py prints them."""
+
+from __future__ import annotations
+
+import measure
+import pytest
+
+
+@pytest.mark.parametrize("board", ["uno_cnc_shield", "mega_ramps14"])
+def test_25_khz_on_every_stepper_with_every_feature_on(board: str) -> None:
+    got = measure.stepping(board, 25_000, seconds=1.0)
+    assert got.exact
+    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
+    assert abs(got.rate - 25_000) < 100
+    assert got.jitter_us <= 10
+    assert got.stack_free >= 200
+
+
+def test_the_shortest_interval_that_the_board_accepts_is_kept() -> None:
+    got = measure.stepping("uno_cnc_shield", 35_000)
+    assert got.exact
+    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
+    assert got.jitter_us <= 10
+
+
+@pytest.mark.parametrize(("board", "interval"), [("uno_cnc_shield", 448), ("mega_ramps14", 576)])
+@pytest.mark.parametrize("high", [19, 80])
+def test_driver_times_while_turning_round_at_the_fastest_ticks(board: str, interval: int, high: int) -> None:
+    dir_setup, step_high, step_low, violations = measure.reversing(board, interval, high)
+    assert violations == 0
+    assert dir_setup >= 10.0  # what CONFIG allows at most, far above any driver's
+    assert step_high >= high / 10
+    assert step_low >= 5.0
+
+
+def test_first_step_within_3_ms_of_the_first_batch() -> None:
+    assert measure.first_step_ms() < 3
+    assert measure.first_step_ms(batch=12) < 3
+
+
+@pytest.mark.parametrize(("baud", "rate"), [(115_200, 700), (250_000, 1520)])
+def test_short_segments_a_second(baud: int, rate: float) -> None:
+    got, exact = measure.segments_per_second(baud, rate, batch=10)
+    assert exact
+    assert got > 0.99 * rate
+
+
+@pytest.mark.parametrize("cause", ["hold", "abort", "silence"])
+def test_a_hold_from_full_speed_stays_on_the_path(cause: str) -> None:
+    got = measure.hold(cause=cause)
+    assert got.exact
+    assert got.known
+    assert got.off_path <= 1
+    assert 0.8 * got.ideal < got.milliseconds < 1.2 * got.ideal
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_on_both_lines_moves_nothing_wrong(seed: int) -> None:
+    got = measure.noise(seed)
+    assert got.resent > 100  # the noise was there
+    assert got.on_path
+    assert got.exact
