@@ -30,7 +30,9 @@ bool hal_abort_level(void) {
 void pins_setup(void) {
 #define SWITCH_INPUT(i, port, bit) PIN_PULL_UP(port, bit);
 #define ABORT_INPUT(port, bit) PIN_PULL_UP(port, bit);
-#define ENABLE_OUTPUT(port, bit) PIN_OUTPUT(port, bit);
+#define ENABLE_OUTPUT(port, bit) \
+    PIN_HIGH(port, bit);         \
+    PIN_OUTPUT(port, bit);  // off first, as these boards' drivers are enabled by low
     SWITCH_PINS(SWITCH_INPUT)
     ABORT_PIN(ABORT_INPUT)
     ENABLE_PINS(ENABLE_OUTPUT)

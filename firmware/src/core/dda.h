@@ -51,6 +51,8 @@ extern struct segment queue[QUEUE_SLOTS];
 extern volatile uint8_t queue_head, queue_tail;  // free-running; the interrupt moves only the tail
 extern struct dda dda;
 
+_Static_assert(QUEUE_SLOTS <= 128 && (QUEUE_SLOTS & (QUEUE_SLOTS - 1)) == 0, "indices run freely in 8 bits");
+
 static inline struct segment *queue_slot(uint8_t index) {
     return &queue[index % QUEUE_SLOTS];
 }

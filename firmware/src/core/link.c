@@ -7,6 +7,7 @@
 #include "hal.h"
 
 enum { CRC_SIZE = 4 };
+_Static_assert(FRAME_MAX <= 250, "COBS with one byte of overhead, lengths in 8 bits");
 
 uint8_t link_bad;
 
