@@ -42,7 +42,7 @@ def main() -> None:
         figures = f"{got.jitter_us:.1f} us, {got.overruns} overruns{fault}"
         row(f"{board}: 25 kHz on all, jitter p2p", figures, "misses ticks" if board == "uno_cnc_shield" else "")
         row(f"{board}: stack never touched", f"{got.stack_free} B")
-    top = measure.ceiling("uno_cnc_shield", range(30_000, 36_000, 1000))
+    top = measure.ceiling("uno_cnc_shield", range(30_000, 36_000, 500))
     row("uno_cnc_shield: clean up to, 4 axes + servo", f"{top / 1000:.1f} kHz", "20 kHz, 3 axes")
     top = measure.ceiling("mega_ramps14", range(25_000, 28_000, 500))
     row("mega_ramps14: clean up to, 5 axes + 4 servos", f"{top / 1000:.1f} kHz", "")

@@ -92,7 +92,7 @@ def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
     """The highest of the rates at which `stepping` is still without fault."""
     best = 0.0
     for rate in rates:
-        got = stepping(board, rate, seconds=0.3)
+        got = stepping(board, rate, seconds=1.0)
         if not got.exact or got.error or got.overruns or got.violations or got.jitter_us > jitter_us:
             break
         best = got.rate
