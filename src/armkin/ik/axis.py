@@ -38,7 +38,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
             virtual = None if prefer[0] is None else Pair(1.0, 0.0)
             found = solve(_pose(goal), [*prefer, virtual])
-            return found._replace(pairs=found.pairs[:5])
+            return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
         return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels)
     solve_rows = inner.rows

@@ -116,12 +116,12 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Array
     assert geometry.pairs is not None
     entries = soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
-    pairs, doubt, _ = geometry.pairs(entries, prefer)
-    values = np.broadcast_arrays(*(p.c if p.s is None else np.arctan2(p.s, p.c) for p in pairs))
+    found = geometry.pairs(entries, prefer)
+    values = np.broadcast_arrays(*found.values())
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]
     missing = numeric.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(doubt, values[0].shape).reshape(B, -1).T
+    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(found.doubt, values[0].shape).reshape(B, -1).T
     return postures, q, valid
 
 

@@ -50,13 +50,11 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     """Arms that a closed form would fit if their axes were moved by up to `NEAR`."""
     if task.orientation == "axis":
         return None  # see `armkin.ik.axis`
-    for module in (planar, elbow, position, spherical, three_parallel):
-        alike = module.recognise(arm, task, NEAR)
-        if alike is not None and alike.pairs is not None:
-            break
-    else:
+    classes = (planar, elbow, position, spherical, three_parallel)
+    found = [alike for module in classes if (alike := module.recognise(arm, task, NEAR)) is not None]
+    if not found:
         return None
-    off = _distance(arm, task, alike)
+    off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
     other = _fallback(arm, task)
 
     def rows(target: Array) -> tuple[Array, Bool]:
@@ -90,8 +88,8 @@ def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array) -> tuple[Array,
     assert alike.pairs is not None
     entries = soa.read(target) if task.orientation == "full" else list(np.ascontiguousarray(target.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
-    pairs, doubt, _ = alike.pairs(entries, prefer)
-    values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
+    found = alike.pairs(entries, prefer)
+    values, doubt = found.values(), found.doubt
     shape = np.broadcast_shapes((1, 1, 1, len(target)), *(np.shape(v) for v in values))
     q = np.stack([np.broadcast_to(v, shape).reshape(-1, len(target)).T for v in values], axis=2)
     return q, np.broadcast_to(doubt, shape).reshape(-1, len(target)).any(axis=0)
@@ -130,7 +128,8 @@ def _solve(
     few = np.flatnonzero(found.doubt)
     if not len(few):
         return q, found.doubt
-    more = found.q[few] if other is None else np.concatenate([found.q[few], other(target[few])], axis=1)
+    extra = _beside(arm, task, found.q[few], target[few]) if other is None else other(target[few])
+    more = np.concatenate([found.q[few], extra], axis=1)
     B, flat = more.shape[1], more.reshape(-1, arm.n).copy()
     goals = np.repeat(target[few], B, axis=0)
     some = np.flatnonzero(numeric.missing(arm, task, flat, goals) < HOPELESS)
@@ -140,13 +139,27 @@ def _solve(
     more = flat.reshape(-1, B, arm.n)
     own = found.q.shape[1]
     # what the other method has found again keeps the seed's place and name
-    for i in range(own, B):
-        again = numeric.wrapped_distance(arm, more[:, :own], more[:, i : i + 1]) < 1e-6
-        more[again.any(axis=1), i] = np.nan
-    out = np.full((len(target), B, arm.n), np.nan)
+    with np.errstate(invalid="ignore"):
+        for i in range(own, B):
+            again = numeric.wrapped_distance(arm, more[:, :i], more[:, i : i + 1]) < 1e-6
+            more[again.any(axis=1), i] = np.nan
+    new = ~np.isnan(more[:, own:, 0])
+    order = own + np.argsort(~new, axis=1, kind="stable")[:, : int(new.sum(axis=1).max())]
+    more = np.concatenate([more[:, :own], np.take_along_axis(more, order[:, :, None], axis=1)], axis=1)
+    out = np.full((len(target), more.shape[1], arm.n), np.nan)
     out[:, :own] = q
     out[few] = more
     return out, found.doubt
+
+
+def _beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Seeds for the other of two branches that all but touch: q (N, B, n) moved to both sides along its weakest direction."""
+    N, B, n = q.shape
+    flat = np.nan_to_num(q.reshape(-1, n))
+    _, V, _ = numeric.null_space(arm, task, flat, np.repeat(target, B, axis=0))
+    push = V[:, -1] * np.where(arm.prismatic, arm.reach, 1.0)
+    moved = [flat + size * push for size in (0.6, -0.6, 0.1, -0.1, 0.01, -0.01)]
+    return np.stack(moved, axis=1).reshape(N, 6 * B, n)
 
 
 def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
@@ -162,8 +175,8 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     good = size <= ACCEPTED
     with np.errstate(invalid="ignore"):
         moved = numeric.wrapped_distance(arm, q, flat) > np.sqrt(off)
-    weak = min(0.05, 5.0 * np.sqrt(off)) + 1e-6
-    unsure = np.where(good, moved | (strength < weak), rough < 1e-9 + 100.0 * off)
+    weak = min(0.05, 1.5 * np.sqrt(off)) + 1e-6
+    unsure = np.where(good, moved | (strength < weak), rough < 1e-9 + 30.0 * off)
     doubt = doubt | unsure.reshape(N, B).any(axis=1)
     q, good = q.reshape(N, B, n), good.reshape(N, B)
     for i in range(B):

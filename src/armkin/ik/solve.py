@@ -139,10 +139,13 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         part.valid[...] = valid.T
         part.within[...] = within.reshape(B, N).T
         part.branch[...] = np.arange(B, dtype=np.int8)
-        count = valid.sum(axis=0)
+        full = bool(valid.all())
+        count = np.full(N, B) if full else valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE
-        edge = np.broadcast_to(doubt, shape).reshape(B, N) | ((miss <= NEARBY**2) & ~valid) | np.isnan(miss)
-        doubtful = np.flatnonzero(edge.any(axis=0))
+        edge = np.any(np.broadcast_to(doubt, np.broadcast_shapes(np.shape(doubt), (1, 1, 1, N))), axis=(0, 1, 2))
+        if not full:
+            edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
+        doubtful = np.flatnonzero(edge)
         if len(doubtful) and straight is not None:
             # again, with the preferred values for joints that are free
             again = _candidates(
@@ -183,13 +186,12 @@ def _candidates(
 ) -> list[Entry]:
     """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
     assert geometry.pairs is not None
-    pairs, doubt, miss = geometry.pairs(goal, prefer)
-    if miss is None:
-        miss = _miss(arm, task, link, pairs, goal)
-    values = [pair.c if pair.s is None else np.arctan2(pair.s, pair.c) for pair in pairs]
+    found = geometry.pairs(goal, prefer)
+    miss = _miss(arm, task, link, found.pairs, goal) if found.miss is None else found.miss
+    values = found.values()
     if len(task.sums):
         miss = np.maximum(miss, _sum_miss(task, values, goal))
-    return [*values, miss, doubt]
+    return [*values, miss, found.doubt]
 
 
 class _Runner:
@@ -251,15 +253,16 @@ def _tidy(
         partial[doubtful] |= ~seen.valid.all(axis=1)
     some = np.flatnonzero(partial)
     if len(some):
-        order = np.argsort(~part.valid[some], axis=1, kind="stable")
-        valid = np.take_along_axis(part.valid[some], order, axis=1)
-        part.valid[some] = valid
-        part.within[some] = np.take_along_axis(part.within[some], order, axis=1)
-        branch = np.take_along_axis(part.branch[some], order, axis=1)
-        part.branch[some] = np.where(valid, branch, -1)
-        q = np.take_along_axis(part.q[some], order[:, :, None], axis=1)
-        q[~valid] = np.nan
-        part.q[some] = q
+        valid = part.valid[some]
+        count = valid.sum(axis=1)
+        row, column = np.nonzero(valid)
+        place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
+        for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+            old = array[some]
+            new = np.full_like(old, missing)
+            new[row, place] = old[row, column]
+            array[some] = new
+        part.valid[some] = np.arange(valid.shape[1]) < count[:, None]
 
 
 def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:

@@ -16,9 +16,19 @@ from armkin.ik.chain import Chain, inverse, is_parallel, reverse
 from armkin.ik.elbow import Elbow
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
+from armkin.ik.subproblems import (
+    TANGENT,
+    Candidates,
+    Pair,
+    Prefer,
+    distance2,
+    linear,
+    rotation_between,
+    signs,
+    spin,
+)
 from armkin.ik.tasks import Task
-from armkin.soa import Array, Pose
+from armkin.soa import Array, Entry, Pose
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -45,8 +55,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return None
 
     def solve(goal: Pose, prefer: Prefer) -> Candidates:
-        found = shoulder.solve(soa.inverse(goal), prefer[::-1])
-        return found._replace(pairs=found.pairs[::-1])
+        return shoulder.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
     why = f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}"
     return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight)
@@ -102,6 +111,7 @@ class SphericalWrist:
         self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
         self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
         self.rest5 = float(A[2, 2] * b[2])
+        self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
@@ -117,8 +127,17 @@ class SphericalWrist:
         # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
         x = soa.turn_back(P, soa.turn(goal, self.end[0:3]))
         z = soa.turn_back(P, soa.turn(goal, self.end[6:9]))
+        if self.mirrored:
+            return self._mirrored(pairs, doubt, miss, x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, prefer)
+        return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
+
+    def _around(
+        self, fifth: Pair, x: list[Entry], z: list[Entry], prefer: Prefer
+    ) -> tuple[Pair, Pair, Array, Entry]:
+        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z."""
         turn5 = soa.rotate(self.A, *fifth)
         u = soa.turn(turn5, self.B[6:9])
         fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3])
@@ -126,9 +145,27 @@ class SphericalWrist:
         # what is left is Rz(q6): its first column
         back = soa.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
         c6, s6, _ = soa.turn_back(self.B, back)
-        doubt = doubt | doubt5 | doubt4
-        # the centre is where it must be, and so are the wrist's first and last columns
         column = soa.turn(turn5, soa.combine(c6, self.B[0:3], s6, self.B[3:6]))
-        miss = miss + distance2(spin(c4, s4, u), z)
-        miss = miss + distance2(spin(c4, s4, column), x)
-        return Candidates([*pairs, fourth, fifth, Pair(c6, s6)], doubt, miss)
+        wrong = distance2(spin(c4, s4, u), z) + distance2(spin(c4, s4, column), x)
+        return fourth, Pair(c6, s6), doubt4, wrong
+
+    def _mirrored(
+        self, pairs: list[Pair], doubt: Array, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
+    ) -> Candidates:
+        """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
+        disc = z[0] * z[0] + z[1] * z[1]
+        fifth = Pair(soa.mul(self.cos5, z[2]), soa.mul(self.cos5, np.sqrt(disc)))
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, prefer)
+        sign = signs(2)
+        flipped = 0.5 - 0.5 * sign
+        q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
+        angles = [
+            None,
+            None,
+            None,
+            q4 - flipped * np.copysign(np.pi, q4),
+            sign * np.arctan2(fifth.s, fifth.c),
+            q6 - flipped * np.copysign(np.pi, q6),
+        ]
+        doubt = doubt | (disc < TANGENT) | doubt4
+        return Candidates([*pairs, fourth, fifth, sixth], doubt, miss + wrong, angles)

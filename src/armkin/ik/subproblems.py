@@ -40,12 +40,26 @@ class Candidates(NamedTuple):
 
     pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these, branches on an edge. miss:
     squared residual of every branch (lengths in units of the reach), recomputed from the
-    pairs, if the geometry has a shorter way than the whole chain; else None.
+    pairs, if the geometry has a shorter way than the whole chain; else None. angles: one a
+    joint, its angle where the geometry knows it without an inverse function, else None.
     """
 
     pairs: list[Pair]
     doubt: Array
     miss: Entry | None = None
+    angles: Sequence[Entry | None] = ()
+
+    def values(self) -> list[Entry]:
+        """Joint values [rad | mm]."""
+        angles = self.angles or [None] * len(self.pairs)
+        return [
+            c if s is None else np.arctan2(s, c) if angle is None else angle
+            for (c, s), angle in zip(self.pairs, angles, strict=True)
+        ]
+
+    def reversed(self) -> Candidates:
+        """The same for the chain walked the other way."""
+        return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
 
 
 def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:

@@ -39,8 +39,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     solver = ThreeParallel(chain)
 
     def solve(goal: Pose, prefer: Prefer) -> Candidates:
-        found = solver.solve(soa.inverse(goal), prefer[::-1])
-        return found._replace(pairs=found.pairs[::-1])
+        return solver.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve, straight=True)
 
@@ -127,22 +126,25 @@ class ThreeParallel:
         # x = Rz(q2 +- q3 +- q4) turned
         tx, ty = self.turned
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
-        for pair, sense in ((second, 1.0), (third, self.sense3)):
-            c, s = c * pair.c + sense * s * pair.s, s * pair.c - sense * c * pair.s
-        fourth = Pair(c, self.sense4 * s)
+        c23, s23 = _together(second, third, self.sense3)
+        fourth = Pair(c * c23 + s * s23, soa.mul(self.sense4, s * c23 - c * s23))
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, its x
         # axis, and the common direction
         reached = spin(*second, self.two_link.reach(third))
         miss = distance2(reached, p[:2]) + (p[2] - self.height4) ** 2
         miss = miss * (1.0 / self.reach**2)
-        x2 = [tx, ty]
-        for pair, sense in ((fourth, self.sense4), (third, self.sense3), (second, 1.0)):
-            x2 = spin(pair.c, soa.mul(sense, pair.s), [*x2, 0.0])[:2]
-        miss = miss + distance2([*x2, 0.0], x)
+        c234, s234 = _together(Pair(c23, s23), fourth, self.sense4)
+        miss = miss + distance2([c234, s234], [c, s]) + x[2] * x[2]
         along = soa.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         miss = miss + distance2(along, [0.0, 0.0, self.sense4])
         return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
+
+
+def _together(first: Pair, second: Pair, sense: float) -> Pair:
+    """Two angles about one direction: their sum, or with sense -1 their difference."""
+    s2 = soa.mul(sense, second.s)
+    return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
 
 
 def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
