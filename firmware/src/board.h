@@ -11,6 +11,7 @@
 #endif
 
 #define AXES (STEPPERS + SERVOS)
+_Static_assert(STEPPERS <= 8 && AXES <= 15, "masks of axes");
 #define ROWS AXES
 #define ALL_AXES ((1U << AXES) - 1)
 #define STEPPER_AXES ((1U << STEPPERS) - 1)
