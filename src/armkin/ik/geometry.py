@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.arm import Arm
 
 EXACT = 1e-12  # axes parallel [rad] or meeting [of the reach] to this count as exactly so
-NEAR = 3e-3  # and to this as nearly so: `armkin.ik.near`
+NEAR = 1e-3  # and to this as nearly so: `armkin.ik.near`
 
 # Modules of `armkin.ik`, in the order in which they are asked.
 _CLASSES = ("planar", "elbow", "position", "spherical", "three_parallel", "near", "axis", "general")

@@ -24,7 +24,7 @@ from armkin.ik.chain import Chain
 from armkin.ik.geometry import NEAR, Geometry
 from armkin.ik.position import Position
 from armkin.ik.subproblems import Pair
-from armkin.ik.tasks import Task, targets_of
+from armkin.ik.tasks import PARALLEL, Task, targets_of
 from armkin.kinematics import fk
 from armkin.soa import Array
 
@@ -47,11 +47,11 @@ class _Corrected(NamedTuple):
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes were moved by up to `NEAR`."""
+    """Arms that a closed form would fit if their axes were moved by up to `NEAR`, or `PARALLEL` where nothing else fits."""
     if task.orientation == "axis":
         return None  # see `armkin.ik.axis`
-    classes = (planar, elbow, position, spherical, three_parallel)
-    found = [alike for module in classes if (alike := module.recognise(arm, task, NEAR)) is not None]
+    classes = ((planar, PARALLEL), (elbow, PARALLEL), (position, NEAR), (spherical, NEAR), (three_parallel, NEAR))
+    found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
     if not found:
         return None
     off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
@@ -83,8 +83,12 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     return float(np.quantile(rough.min(axis=1), 0.8)) + 1e-14
 
 
-def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array) -> tuple[Array, Bool]:
-    """Candidates (N, B, n) of the similar arm, real or not, and its doubts (N,)."""
+def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array, off: float = 0.0) -> tuple[Array, Bool]:
+    """Candidates (N, B, n) of the similar arm, real or not, and its doubts (N,).
+
+    A pair without a real root leaves the unit circle by as much as it misses one: where that is
+    no more than the arm's distance `off` from its class explains, the arm itself may have a root.
+    """
     assert alike.pairs is not None
     entries = soa.read(target) if task.orientation == "full" else list(np.ascontiguousarray(target.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
@@ -92,6 +96,11 @@ def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array) -> tuple[Array,
     values, doubt = found.values(), found.doubt
     shape = np.broadcast_shapes((1, 1, 1, len(target)), *(np.shape(v) for v in values))
     q = np.stack([np.broadcast_to(v, shape).reshape(-1, len(target)).T for v in values], axis=2)
+    if off:
+        outside = [np.abs(pair.c * pair.c + pair.s * pair.s - 1.0) for pair in found.pairs if pair.s is not None]
+        most = np.max(np.stack([np.broadcast_to(v, shape) for v in outside]), axis=0) if outside else np.zeros(shape)
+        # what is not quite on the circle only because the arm is not quite of the class comes later
+        doubt = doubt | ((most > 1e-12 + 10.0 * off) & (most < 100.0 * off))
     return q, np.broadcast_to(doubt, shape).reshape(-1, len(target)).any(axis=0)
 
 
@@ -164,7 +173,7 @@ def _beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
     """Move the seeds onto the arm, and find the poses for which that may not be all."""
-    seed, doubt = _seeds(arm, task, alike, target)
+    seed, doubt = _seeds(arm, task, alike, target, off)
     N, B, n = seed.shape
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)

@@ -101,6 +101,10 @@ class Position:
         self.main = U[:, 0] * weight  # the one that gives q2
         return "general axes: a quartic in joint 3" if self.regular else "special axes: joint 3 alone, then joint 2"
 
+    def _unit(self, pair: Pair) -> Pair:
+        """On the unit circle, so that the residual shows where there is no real root; `near` looks at the length itself."""
+        return pair if self.tolerance >= NEAR else normalised(pair)
+
     def _is_regular(self, off: float) -> bool:
         """Whether the general equations serve, off being how far the arm is from a special case."""
         self.close = self.tolerance < off <= NEAR
@@ -204,7 +208,7 @@ class Position:
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             third, doubt = linear(alone[1], alone[2], -alone[0], 0, self.scale, prefer[2])
-            third = normalised(third)
+            third = self._unit(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
         b1 = third.c
@@ -214,7 +218,7 @@ class Position:
         second, doubt2 = linear(
             ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1]
         )
-        return third, normalised(second), doubt | doubt2
+        return third, self._unit(second), doubt | doubt2
 
     def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -275,7 +279,7 @@ class Position:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair((-coefficients[0] / slope)[None, None, None, :], None), np.zeros(1, bool)
         third, doubt = linear(coefficients[1], coefficients[2], -coefficients[0], 0, self.scale, prefer[2])
-        return normalised(third), doubt
+        return self._unit(third), doubt
 
     @staticmethod
     def _at(coefficients: list[Entry], third: Pair) -> Array:
