@@ -131,16 +131,19 @@ class SphericalWrist:
             return self._mirrored(pairs, doubt, miss, x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc)
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, prefer)
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
 
     def _around(
-        self, fifth: Pair, x: list[Entry], z: list[Entry], prefer: Prefer
+        self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
     ) -> tuple[Pair, Pair, Array, Entry]:
-        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z."""
+        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
+
+        across: the square of z's part across joint 4, if the wrist can reach every z.
+        """
         turn5 = soa.rotate(self.A, *fifth)
         u = soa.turn(turn5, self.B[6:9])
-        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3])
+        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3], across)
         c4, s4 = fourth
         # what is left is Rz(q6): its first column
         back = soa.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
@@ -155,7 +158,7 @@ class SphericalWrist:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]
         fifth = Pair(soa.mul(self.cos5, z[2]), soa.mul(self.cos5, np.sqrt(disc)))
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, prefer)
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         sign = signs(2)
         flipped = 0.5 - 0.5 * sign
         q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))

@@ -122,18 +122,30 @@ def normalised(pair: Pair) -> Pair:
 
 
 def rotation_between(
-    ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: float, prefer: Pair | None
+    ux: Entry,
+    uy: Entry,
+    vx: Entry,
+    vy: Entry,
+    scale: float,
+    prefer: Pair | None,
+    length2: Entry | None = None,
 ) -> tuple[Pair, Array]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
+    length2: the squared length that u and v both have if the target is reached, where the
+    caller knows it; the pair of a target that is not is then not normalised.
     Returns the pair and doubt: True where u or v vanishes, so that the angle is free.
     """
     c = soa.add(soa.mul(ux, vx), soa.mul(uy, vy))
     s = soa.sub(soa.mul(ux, vy), soa.mul(uy, vx))
-    h2 = soa.add(soa.mul(c, c), soa.mul(s, s))
-    least = (FREE * scale * scale) ** 2
-    free = h2 < least
-    inverse = 1.0 / np.sqrt(np.maximum(h2, least))
+    least = FREE * scale * scale
+    if length2 is None:
+        h2 = soa.add(soa.mul(c, c), soa.mul(s, s))
+        free = h2 < least * least
+        inverse = 1.0 / np.sqrt(np.maximum(h2, least * least))
+    else:
+        free = length2 < least
+        inverse = 1.0 / np.maximum(length2, least)
     return _prefer(Pair(c * inverse, s * inverse), free, prefer), free
 
 

@@ -116,7 +116,7 @@ class ThreeParallel:
             self.B, [soa.add(soa.mul(c5, mx), soa.mul(s5, my)), soa.sub(soa.mul(c5, my), soa.mul(s5, mx)), mz]
         )
         # Rz(-q6) v = w
-        sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5])
+        sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5], disc)
         # joint 4's frame seen from joint 2
         X = soa.times(soa.rotate(D, sixth.c, -sixth.s), self.back5)
         X = soa.times(soa.rotate(X, c5, -s5), self.back4)
