@@ -78,9 +78,10 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     times = np.array(tick_times(move.segments))
     assert times[-1] == move.cycles
 
-    # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid, gentler than what was asked for.
+    # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid,
+    # gentler than what was asked for.
     ideal = trapezoid(times / CLOCK, n, move.peak * n, accel * motion._EASE) / n
-    late = 1.25 + 2e-3 * n  # the device's whole cycles make a cruise up to 0.2 % slower
+    late = 1.25 + 4e-3 * n  # whole cycles make a cruise up to 0.2 % slower, and linear intervals are no root
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
         assert np.abs(made(move.segments, k) - ideal * (b - a)).max() <= late
         assert sum(s.steps[k] > 0 for s in move.segments) == 0 or b > a  # monotone
@@ -110,12 +111,13 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 30_000), st.floats(50, 40_000), st.floats(200, 200_000))
 def test_a_queue_of_28_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
-    """PROTOCOL.md, section 7: DRY when the queued time falls to u/2 + u/16 + 2 ms, u = rate / max_accel."""
+    """PROTOCOL.md, section 7: DRY when the queued time falls to u^2 / (u + e) + u / 32 + 2 ms."""
     move = motion.line([0], [n], rate / n, accel / n)
     length = [motion.cycles_of(s) / CLOCK for s in move.segments]
-    for i, s in enumerate(move.segments[:-28]):
-        u = abs(s.steps[0]) / length[i] / accel
-        assert sum(length[i + 1 : i + 28]) > u / 2 + u / 16 + 0.002 + 0.02
+    rate_at = [[abs(s.steps[0]) * CLOCK / s.ticks / x for x in (s.interval, s.last_interval)] for s in move.segments]
+    for i in range(len(length) - 28):
+        u, e = rate_at[i][0] / accel, rate_at[i + 27][1] / accel
+        assert sum(length[i : i + 28]) > u * u / (u + e) + u / 32 + 0.002 + 0.02
 
 
 @given(st.integers(1, 2000), st.floats(50, 40_000), st.floats(200, 200_000))
@@ -136,8 +138,8 @@ def test_the_published_pose(three_dof: Arm) -> None:
     totals = np.sum([s.steps for s in plan.moves[0].segments], axis=0)
     assert totals.tolist() == [-1067, -10144, 5667]
     assert np.all(plan.top_speed <= three_dof.max_speed * (1 + 1e-12))
-    # 85 deg at 60 deg/s with ramps of 120 deg/s^2 would take 1.917 s; ours are 7 % gentler.
-    assert 1.917 < plan.duration < 1.97
+    # 85 deg at 60 deg/s with ramps of 120 deg/s^2 would take 1.917 s; ours are 10 % gentler.
+    assert 1.917 < plan.duration < 1.99
 
 
 def test_a_trace_starts_and_ends_where_the_counts_do(three_dof: Arm) -> None:
@@ -184,9 +186,7 @@ def test_missing_rates_are_named() -> None:
 
 def test_a_rate_beyond_the_device_is_refused_with_the_figure(three_dof: Arm) -> None:
     goal = np.deg2rad([-30, 5, -5])
-    with pytest.raises(
-        UsageError, match=r"joint q2 at 60 deg/s needs 7,160 counts/s of motor q2; .* 4,000\n"
-    ) as e:
+    with pytest.raises(UsageError, match=r"joint q2 at 60 deg/s needs 7,160 counts/s of motor q2; .* 4,000\n") as e:
         motion.plan(three_dof, [0, 0, 0], goal, min_interval=4000)
     assert "--speed 55" in str(e.value)
     motion.plan(three_dof, [0, 0, 0], goal, min_interval=4000, speed=0.55)

@@ -187,16 +187,20 @@ class Motors:
         now = self._queue[0]
         tick = min(bisect_right(now.times, self._at), len(now.times) - 1)
         interval = now.times[tick] - (now.times[tick - 1] if tick else 0)
-        rate = self.clock / (now.segment.ticks * interval)
-        limits = zip(now.segment.steps, self.image.axes, strict=True)
+        return self._brake(now.segment, interval)
+
+    def _brake(self, segment: Segment, interval: int) -> float:
+        rate = self.clock / (segment.ticks * interval)
+        limits = zip(segment.steps, self.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
     def _dry(self) -> bool:
         if not self._queue or self._queue[-1].end:
             return False
         rest = sum(q.segment.units() * 256 for q in self._queue) - self._at
-        u = self._stop_time()
-        return rest / self.clock < u / 2 + u / 16 + 0.002
+        u, last = self._stop_time(), self._queue[-1].segment
+        e = self._brake(last, last.last_interval)
+        return rest / self.clock < (u * u / (u + e) if u else 0.0) + u / 32 + 0.002
 
     # Homing and jogging: a vector of rates, of which a share between 0 and 1 is run
 
@@ -221,9 +225,7 @@ class Motors:
 
     def _glide(self, target: float) -> None:
         """One millisecond with the share on its way to `target`."""
-        slope = min(
-            (self.image.axes[i].max_accel / abs(r) for i, r in enumerate(self._rate) if r), default=1e9
-        )
+        slope = min((self.image.axes[i].max_accel / abs(r) for i, r in enumerate(self._rate) if r), default=1e9)
         before, step = self._share, slope * 0.001
         self._share = min(before + step, target) if target > before else max(before - step, target)
         moved = (before + self._share) / 2 * 0.001
@@ -257,11 +259,7 @@ class Motors:
         ahead = share * 0.001 + share * share / (2 * slope) + share * 0.001
         there = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(self.base, self._rate, strict=True)]
         for i, axis in enumerate(self.image.axes):
-            if (
-                self._rate[i]
-                and self.known >> i & 1
-                and not within(axis.lower, axis.upper, self.base[i], there[i])
-            ):
+            if self._rate[i] and self.known >> i & 1 and not within(axis.lower, axis.upper, self.base[i], there[i]):
                 return False
         for row in self.image.rows:
             if all(self.known >> i & 1 for i, w in enumerate(row.weight) if w) and not within(

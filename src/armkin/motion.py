@@ -8,7 +8,7 @@ start and stop together. The motor with the most steps, the *leader*, sets the t
 
 Segments end on whole leader steps, and their steps are differences of one rounded line: their sums are
 exact by construction. A segment's ticks are evenly spaced up to a linear change of the interval, which the
-device adds up (firmware/PROTOCOL.md, section 6). Within a ramp a segment spans 8 % of the time since (or
+device adds up (firmware/PROTOCOL.md, section 6). Within a ramp a segment spans 12 % of the time since (or
 until) standstill: so few that a 32-segment queue always holds the way to a stop, so many that no step is
 farther than one count from the trapezoid.
 """
@@ -40,7 +40,7 @@ Counts = NDArray[np.int64]
 CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 400  # [cycles] between ticks
 
-_GROWTH = 1.08  # time at a ramp segment's end over time at its start, seen from standstill
+_GROWTH = 1.12  # time at a ramp segment's end over time at its start, seen from standstill
 # Inside such a segment the interval is linear, and at its fast end the acceleration is
 # 4 g^2 / (1 + g)^2 times the mean: plan the mean that much lower.
 _EASE = ((1 + _GROWTH) / (2 * _GROWTH)) ** 2
@@ -146,7 +146,7 @@ def plan(
     >>> arm = armkin.load("robots/three_dof.yaml")
     >>> p = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
     >>> p.end.tolist(), round(p.duration, 2), np.rad2deg(p.top_speed).round().tolist()
-    ([-1067, -10144, 5667], 1.95, [21.0, 60.0, 60.0])
+    ([-1067, -10144, 5667], 1.98, [21.0, 60.0, 60.0])
     """
     check_rates(arm)
     if not 0 < speed <= 1:
@@ -234,16 +234,20 @@ def _holds(segments: list[Segment], brakes: Array, clock: int) -> bool:
     """Whether the queue always holds the way to a stop, as the board sees it.
 
     To the board a motor with one step in a short segment is fast, however seldom its steps are; so its
-    time to a stop, u, may be far above the plan's. It holds when the queued time falls to u / 2 + u / 16.
+    time to a stop, u, may be far above the plan's. It holds when the queued time falls to
+    u^2 / (u + e) + u / 32 + 2 ms, e being u at the queue's end (firmware/PROTOCOL.md, section 7).
     """
-    lengths = np.array([cycles_of(s) for s in segments]) / clock
-    fastest = np.array([min(s.interval, s.last_interval) * s.ticks for s in segments]) / clock
-    u = (np.abs([s.steps for s in segments]) / fastest[:, None] / brakes).max(axis=1)
-    behind = np.concatenate(
-        [np.cumsum(lengths), np.full(_AHEAD, np.inf)]
-    )  # beyond the end nothing is missing
-    queued = behind[_AHEAD : _AHEAD + len(segments)] - behind[: len(segments)]
-    return bool(np.all(queued > u * 0.5625 + 0.004))
+    if len(segments) <= _AHEAD:
+        return True
+    ends = np.cumsum([cycles_of(s) for s in segments]) / clock
+    steps = np.abs([s.steps for s in segments]) / (brakes / clock)
+    ticks = np.array([s.ticks for s in segments])[:, None]
+    first, last = (np.array(x)[:, None] for x in zip(*((s.interval, s.last_interval) for s in segments), strict=True))
+    begins = np.concatenate([[0.0], ends[:-1]])
+    u = (steps / (ticks * first)).max(axis=1)[:-_AHEAD]
+    e = (steps / (ticks * last)).max(axis=1)[_AHEAD - 1 : -1]
+    queued = ends[_AHEAD - 1 : -1] - begins[:-_AHEAD]
+    return bool(np.all(queued > u * u / np.maximum(u + e, 1e-9) + u / 32 + 0.004))
 
 
 def _cut(ramp: _Trapezoid, span: Counts, clock: int, min_interval: int) -> tuple[list[Segment], int]:
@@ -356,9 +360,7 @@ class _Trapezoid:
         yield from (self.n - at for at in reversed(rise))
 
 
-def _spacing(
-    ramp: _Trapezoid, a: int, b: int, cycles: float, clock: int, min_interval: int
-) -> tuple[int, int, int]:
+def _spacing(ramp: _Trapezoid, a: int, b: int, cycles: float, clock: int, min_interval: int) -> tuple[int, int, int]:
     """Ticks, interval and add that take a segment from leader step a to b in about `cycles`."""
     steps = b - a
     over = max(1, int(cycles / (_TICK * steps)))
@@ -417,6 +419,4 @@ def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, 
             f"lower its max_speed, or send with --speed {math.floor(100 * speed * allowed / rates[k])}"
         )
     brakes = motor_accel(arm)
-    return line(
-        start.tolist(), end.tolist(), top, accel, brakes=brakes, clock=clock, min_interval=min_interval
-    )
+    return line(start.tolist(), end.tolist(), top, accel, brakes=brakes, clock=clock, min_interval=min_interval)

@@ -45,7 +45,7 @@ def test_json_tells_plan_and_arrival() -> None:
     assert answer["start_joints"] == pytest.approx([0, 90, -90])
     assert answer["joints"] == pytest.approx([-30.009375, 4.998371, -4.995], abs=1e-6)
     assert answer["position"] == "known"
-    assert answer["duration_s"] == pytest.approx(1.956, abs=0.01)
+    assert answer["duration_s"] == pytest.approx(1.975, abs=0.01)
     assert answer["top_speed"] == pytest.approx([21.18, 60, 60], abs=0.01)
 
 

@@ -224,8 +224,15 @@ static void hold_millisecond(const struct segment *s, uint16_t interval) {
 // The queue must always hold the path that a stop needs.
 static void watch_queue(const struct segment *s, uint16_t left, uint16_t interval) {
     speed = stop_time(s, interval);
+    if (motion.ended) {
+        return;
+    }
+    // The way to a stop takes u / 2 of this speed, and longer on a path that slows down by itself.
     const uint32_t rest = queued_units - units(s) + span(left, interval, last_interval(s));
-    if (!motion.ended && rest * UNIT_MS < speed / 2 + speed / 16 + 2.0F) {
+    const struct segment *last = queue_slot(queue_head - 1);
+    const float end = stop_time(last, last_interval(last));
+    const float need = speed > 0 ? speed * speed / (speed + end) : 0;
+    if (rest * UNIT_MS < need + speed / 32 + 2.0F) {
         session_end(E_DRY, 0);
     }
 }

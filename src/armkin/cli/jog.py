@@ -46,7 +46,7 @@ def jog(
     if not 0 < time <= _LONGEST:
         raise UsageError(f"--seconds: '{seconds}' must be above 0 and at most {_LONGEST:g}")
     top = float(units.joints_out(arm, arm.max_speed)[j])
-    if abs(rate) > top or rate == 0:
+    if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     with linking.machine(arm, configuration, port, baud) as machine:
         _prepare(machine)
