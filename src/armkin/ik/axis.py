@@ -40,7 +40,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             found = solve(_pose(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
-        return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels)
+        return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels, ordered=inner.ordered)
     solve_rows = inner.rows
     assert solve_rows is not None
 
@@ -50,7 +50,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         q, doubt = solve_rows(T)
         return q[:, :, :5], doubt
 
-    return Geometry(inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches)
+    return Geometry(inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered)
 
 
 def _pose(goal: list[Entry]) -> soa.Pose:

@@ -35,6 +35,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             "no axes meet or run parallel in a way that a closed form could use: numeric elimination, up to 16 branches",
             prepared.complete,
             rows=lambda T: elimination.solve(prepared, T),
+            ordered=False,
         )
     link, prismatic = _padded(arm)
     prepared = elimination.prepare(link, prismatic)
@@ -58,6 +59,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero",
         prepared.complete,
         rows=rows,
+        ordered=False,
     )
 
 

@@ -46,6 +46,7 @@ class Geometry:
     rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
     straight: bool = False  # `pairs` is made of numpy's elementwise functions alone: `armkin.straight` can record it
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
+    ordered: bool = True  # a branch keeps its index along a path; otherwise `armkin.ik.tracking` sees to it
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered
 
 

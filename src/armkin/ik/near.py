@@ -69,7 +69,13 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     sizes = [2 if label else 1 for label in alike.labels]
     why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
     return Geometry(
-        f"near {alike.name}", why, False, rows=rows, labels=alike.labels, branches=int(np.prod(sizes)) if sizes else None
+        f"near {alike.name}",
+        why,
+        False,
+        rows=rows,
+        labels=alike.labels,
+        ordered=alike.ordered,
+        branches=int(np.prod(sizes)) if sizes else None,
     )
 
 

@@ -326,4 +326,9 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     why = f"{kinds}: {position.why}"
-    return Geometry("three joints", why, True, lambda goal, prefer: Candidates(*position.solve(goal, prefer)))
+
+    def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
+        return Candidates(*position.solve(goal, prefer))
+
+    # a quartic's roots come in no order
+    return Geometry("three joints", why, True, solve, ordered=not position.regular)

@@ -21,6 +21,7 @@ from armkin.ik.names import branch_names
 from armkin.ik.solutions import Solutions, Status
 from armkin.ik.subproblems import Pair, Prefer, distance2, spin
 from armkin.ik.tasks import Task, read_targets
+from armkin.ik.tracking import follow
 from armkin.soa import Array, Entry
 from armkin.straight import Straight
 
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
 Bool = NDArray[np.bool_]
 
-ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad
+ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
+ACCEPTED_MM = 5e-10  # and as a length
 NEARBY = 1e-6  # residual up to which a candidate is worth correcting
 
 
@@ -70,6 +72,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     each = close.reshape(-1, arm.n) if close.ndim > 1 else np.broadcast_to(close, (len(target), arm.n))
     one = close if close.ndim == 1 else None
     out = _closed(arm, definition, geometry, target, each, one) if geometry.pairs else _rows(arm, definition, geometry, target, each)
+    if not geometry.ordered:
+        out.branch[...] = follow(arm, definition, out.q, target)
     names = branch_names(arm, definition, geometry, out.q.shape[1])
     return Solutions(
         arm=arm,
@@ -123,7 +127,7 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))
         B = int(np.prod(shape[:-1]))
         miss = np.broadcast_to(miss, shape).reshape(B, N)
-        valid = miss <= ACCEPTED**2
+        valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
         if out is None:
             out = _empty(len(target), B, arm.n)
         part = out.part(rows)

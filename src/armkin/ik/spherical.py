@@ -45,7 +45,15 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         if wrist.close:
             return None
         why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
-        return Geometry("spherical wrist", why, True, wrist.solve, straight=wrist.straight, labels=wrist.labels)
+        return Geometry(
+            "spherical wrist",
+            why,
+            True,
+            wrist.solve,
+            straight=wrist.straight,
+            labels=wrist.labels,
+            ordered=wrist.ordered,
+        )
     chain = reverse(chain)
     centre = wrist_centre(chain, tolerance * arm.reach)
     if centre is None:
@@ -58,7 +66,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return shoulder.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
     why = f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}"
-    return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight)
+    return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight, ordered=shoulder.ordered)
 
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
@@ -84,6 +92,7 @@ class SphericalWrist:
         """after3, after6: (3,) the centre seen after joint 3 and after joint 6 [mm]; tolerance: as in `recognise`."""
         self.chain = chain
         self.labels: tuple[str, ...] = ()
+        self.ordered = True
         self.close = False  # the first three joints are almost special: see `Position`
         if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], tolerance) and not chain.prismatic[0]:
             elbow = Elbow(chain, after3)
@@ -93,7 +102,7 @@ class SphericalWrist:
             self.labels = ("shoulder", "elbow", "wrist")
         else:
             position = Position(chain, after3, tolerance)
-            self.close = position.close
+            self.close, self.ordered = position.close, not position.regular
             self.place = position.solve
             self.straight = False
             self.why = f"joints 1, 2 and 3: {position.why}"
