@@ -11,8 +11,8 @@ import pytest
 from armkin import protocol
 from armkin.board_sim import SimBoard
 from armkin.boards import BOARDS
-from armkin.motion import line
 from armkin.protocol import AxisImage, Error, Flag, Image, Segment, State, Status
+from armkin.segments import line
 
 GOLDEN = Path(__file__).parent.parent / "firmware" / "golden"
 
@@ -47,9 +47,7 @@ def test_golden_conversations(path: Path) -> None:
             assert word == "<", f"{path.name}:{number}"
             waiting += splitter.feed(board.take())
             got = waiting.pop(0).hex()
-            shown = "".join(
-                "??" if rest[i : i + 2] == "??" else got[i : i + 2] for i in range(0, len(got), 2)
-            )
+            shown = "".join("??" if rest[i : i + 2] == "??" else got[i : i + 2] for i in range(0, len(got), 2))
             assert shown == rest, f"{path.name}:{number}"
             checked += 1
     assert checked >= 2
@@ -87,9 +85,7 @@ class Host:
         assert isinstance(status, Status)
         return status
 
-    def move(
-        self, axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], at_rest: bool
-    ) -> Error:
+    def move(self, axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], at_rest: bool) -> Error:
         ends = [a + sum(s.steps[i] for s in segments) for i, a in enumerate(start)]
         return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest))
 

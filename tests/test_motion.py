@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armkin import arm as arms
-from armkin import motion
+from armkin import motion, segments
 from armkin.arm import Arm
 from armkin.errors import NoSolutionError, UsageError
 from armkin.protocol import Segment
 from armkin.pulses import joints, pulses
 
-CLOCK, MIN_INTERVAL = motion.CLOCK, motion.MIN_INTERVAL
+CLOCK, MIN_INTERVAL = segments.CLOCK, segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
 
 
@@ -26,16 +26,16 @@ def three_dof() -> Arm:
     return arms.load("robots/three_dof.yaml")
 
 
-def tick_times(segments: tuple[Segment, ...]) -> list[int]:
+def tick_times(cut: tuple[Segment, ...]) -> list[int]:
     """Cycle of every tick, as the device counts (PROTOCOL.md, section 6)."""
-    intervals = [(256 * s.interval + j * s.add) >> 8 for s in segments for j in range(s.ticks)]
+    intervals = [(256 * s.interval + j * s.add) >> 8 for s in cut for j in range(s.ticks)]
     return list(accumulate(intervals))
 
 
-def made(segments: tuple[Segment, ...], axis: int) -> list[int]:
+def made(cut: tuple[Segment, ...], axis: int) -> list[int]:
     """Net steps of an axis after every tick: the device's Bresenham."""
     out, base = [], 0
-    for s in segments:
+    for s in cut:
         n, sign = abs(s.steps[axis]), 1 if s.steps[axis] > 0 else -1
         done = ((j * n + s.ticks - 1 - s.ticks // 2) // s.ticks for j in range(1, s.ticks + 1))
         out += [base + sign * d for d in done]
@@ -60,7 +60,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
     rate = data.draw(st.floats(20, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
     accel = data.draw(st.floats(100, 400_000))
-    move = motion.line(start, end, rate / max(n, 1), accel / max(n, 1))
+    move = segments.line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
     totals = [sum(s.steps[k] for s in move.segments) for k in range(len(start))]
@@ -71,7 +71,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
         assert max(s.interval, s.last_interval) <= 65535
         assert abs(s.add) <= 32767
         assert all(abs(x) <= min(s.ticks, 32767) for x in s.steps)
-    assert move.cycles == sum(motion.cycles_of(s) for s in move.segments)
+    assert move.cycles == sum(segments.cycles_of(s) for s in move.segments)
     if n == 0:
         assert move.segments == ()
         return
@@ -80,7 +80,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
 
     # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid,
     # gentler than what was asked for.
-    ideal = trapezoid(times / CLOCK, n, move.peak * n, accel * motion._EASE) / n
+    ideal = trapezoid(times / CLOCK, n, move.peak * n, accel * segments.EASE) / n
     late = 1.25 + 4e-3 * n  # whole cycles make a cruise up to 0.2 % slower, and linear intervals are no root
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
         assert np.abs(made(move.segments, k) - ideal * (b - a)).max() <= late
@@ -96,8 +96,8 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 20_000), st.floats(50, 40_000), st.floats(200, 400_000))
 def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
-    move = motion.line([0], [n], rate / n, accel / n)
-    times = np.cumsum([0, *(motion.cycles_of(s) for s in move.segments)]) / CLOCK
+    move = segments.line([0], [n], rate / n, accel / n)
+    times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
     position = np.cumsum([0, *(s.steps[0] for s in move.segments)])
     # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
     # rounding of a step: the definition of an acceleration that whole steps allow.
@@ -112,8 +112,8 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
 @given(st.integers(1, 30_000), st.floats(50, 40_000), st.floats(200, 200_000))
 def test_a_queue_of_28_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u^2 / (u + e) + u / 32 + 2 ms."""
-    move = motion.line([0], [n], rate / n, accel / n)
-    length = [motion.cycles_of(s) / CLOCK for s in move.segments]
+    move = segments.line([0], [n], rate / n, accel / n)
+    length = [segments.cycles_of(s) / CLOCK for s in move.segments]
     rate_at = [[abs(s.steps[0]) * CLOCK / s.ticks / x for x in (s.interval, s.last_interval)] for s in move.segments]
     for i in range(len(length) - 28):
         u, e = rate_at[i][0] / accel, rate_at[i + 27][1] / accel
@@ -123,13 +123,13 @@ def test_a_queue_of_28_segments_always_reaches_to_a_stop(n: int, rate: float, ac
 @given(st.integers(1, 2000), st.floats(50, 40_000), st.floats(200, 200_000))
 @settings(max_examples=30, deadline=None)
 def test_progress_inverts_the_ticks(n: int, rate: float, accel: float) -> None:
-    move = motion.line([0], [n], rate / n, accel / n)
+    move = segments.line([0], [n], rate / n, accel / n)
     times = np.array(tick_times(move.segments), dtype=float)
-    done = motion.progress(move, times)
+    done = segments.progress(move, times)
     assert np.all(np.diff(done) >= 0)
     assert done[-1] == 1
     assert np.abs(done * n - made(move.segments, 0)).max() <= 1
-    assert motion.progress(move, np.array([0.0]))[0] == 0
+    assert segments.progress(move, np.array([0.0]))[0] == 0
 
 
 def test_the_published_pose(three_dof: Arm) -> None:

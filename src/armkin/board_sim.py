@@ -9,32 +9,16 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from armkin import protocol
+from armkin.board_sim_frames import RefusedError, axes_of, image_valid
+from armkin.board_sim_frames import batch as read_batch
 from armkin.board_sim_motion import Motors, row_value, within
 from armkin.boards import Board
 from armkin.protocol import AxisImage, Error, Flag, Image, Info, Segment, State, Status, Type
 
 _SILENCE = 0.5  # [s]
 _RUNNING = (State.IDLE, State.MOVING)
-
-
-class RefusedError(Exception):
-    """A frame that is not executed: ends the session."""
-
-    def __init__(self, error: Error, detail: int = 0) -> None:
-        super().__init__(error.name)
-        self.error, self.detail = error, detail
-
-
-@dataclass(frozen=True)
-class _Batch:
-    axes: list[int]
-    start: tuple[int, ...]
-    end: tuple[int, ...]
-    segments: list[Segment]
-    at_rest: bool
 
 
 class SimBoard:
@@ -240,34 +224,10 @@ class SimBoard:
         length, crc = struct.unpack_from("<HI", payload, 2)
         data = bytes(self._image_bytes[:length])
         image = Image.unpack(data)
-        if image is None or len(data) != length or zlib.crc32(data) != crc or not self._valid(image):
+        if image is None or len(data) != length or zlib.crc32(data) != crc or not image_valid(image, self.board):
             raise RefusedError(Error.CONFIG_BAD)
         self._image = self.motors.image = image
         self._config = crc
-
-    def _valid(self, image: Image) -> bool:
-        board, far = self.board, 2**30
-        if len(image.axes) != len(board.axes) or len(image.rows) > board.rows:
-            return False
-        if image.step_high > 80 or image.step_low > 50 or image.dir_setup > 100:
-            return False
-        for i, axis in enumerate(image.axes):
-            servo = board.servo_mask >> i & 1
-            if axis.used and not (
-                -far <= axis.lower <= axis.home <= axis.upper <= far
-                and axis.max_rate > 0
-                and 0 < axis.max_accel < 2**24
-                and (not servo or 400 <= axis.lower <= axis.upper <= 2600)
-            ):
-                return False
-        for row in image.rows:
-            if any(w and not axis.used for w, axis in zip(row.weight, image.axes, strict=True)):
-                return False
-            reach = zip(row.weight, image.axes, strict=True)
-            most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
-            if row.lower > row.upper or most >= far:
-                return False
-        return True
 
     def _enable(self, payload: bytes) -> None:
         if len(payload) != 3:
@@ -284,7 +244,7 @@ class SimBoard:
     def _set_position(self, payload: bytes) -> None:
         if len(payload) < 4:
             raise RefusedError(Error.LENGTH)
-        axes = _axes(struct.unpack_from("<H", payload, 2)[0])
+        axes = axes_of(struct.unpack_from("<H", payload, 2)[0])
         if len(payload) != 4 + 4 * len(axes):
             raise RefusedError(Error.LENGTH)
         self._needs(State.IDLE)
@@ -313,7 +273,7 @@ class SimBoard:
             raise RefusedError(Error.DISABLED, axis)
 
     def _motion(self, payload: bytes) -> None:
-        batch = _batch(payload)
+        batch = read_batch(payload)
         self._needs(*_RUNNING, abort=True)
         plan = list(self.motors.plan)
         for axis, start in zip(batch.axes, batch.start, strict=True):
@@ -338,11 +298,7 @@ class SimBoard:
             image = self._image.axes[axis]
             if abs(n) > s.ticks:
                 raise RefusedError(Error.STEPS, axis)
-            if (
-                n
-                and (abs(n) - 1) * min(65535, self.board.clock // (4 * image.max_rate))
-                > s.ticks * fastest // 4
-            ):
+            if n and (abs(n) - 1) * min(65535, self.board.clock // (4 * image.max_rate)) > s.ticks * fastest // 4:
                 raise RefusedError(Error.RATE, axis)
             steps[axis] = n
             plan[axis] += n
@@ -388,27 +344,3 @@ class SimBoard:
         rate = struct.unpack_from(f"<{n}h", payload, 2)
         self._rates(rate, jogging=True)
         self.motors.jog(list(rate))
-
-
-def _axes(mask: int) -> list[int]:
-    return [i for i in range(16) if mask >> i & 1]
-
-
-def _batch(payload: bytes) -> _Batch:
-    """A MOTION frame's fields; its length must follow from them exactly."""
-    if len(payload) < 6:
-        raise RefusedError(Error.LENGTH)
-    mask, flags, n = struct.unpack_from("<HBB", payload, 2)
-    axes = _axes(mask)
-    k = len(axes)
-    wide = bool(flags & protocol.MOTION_WIDE)
-    form = struct.Struct(f"<HHh{k}h" if wide else f"<BHh{k}b")
-    known_flags = protocol.MOTION_END | protocol.MOTION_WIDE
-    if n == 0 or flags & ~known_flags or len(payload) != 6 + 8 * k + n * form.size:
-        raise RefusedError(Error.LENGTH)
-    ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
-    segments = []
-    for i in range(n):
-        ticks, interval, add, *steps = form.unpack_from(payload, 6 + 8 * k + i * form.size)
-        segments.append(Segment(ticks, interval, add, tuple(steps)))
-    return _Batch(axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END))

@@ -141,9 +141,7 @@ def _limits(arm: Arm) -> tuple[list[int], list[int]]:
     return low, high
 
 
-def _rows(
-    arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]
-) -> tuple[RowImage, ...]:
+def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]) -> tuple[RowImage, ...]:
     """A row for every limited joint that does not have a motor of its own."""
     per_count = np.linalg.pinv(arm.motor_gain)  # (n, motors)
     per_count[np.abs(per_count) < 1e-12 * np.abs(per_count).max()] = 0.0
@@ -157,9 +155,7 @@ def _rows(
             continue
         rows.append(_row(arm, board, axes, per_count[j], j, far))
     if len(rows) > board.rows:
-        raise UsageError(
-            f"{arm.name} has {len(rows)} coupled joints with limits; {board.kind} takes {board.rows}"
-        )
+        raise UsageError(f"{arm.name} has {len(rows)} coupled joints with limits; {board.kind} takes {board.rows}")
     return tuple(rows)
 
 
@@ -186,9 +182,7 @@ def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int
 def _check_servo(what: str, low: int, high: int) -> None:
     least, most = _SERVO_RANGE
     if low < least or high > most:
-        raise UsageError(
-            f"{what}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}"
-        )
+        raise UsageError(f"{what}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
 
 
 def _rate(board: Board, rate: float) -> int:
@@ -218,9 +212,7 @@ def _grip(board: Board, gripper: Gripper, where: str) -> Grip:
         per_unit,
         zero,
     )
-    return Grip(
-        axis, bare.count(gripper.open), bare.count(gripper.closed), bare.top, bare.accel, per_unit, zero
-    )
+    return Grip(axis, bare.count(gripper.open), bare.count(gripper.closed), bare.top, bare.accel, per_unit, zero)
 
 
 def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:

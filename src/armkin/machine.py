@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from armkin.arm import Arm
     from armkin.configuration import Configuration
     from armkin.link import Port
-    from armkin.motion import Counts, Move, Plan
+    from armkin.motion import Plan
+    from armkin.segments import Counts, Move
     from armkin.soa import Array
 
 Position = Literal["known", "retained", "lost"]
@@ -314,9 +315,7 @@ class Machine:
                 self.info = self.session.reopen()
                 self.status = self.session.status()
         except LinkError:
-            return LinkError(
-                f"{why}; then the board did not answer any more: armkin status tells where it stands"
-            )
+            return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
         return LinkError(f"{why}\n{self.standing()}")
 
     def standing(self) -> str:

@@ -1,6 +1,6 @@
-"""Frames and bytes of the wire protocol: firmware/PROTOCOL.md is the text, firmware/golden/ the vectors.
+"""Frames of the wire protocol: firmware/PROTOCOL.md is the text, firmware/golden/ the vectors.
 
-    payload  --wire()-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
+    fields  --hello(), motion(), ...-->  payload  --framing-->  bytes on the line  --framing, parse()-->  fields
 
 Host and simulated board share this module; it knows no port and no motion.
 """
@@ -8,13 +8,21 @@ Host and simulated board share this module; it knows no port and no motion.
 from __future__ import annotations
 
 import struct
-import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+from armkin.framing import MAX_FRAME as MAX_FRAME
+from armkin.framing import Splitter as Splitter
+from armkin.framing import cobs_decode as cobs_decode
+from armkin.framing import cobs_encode as cobs_encode
+from armkin.framing import unwire as unwire
+from armkin.framing import wire as wire
+from armkin.image import AxisImage as AxisImage
+from armkin.image import Image as Image
+from armkin.image import RowImage as RowImage
+
 VERSION = 1
-MAX_FRAME = 250  # payload + CRC: COBS then adds one byte
 
 
 class Type(IntEnum):
@@ -186,84 +194,6 @@ _INFO = struct.Struct("<5BIBBHBBBBHIIHBHB")
 _STATUS = struct.Struct("<8BHH4B")
 
 
-# Framing
-
-
-def cobs_encode(data: bytes) -> bytes:
-    """Consistent overhead byte stuffing (Cheshire & Baker 1999) of at most 254 bytes.
-
-    >>> cobs_encode(bytes([1, 0, 2])).hex()
-    '02010202'
-    """
-    if len(data) > 254:
-        raise ValueError(f"{len(data)} bytes in a frame; 254 fit")
-    return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0"))
-
-
-def cobs_decode(data: bytes) -> bytes | None:
-    """The inverse of `cobs_encode`; None if the stuffing is broken."""
-    blocks, at = [], 0
-    while at < len(data):
-        code = data[at]
-        if code == 0 or at + code > len(data):
-            return None
-        blocks.append(data[at + 1 : at + code])
-        at += code
-    if not blocks or any(0 in block for block in blocks):
-        return None
-    return b"\0".join(blocks)
-
-
-def wire(payload: bytes) -> bytes:
-    """A payload as it goes over the line: with CRC, stuffed, ended by a zero.
-
-    >>> wire(hold(9)).hex()
-    '03030998f9281300'
-    """
-    if len(payload) + 4 > MAX_FRAME:
-        raise ValueError(f"a payload of {len(payload)} bytes; {MAX_FRAME - 4} fit")
-    return cobs_encode(payload + struct.pack("<I", zlib.crc32(payload))) + b"\0"
-
-
-def unwire(frame: bytes) -> bytes | None:
-    """The payload of a frame without its zero; None if it is damaged."""
-    data = cobs_decode(frame)
-    if data is None or not 6 <= len(data) <= MAX_FRAME:
-        return None
-    payload = data[:-4]
-    return payload if struct.unpack("<I", data[-4:])[0] == zlib.crc32(payload) else None
-
-
-class Splitter:
-    """Cuts a stream of bytes into payloads; counts what was damaged in `bad`."""
-
-    def __init__(self, largest: int = MAX_FRAME) -> None:
-        self.bad = 0
-        self._largest = largest + 1
-        self._rest = bytearray()
-        self._skip = False  # in a frame that is too long already
-
-    def feed(self, data: bytes) -> Iterator[bytes]:
-        """The payloads that `data` completes."""
-        *frames, rest = data.split(b"\0")
-        for frame in frames:
-            whole = bytes(self._rest) + frame
-            self._rest.clear()
-            if self._skip or len(whole) > self._largest:
-                self._skip = False
-                self.bad += 1
-            elif whole:
-                payload = unwire(whole)
-                if payload is None:
-                    self.bad += 1
-                else:
-                    yield payload
-        self._rest += rest
-        if len(self._rest) > self._largest:
-            self._rest.clear()
-            self._skip = True
-
-
 # Frames to the board
 
 
@@ -403,82 +333,3 @@ def pack_status(status: Status) -> bytes:
         status.free, status.queued, status.known, status.switches, status.overruns, status.bad, status.page,
     )  # fmt: skip
     return head + struct.pack(f"<{len(status.counts)}i", *status.counts)
-
-
-# The configuration image (PROTOCOL.md, section 4)
-
-
-@dataclass(frozen=True)
-class AxisImage:
-    """One axis of the configuration image; an unused one is all zero."""
-
-    used: bool = False
-    invert: bool = False
-    lower: int = 0
-    upper: int = 0
-    home: int = 0
-    max_rate: int = 0
-    max_accel: int = 0
-
-
-@dataclass(frozen=True)
-class RowImage:
-    """lower <= sum of weight x count <= upper."""
-
-    lower: int
-    upper: int
-    weight: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Image:
-    """All that a board knows of the arm; times in 0.1 us, `wake` in ms."""
-
-    axes: tuple[AxisImage, ...]
-    rows: tuple[RowImage, ...] = ()
-    abort_closed: bool = False
-    enable_high: bool = False
-    step_high: int = 10
-    step_low: int = 10
-    dir_setup: int = 2
-    wake: int = 1
-    meaning: int = 0
-
-    def pack(self) -> bytes:
-        """The image's bytes."""
-        n = len(self.axes)
-        flags = self.abort_closed | self.enable_high << 1
-        times = (self.step_high, self.step_low, self.dir_setup, self.wake)
-        out = struct.pack("<8BI", 1, n, len(self.rows), flags, *times, self.meaning)
-        for a in self.axes:
-            marks = a.used | a.invert << 1
-            out += struct.pack("<BiiiHI", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
-        for r in self.rows:
-            out += struct.pack(f"<ii{n}h", r.lower, r.upper, *r.weight)
-        return out
-
-    @classmethod
-    def unpack(cls, data: bytes) -> Image | None:
-        """The image of its bytes; None if layout or length are wrong (ranges are the board's to check)."""
-        if len(data) < 12:
-            return None
-        layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", data)
-        if layout != 1 or flags > 3 or len(data) != 12 + 19 * n + (8 + 2 * n) * rows:
-            return None
-        axes = []
-        for i in range(n):
-            marks, *fields = struct.unpack_from("<BiiiHI", data, 12 + 19 * i)
-            if marks > 3:
-                return None
-            axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))
-        limits = []
-        for i in range(rows):
-            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", data, 12 + 19 * n + (8 + 2 * n) * i)
-            limits.append(RowImage(lower, upper, tuple(weight)))
-        return cls(
-            tuple(axes), tuple(limits), bool(flags & 1), bool(flags & 2), high, low, setup, wake, meaning
-        )
-
-    def crc(self) -> int:
-        """What INFO's `config` says while this image is in force."""
-        return zlib.crc32(self.pack())

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 def grip(
     robot: Robot,
-    value: Annotated[
-        str, typer.Argument(metavar="open|closed|VALUE", help="In the gripper drive's degrees (mm).")
-    ],
+    value: Annotated[str, typer.Argument(metavar="open|closed|VALUE", help="In the gripper drive's degrees (mm).")],
     port: PortName,
     assume: Annotated[
         str | None,
@@ -35,7 +33,7 @@ def grip(
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
-    from armkin.motion import line
+    from armkin.segments import line
 
     arm = inputs.load(robot)
     configuration = linking.configured(arm)

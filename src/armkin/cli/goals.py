@@ -1,0 +1,171 @@
+"""Where `armkin send` is told to go: joint values, a target, a file or a stream of waypoints, a piped answer."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armkin.cli import inputs, piped, render, units
+from armkin.cli.batch import streamed_rows
+from armkin.cli.numbers import listed
+from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+    from armkin.motion import Plan
+    from armkin.soa import Array
+
+Planner = Callable[[Sequence[int], "Array"], "Plan"]  # counts to start from, joint values (w, n) [rad | mm]
+
+
+def goals(
+    robot: str | None,
+    q: list[str] | None,
+    target: str | None,
+    branch: str | None,
+    task: str | None,
+    batch: str | None,
+) -> tuple[Arm, Goals | Stream]:
+    """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
+    import numpy as np
+
+    given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)}: give one of them")
+    if target is None and (branch is not None or task is not None):
+        raise UsageError("--branch and --task belong to --target")
+    if not given:
+        return _from_pipe(robot)
+    if robot is None:
+        raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
+    arm = inputs.load(robot)
+    if target is not None:
+        from armkin.ik.tasks import task_for
+
+        what = task_for(arm, task)
+        values = listed(target, what.labels, f"--target (task {what.name})")
+        goal = units.targets_in(what.labels, np.array([values]))
+        return arm, Goals(None, [1], goal, what.name, branch)
+    if batch == "-":
+        return arm, Stream(arm, batch)
+    if batch is not None:
+        rows = list(streamed_rows(batch, arm.joint_names, arm.name))
+        if not rows:
+            raise UsageError(f"{batch} has no rows: it needs one of {','.join(arm.joint_names)} per waypoint")
+        return arm, _checked(arm, [number for number, _ in rows], [values for _, values in rows])
+    return arm, _checked(arm, [], [inputs.joints(arm, q)])
+
+
+@dataclass
+class Goals:
+    """Where to go: joint values (w, n) [rad | mm], with their row numbers, or one target for ik."""
+
+    joints: Array | None
+    rows: Sequence[int]
+    target: Array | None = None
+    task: str | None = None
+    branch: str | None = None
+
+    def resolve(self, arm: Arm, near: Array) -> Array:
+        """Joint values (w, n); near: where the arm stands [rad | mm]."""
+        if self.joints is not None:
+            return self.joints
+        from armkin.cli import solving
+
+        request = solving.Request(
+            arm=arm, task=self.task, near=units.joints_out(arm, near).tolist(), branch=self.branch
+        )
+        [answer] = solving.solve(request, self.target)  # type: ignore[arg-type]
+        if answer.best is None:
+            nearest = solving.closest(request, self.target[0])  # type: ignore[index]
+            legal = sum(found.within_limits for found in answer.branches)
+            raise render.unsolved(
+                arm,
+                {
+                    "status": answer.status,
+                    "branches_within_limits": legal,
+                    "closest": {"distance_mm": nearest.distance},
+                },
+            )
+        return answer.branches[answer.best].q[None]
+
+
+class Stream:
+    """Rows of standard input, each planned and sent as soon as it has come."""
+
+    def __init__(self, arm: Arm, source: str) -> None:
+        self.problem: ArmkinError | None = None
+        self._rows: queue.SimpleQueue[tuple[int, list[float]] | ArmkinError | None] = queue.SimpleQueue()
+        self._arm, self._source = arm, source
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        try:
+            for row in streamed_rows(self._source, self._arm.joint_names, self._arm.name):
+                self._rows.put(row)
+        except ArmkinError as error:
+            self._rows.put(error)
+        self._rows.put(None)
+
+    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Plan | None]:
+        """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
+        at, empty = list(start), True
+        while True:
+            try:
+                item = self._rows.get_nowait()
+            except queue.Empty:
+                yield None
+                continue
+            if item is None:
+                break
+            if isinstance(item, ArmkinError):
+                self.problem = item
+                return
+            empty = False
+            try:
+                plan = planner(at, units.joints_in(self._arm, [item[1]]))
+            except (NoSolutionError, UsageError) as error:
+                self.problem = type(error)(f"row {item[0]}: {error}; the rows before it were carried out")
+                return
+            at = plan.end.tolist()
+            yield plan
+        if empty:
+            self.problem = UsageError("standard input has no rows: nothing was moved")
+
+
+def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
+    from armkin.motion import check_limits
+
+    joints = units.joints_in(arm, values)
+    for i, goal in enumerate(joints):
+        try:
+            check_limits(arm, goal[None])
+        except NoSolutionError as error:
+            raise NoSolutionError(f"row {rows[i]}: {error}" if rows else str(error)) from None
+    return Goals(joints, rows)
+
+
+def _from_pipe(robot: str | None) -> tuple[Arm, Goals]:
+    import numpy as np
+
+    import armkin
+
+    answer = piped.read(robot)
+    arm = inputs.load(answer.robot_file)
+    if arm.sha256 != answer.robot_sha256:
+        raise FileError(
+            f"{answer.robot_file} is not the file that the answer on standard input was computed with: "
+            "it has changed; compute the answer again"
+        )
+    poses = []
+    for pose in answer.poses:
+        if len(pose.joints) != arm.n:
+            raise UsageError(f"the answer has {len(pose.joints)} joint values, {arm.name} has {arm.n} joints")
+        [exact] = _checked(arm, [], [pose.joints]).joints  # type: ignore[misc]
+        if pose.pulses is not None and armkin.pulses(arm, exact).tolist() != pose.pulses:
+            exact = armkin.joints(arm, pose.pulses)  # of `pulses --best`: not those of plain rounding
+        poses.append(exact)
+    return arm, Goals(np.array(poses), list(range(1, len(poses) + 1)))

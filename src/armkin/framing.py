@@ -1,0 +1,87 @@
+"""Payloads to bytes on the line and back (firmware/PROTOCOL.md, section 1).
+
+payload  --wire()-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+
+MAX_FRAME = 250  # payload + CRC: COBS then adds one byte
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Consistent overhead byte stuffing (Cheshire & Baker 1999) of at most 254 bytes.
+
+    >>> cobs_encode(bytes([1, 0, 2])).hex()
+    '02010202'
+    """
+    if len(data) > 254:
+        raise ValueError(f"{len(data)} bytes in a frame; 254 fit")
+    return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0"))
+
+
+def cobs_decode(data: bytes) -> bytes | None:
+    """The inverse of `cobs_encode`; None if the stuffing is broken."""
+    blocks, at = [], 0
+    while at < len(data):
+        code = data[at]
+        if code == 0 or at + code > len(data):
+            return None
+        blocks.append(data[at + 1 : at + code])
+        at += code
+    if not blocks or any(0 in block for block in blocks):
+        return None
+    return b"\0".join(blocks)
+
+
+def wire(payload: bytes) -> bytes:
+    """A payload as it goes over the line: with CRC, stuffed, ended by a zero.
+
+    >>> wire(bytes([3, 9])).hex()
+    '07030998f9281300'
+    """
+    if len(payload) + 4 > MAX_FRAME:
+        raise ValueError(f"a payload of {len(payload)} bytes; {MAX_FRAME - 4} fit")
+    return cobs_encode(payload + struct.pack("<I", zlib.crc32(payload))) + b"\0"
+
+
+def unwire(frame: bytes) -> bytes | None:
+    """The payload of a frame without its zero; None if it is damaged."""
+    data = cobs_decode(frame)
+    if data is None or not 6 <= len(data) <= MAX_FRAME:
+        return None
+    payload = data[:-4]
+    return payload if struct.unpack("<I", data[-4:])[0] == zlib.crc32(payload) else None
+
+
+class Splitter:
+    """Cuts a stream of bytes into payloads; counts what was damaged in `bad`."""
+
+    def __init__(self, largest: int = MAX_FRAME) -> None:
+        self.bad = 0
+        self._largest = largest + 1
+        self._rest = bytearray()
+        self._skip = False  # in a frame that is too long already
+
+    def feed(self, data: bytes) -> Iterator[bytes]:
+        """The payloads that `data` completes."""
+        *frames, rest = data.split(b"\0")
+        for frame in frames:
+            whole = bytes(self._rest) + frame
+            self._rest.clear()
+            if self._skip or len(whole) > self._largest:
+                self._skip = False
+                self.bad += 1
+            elif whole:
+                payload = unwire(whole)
+                if payload is None:
+                    self.bad += 1
+                else:
+                    yield payload
+        self._rest += rest
+        if len(self._rest) > self._largest:
+            self._rest.clear()
+            self._skip = True
