@@ -34,7 +34,7 @@ from armkin.ik.subproblems import (
     rotation_between,
     trig_quadratic,
 )
-from armkin.ik.tasks import Task
+from armkin.ik.tasks import Task, rank
 from armkin.soa import Array, Entry
 
 if TYPE_CHECKING:
@@ -321,6 +321,8 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     """Any three joints that place a point."""
     if task.name != "xyz" or arm.n != 3:
         return None
+    if rank(arm, task) < 3:
+        raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
     position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance)
     if position.close and tolerance == EXACT:
         return None

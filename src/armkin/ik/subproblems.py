@@ -170,7 +170,8 @@ def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Ar
     with np.errstate(divide="ignore", invalid="ignore"):
         # tan(q/2) = s / (1 + c) = (1 - c) / s: the form without cancellation
         t = np.where(pair.c > 0.0, pair.s / (1.0 + pair.c), (1.0 - pair.c) / pair.s)
-    return scale * t, doubt
+    # a root at infinity is no answer, but inf would turn into nan on its way
+    return scale * np.where(np.abs(t) < 1e9, t, 1e9), doubt
 
 
 def trig_quadratic(e: list[Entry], near: float = TOUCHING) -> tuple[Array, Array]:

@@ -98,7 +98,7 @@ def default_task(arm: Arm) -> str | None:
     }.get(arm.n, ("pose",) if arm.n > 5 else ())
     for name in order:
         build = {"xyz_yaw": _yaw, "xyz_pitch": _pitch, "xyz_pitch_roll": _pitch}.get(name, _planar if "xy" in name and "z" not in name else _free)
-        if not isinstance(task := build(arm, name), str) and _rank(arm, task) == min(task.constraints, arm.n):
+        if not isinstance(task := build(arm, name), str) and rank(arm, task) == min(task.constraints, arm.n):
             return name
     return None
 
@@ -243,7 +243,7 @@ def _joints(arm: Arm) -> str:
     return f"{arm.n} joints ({kinds})"
 
 
-def _rank(arm: Arm, task: Task) -> int:
+def rank(arm: Arm, task: Task) -> int:
     """Rank of the task's Jacobian at poses in general position."""
     from armkin.kinematics import fk, jacobian
 
