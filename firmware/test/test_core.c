@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "../src/core/bytes.h"
+#include "../src/core/crc.h"
 #include "../src/core/dda.h"
 #include "../src/core/session.h"
 #include "host.h"
@@ -109,8 +111,8 @@ static double hold_by(void (*cause)(void), enum error error) {
     fresh(2);
     CHECK(host_motion(3, HOST_END | HOST_WIDE, home_counts, 1, &cruise_segment).error == OK);
     for (int i = 0; i < 10; i++) {
-        bench_run(20000);
-        host_status(0);
+        bench_run(20000 + i);
+        CHECK(pins_are(host_status(0).counts));  // on the way, too
     }
     slowing = false;
     bench_on_tick = watch_slowing;
@@ -254,7 +256,7 @@ static void credit_and_duplicates(void) {
         uint8_t answer[300];
         CHECK(bench_answer(answer, sizeof answer) == 8 && answer[1] == host_next && answer[5] == free);
     }
-    CHECK(host_motion(1, 0, at, 8, s).error == E_CREDIT);
+    CHECK(free == 0 && host_motion(1, 0, at, 1, s).error == E_CREDIT);
     host_wait_idle(20000);
     CHECK(host_status(0).ack.error == E_CREDIT);
 }
@@ -405,6 +407,67 @@ static void limits_hold(void) {
     CHECK(host_motion(1, HOST_END, beyond, 1, &in).error == OK);
     host_wait_idle(1000);
     CHECK(host_status(0).counts[0] == -100400);
+
+    fresh(33);
+    beyond[0] = 100500;
+    CHECK(host_enable(2).error == OK && host_position(1, beyond).error == OK && host_enable(3).error == OK);
+    CHECK(host_motion(1, HOST_END, beyond, 1, &in).error == E_LIMIT);
+    host_hello(34);
+    const struct host_segment back = {.ticks = 200, .interval = 1600, .steps = {-100}};
+    CHECK(host_motion(1, HOST_END, beyond, 1, &back).error == OK);
+    host_wait_idle(1000);
+    CHECK(host_status(0).counts[0] == 100400);
+}
+
+// ---- images that must not come into force
+
+static void spoil(struct image *image, int how) {
+    struct axis_config *axis = &image->axis[1], *servo = &image->axis[STEPPERS];
+    image->rows = 1;
+    image->row[0] = (struct row_config){-5, 5, {1, 1}};
+    switch (how) {
+        case 0: image->layout = 2; break;
+        case 1: image->axes = AXES - 1; break;
+        case 2: image->rows = ROWS + 1; break;
+        case 3: image->flags = 4; break;
+        case 4: image->step_high = 81; break;
+        case 5: image->step_low = 51; break;
+        case 6: image->dir_setup = 101; break;
+        case 7: axis->flags = 4 | USED; break;
+        case 8: axis->lower = -(1 << 30) - 1; break;
+        case 9: axis->upper = (1 << 30) + 1; break;
+        case 10: axis->home = axis->upper + 1; break;
+        case 11: axis->home = axis->lower - 1; break;
+        case 12: axis->max_rate = 0; break;
+        case 13: axis->max_accel = 0; break;
+        case 14: axis->max_accel = 1 << 24; break;
+        case 15: servo->lower = 399; break;
+        case 16: servo->upper = 2601; break;
+        case 17: image->row[0].lower = 6; break;
+        case 18: image->row[0].weight[1] = 10737; axis->upper = 100001; break;  // 10737 · 100001 > 2³⁰
+        case 19: axis->flags = 0; break;                                        // a row's axis is not used
+        default: break;
+    }
+}
+
+static void broken_images_are_refused(void) {
+    for (int how = 0; how <= 20; how++) {
+        struct image image = host_image();
+        uint8_t body[6];
+        spoil(&image, how);
+        bench_power();
+        host_hello(1);
+        const uint16_t length = 12 + AXES * 19 + sizeof image.row[0];
+        for (uint16_t at = 0; at < length; at += 50) {
+            uint8_t chunk[52] = {at, at >> 8};
+            const uint8_t n = length - at < 50 ? length - at : 50;
+            memcpy(chunk + 2, (const uint8_t *)&image + at, n);
+            CHECK(host_order(0x10, chunk, n + 2).error == OK);
+        }
+        put32(put16(body, length), crc_block(&image, length));
+        CHECK(host_order(0x11, body, 6).error == (how < 20 ? E_CONFIG_BAD : OK));
+        CHECK((memory.config != 0) == (how == 20));
+    }
 }
 
 // ---- homing
@@ -609,6 +672,7 @@ int main(void) {
     resets();
     motors_off_means_lost();
     limits_hold();
+    broken_images_are_refused();
     homing();
     jogging();
     coupled_motors();
