@@ -35,7 +35,7 @@ _GROWTH = 1.12  # time at a ramp segment's end over time at its start, seen from
 # Inside such a segment the interval is linear, and at its fast end the acceleration is
 # 4 g^2 / (1 + g)^2 times the mean: plan the mean that much lower.
 EASE = ((1 + _GROWTH) / (2 * _GROWTH)) ** 2
-_SHORTEST = (0.002, 0.012)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
+_SHORTEST = (0.002, 0.02)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
 _AHEAD = 26  # segments that the board's queue surely holds (32, but for those under way)
 _CRUISE = 0.05  # [s] a cruise segment's time at least
 _TICK = 1300  # [cycles] slower segments are oversampled down to about this

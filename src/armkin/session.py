@@ -19,14 +19,16 @@ from armkin.protocol import Ack, Credit, Error, Info, State, Status
 _RESEND = 0.03  # [s] without progress
 _GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
 _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
+_POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
 _POLL_CREDIT = 0.01  # [s] while waiting for credit, which only answers bring
 _GIVE_UP = 1.5  # [s] without any answer
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
-_COPIES = 2  # of every frame, on a bad line
+_COPIES = 3  # of every frame, on a bad line
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
+_LATE = 0.03  # [s] an answer may take
 _PROBES = 8
 _UNDER_WAY = 16  # frames
-_BYTES = (100, 700)  # under way, on a bad line and on a good one
+_BYTES = (240, 700)  # under way, on a bad line and on a good one
 
 
 class DeviceError(LinkError):
@@ -70,6 +72,7 @@ class Session:
         self._free = 0
         self._queue = 0
         self._tag = 0
+        self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
         self._status: Status | None = None
         self._error: Ack | Status | None = None
         self._heard = port.now()
@@ -177,7 +180,7 @@ class Session:
         if self._sent and now - self._clear > (_EAGER if self.noisy else _GAP if self._gap else _RESEND):
             self._again()
         idle_credit = bool(self._waiting) and not self._sent
-        if now - self._asked >= (_POLL_CREDIT if idle_credit else _POLL):
+        if now - self._asked >= (_POLL_CREDIT if idle_credit else _POLL_NOISY if self.damaged else _POLL):
             self._ask()
         self._hear(timeout)
         if self._error is not None:
@@ -238,6 +241,7 @@ class Session:
 
     def _ask(self, page: int = 0) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
+        self._asked_at[self._tag] = self._asked
         self._write(protocol.wire(protocol.status_query(self._tag, page)))
         return self._tag
 
@@ -252,7 +256,17 @@ class Session:
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
+                self._measure(reply.tag)
             self._acknowledge(reply)
+
+    def _measure(self, tag: int) -> None:
+        """Wait as long as an answer was late: so long the line is behind what was written already."""
+        asked = self._asked_at.pop(tag, None)
+        if asked is not None:
+            self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
+            late = self.port.now() - asked - _LATE
+            if late > 0:
+                self._clear = max(self._clear, self.port.now() + late)
 
     def _acknowledge(self, reply: Ack | Status) -> None:
         done = (reply.next - self._next) & 255
