@@ -6,16 +6,21 @@ import csv
 import json
 import os
 import pty
+import select
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
+from armkin.board_sim import SimBoard
+from armkin.boards import BOARDS
 from armkin.protocol import State
 from command_line import ROOT, THREE_DOF, process, run
 from pty_board import PtyBoard
@@ -414,3 +419,31 @@ def test_a_noisy_line(seed: int) -> None:
             assert done.code == 5
             assert "position is known" in done.err
             on_the_path(board.net)
+
+
+def test_a_board_behind_a_socket() -> None:
+    board = SimBoard(BOARDS["uno_cnc_shield"])
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+
+        def serve() -> None:
+            line, _ = server.accept()
+            with line:
+                last = time.monotonic()
+                while True:
+                    ready, _, _ = select.select([line], [], [], 0.002)
+                    data = line.recv(4096) if ready else b""
+                    if ready and not data:
+                        return  # the host has hung up
+                    now = time.monotonic()
+                    board.advance(now - last)
+                    last = now
+                    board.receive(data)
+                    line.sendall(board.take())
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        done = run("send", THREE_DOF, 10, 80, -80, "--port", port, "--assume-home", "--json")
+        thread.join()
+    assert done.code == 0, done.err
+    assert board.net[:3] == done.json["pulses"] == [356, -1193, 667]

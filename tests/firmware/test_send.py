@@ -141,6 +141,17 @@ def test_a_killed_process(board: EmulatedBoard) -> None:
     assert net(board) == COUNTS
 
 
+def test_a_boot_loader_hides_the_cause_and_the_position_is_retained() -> None:
+    """The stock Uno: it swallows what comes in its first second and a half, and clears MCUSR."""
+    with EmulatedBoard(bootloader=1500) as board:
+        assert run("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+        status = run("status", THREE_DOF, "--port", board.port, "--json").json
+        assert (status["position"], status["reset_cause"]) == ("retained", 0)
+        assert status["boots"] >= 2
+        finish(board)
+        assert net(board) == COUNTS
+
+
 class _KilledError(Exception):
     pass
 
