@@ -106,6 +106,7 @@ def test_colours_and_progress_on_a_terminal_only() -> None:
     assert plain.err == ""
     seen = on_a_terminal(batch, MANY, NO_COLOR="")
     assert " rows" in seen
+    assert "] 100 %  8 of 8 samples" in on_a_terminal(["workspace", "robots/pan_tilt.yaml", "--grid", "2,4"], b"")
     assert "\x1b[31merror:" in on_a_terminal(["fk", THREE_DOF, "1"], b"", NO_COLOR="")
     assert "\x1b[31m" not in on_a_terminal(["fk", THREE_DOF, "1"], b"", NO_COLOR="1")
 

@@ -9,7 +9,7 @@ import typer
 
 from armkin.cli import inputs, output, render, units
 from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
-from armkin.cli.options import Batch, Joints, Json, Out, Robot
+from armkin.cli.options import Batch, Joints, JsonLines, Out, Robot
 from armkin.cli.render import fixed
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def fk(
     frames: Annotated[
         bool, typer.Option("--frames", help="Also the base's and every joint's frame.")
     ] = False,
-    json: Json = False,
+    json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
 ) -> None:

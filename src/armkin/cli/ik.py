@@ -13,7 +13,7 @@ from armkin.cli.options import (
     AllBranches,
     Batch,
     BranchName,
-    Json,
+    JsonLines,
     Lock,
     Near,
     Out,
@@ -42,7 +42,7 @@ def ik(
     task: TaskName = None,
     lock: Lock = None,
     sweep: Sweep = None,
-    json: Json = False,
+    json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
 ) -> None:
@@ -176,7 +176,8 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
             miss += f", turned by {fixed(nearest['angle_deg'])} deg"
         rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
     last = len(headings) + 3
-    return f"{arm.name}: {goal}\n\n{render.table(rows, left=(0, 1, last), indent='')}\n\n{_summary(answer)}\n"
+    table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
+    return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
 
 
 def _summary(answer: dict[str, Any]) -> str:

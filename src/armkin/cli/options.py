@@ -10,6 +10,9 @@ Joints = Annotated[
     typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm)."),
 ]
 Json = Annotated[
+    bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")
+]
+JsonLines = Annotated[
     bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")
 ]
 Batch = Annotated[
@@ -17,7 +20,7 @@ Batch = Annotated[
     typer.Option(
         "--batch",
         metavar="FILE|-",
-        help="Many at once: a CSV file, or standard input; one row each. Gives CSV.",
+        help="Many at once: a CSV file, or standard input; one row each. Gives CSV, or JSON Lines.",
     ),
 ]
 Out = Annotated[

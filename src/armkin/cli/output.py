@@ -65,24 +65,35 @@ def _coloured(stream: TextIO) -> bool:
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A counter on stderr, if that is a terminal, for long commands; call it with the count so far."""
+    """A bar on stderr, or a counter without a total, if that is a terminal; call it with the count so far."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda done: None
         return
+    import shutil
     import time
 
-    last = time.monotonic()
+    last = time.monotonic() - (0.2 if total else 0.0)  # how long a counter takes is not known
     shown = False
 
     def tick(done: int) -> None:
         nonlocal last, shown
-        if (now := time.monotonic()) - last >= 0.2:
+        if (now := time.monotonic()) - last >= 0.2 or done == total:
             last, shown = now, True
-            part = f" of {total:,} ({100 * done // total} %)" if total else ""
-            print(f"\r{done:,}{part} {what} ", end="", file=sys.stderr, flush=True)
+            line = bar(done, total, what) if total else f"{done:,} {what}"
+            print(f"\r{line[: shutil.get_terminal_size().columns - 1]}\x1b[K", end="", file=sys.stderr, flush=True)
 
     try:
         yield tick
     finally:
         if shown:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def bar(done: int, total: int, what: str, width: int = 24) -> str:
+    """How far a long command has come.
+
+    >>> bar(1_250_000, 3_000_000, "samples")
+    '[##########..............]  41 %  1,250,000 of 3,000,000 samples'
+    """
+    full = width * done // total
+    return f"[{'#' * full}{'.' * (width - full)}] {100 * done // total:3d} %  {done:,} of {total:,} {what}"

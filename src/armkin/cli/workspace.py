@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -79,7 +80,9 @@ def workspace(
         measures += [shade] if shade in ("manipulability", "step_error") and shade not in measures else []
     count = None if samples is None else whole(samples, "--samples", 1, _MOST)
     points = None if grid is None else [whole(word, "--grid", 1, _MOST) for word in grid.split(",")]
-    with output.progress("samples", None if points else count or 100_000) as tick:
+    each = points * arm.n if points and len(points) == 1 else points
+    total = math.prod(each) if each else count or 100_000
+    with output.progress("samples", total) as tick:
         found = armkin.workspace(
             arm,
             count,
@@ -123,8 +126,10 @@ def _text(answer: dict[str, Any]) -> str:
         rows.append(
             [name.replace("_", " "), f"{low:.4g}", f"{high:.4g}", "mm" if name == "step_error" else ""]
         )
-    text = f"{answer['robot']}: {answer['samples']:,} samples\n\n{render.table(rows, left=(0, 3))}\n\n"
+    count = answer["samples"]
+    text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left=(0, 3))}\n\n"
     what, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
     value, error = answer[f"{what}_{unit}"], answer[f"{what}_error_{unit}"]
     off = f" +- {100 * error / value:.2g} %" if value else ""
-    return f"{text}{what} {value:.6g} {unit}{off}\n{render.wrapped('by ' + answer['method'])}\n"
+    how = answer["method"] if answer["method"].startswith("exact") else f"by {answer['method']}"
+    return f"{text}{what} {value:.6g} {unit}{off}\n{render.wrapped(how)}\n"
