@@ -17,7 +17,7 @@ from armkin.arm import from_links
 from armkin.errors import FileError, MissingExtraError, UsageError
 from armkin.kinematics import fk
 from armkin.plot import plot_poses, plot_workspace
-from armkin.plot.canvas import tick_step
+from armkin.plot.canvas import space, tick_step
 from armkin.plot.skeleton import skeleton
 from armkin.workspace import Workspace, workspace
 from command_line import ROOT
@@ -274,3 +274,9 @@ def test_without_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_importing_the_module_does_not_import_matplotlib() -> None:
     code = "import armkin.plot, sys; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("view", "hidden"), [((90, -90), "z"), ((0, -90), "y"), ((0, 0), "x"), ((22, -60), "")])
+def test_an_axis_seen_end_on_has_no_label(view: tuple[float, float], hidden: str) -> None:
+    axes = space(Figure(), [0, 0, 1, 1], view)
+    assert [name for name in "xyz" if not getattr(axes, f"get_{name}label")()] == list(hidden)

@@ -95,6 +95,12 @@ def test_plot_one_pose(tmp_path: Path) -> None:
     assert out.read_bytes() != first
 
 
+def test_plot_warns_of_a_pose_outside_the_limits(tmp_path: Path) -> None:
+    result = run("plot", THREE_DOF, 200, 0, 0, "--view", "top", "--out", tmp_path / "arm.png")
+    assert (result.code, result.out) == (0, "")
+    assert result.err == "warning: q1 = 200 deg is outside -120 to 120 deg\n"
+
+
 def test_plot_all_branches(tmp_path: Path) -> None:
     out = tmp_path / "branches.svg"
     assert run("plot", THREE_DOF, "--target", "390,80,300", "--out", out) == (0, "", "")
@@ -118,6 +124,7 @@ def test_plot_the_homeworks_path(tmp_path: Path) -> None:
     ("words", "code", "message"),
     [
         (["1", "2", "3"], 2, "plot needs --out FILE, a .png or .svg"),
+        (["--out", "a.png"], 2, "nothing to draw: give joint values (q1 q2 q3), --target or --path"),
         (["1", "2", "--out", "a.png"], 2, "three_dof takes 3 numbers (q1 q2 q3), got 2"),
         (["1", "2", "3", "--out", "a.gif"], 2, "a.gif: a picture is written as .png or .svg"),
         (["1", "2", "3", "--out", "a.png", "--view", "up"], 2, "--view up: there are front, side, top, iso"),

@@ -62,6 +62,8 @@ def plot(
     arm = inputs.load(robot)
     if sum((bool(q), target is not None, path is not None)) > 1:
         raise UsageError("joint values, --target and --path: give one of the three")
+    if not (q or target or path):
+        raise UsageError(f"nothing to draw: give joint values ({' '.join(arm.joint_names)}), --target or --path")
     if target is None and (task is not None or lock):
         raise UsageError("--task and --lock belong to --target")
     eye = None if view is None else _eye(view)
@@ -72,9 +74,13 @@ def plot(
         title = f"{arm.name}: {len(poses)} poses"
         plot_poses(arm, units.joints_in(arm, poses), out, title=title, frames=frames, view=eye)
     else:
+        import numpy as np
+
         values = inputs.joints(arm, q)
         title = render.pose_line(arm, values)
         plot_poses(arm, units.joints_in(arm, values), out, title=title, frames=frames, view=eye)
+        [outside] = render.violations(arm, np.array([values]), units.joints_in(arm, [values]))
+        render.warn_of_limits(arm, outside)
 
 
 def _eye(text: str) -> tuple[float, float]:

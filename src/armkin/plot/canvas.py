@@ -92,7 +92,23 @@ def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any
         axes.tick_params(axis=name, pad=4 if name == "z" else 1, colors=SOFT)
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90)
+    sizes = _on_paper(*view)
+    for name, size in zip("xyz", sizes, strict=True):
+        axis = getattr(axes, f"{name}axis")
+        if size >= 0.1 > sizes.min():  # seen square: nothing slants away from under the ticks
+            axis.labelpad = 10
+        elif size < 0.1:  # seen end-on: its ticks would lie on each other
+            axes.tick_params(axis=name, labelcolor="none", color="none")
+            getattr(axes, f"set_{name}label")("")
     return axes
+
+
+def _on_paper(elevation: float, azimuth: float) -> Array:
+    """How long x, y and z of length 1 look from an eye far away at these angles [deg]."""
+    up, around = np.radians(elevation), np.radians(azimuth)
+    toward = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    seen: Array = np.sqrt(np.maximum(1.0 - toward**2, 0.0))
+    return seen
 
 
 def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5) -> None:
@@ -118,7 +134,8 @@ def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5)
         getattr(axes, f"{name}axis").set_major_locator(MultipleLocator(tick_step(most, ticks)))
 
     x0, y0, width, height = axes.get_position().bounds
-    room = np.array([0.80 * width, 0.86 * height])
+    square = _on_paper(axes.elev, axes.azim).min() < 0.1
+    room = np.array([0.80 * width, (0.72 if square else 0.86) * height])
     middle = np.array([x0 + 0.5 * width, y0 + 0.52 * height])
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     zoom = 1.0
