@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Arm:
     """An arm as arrays, read-only, lengths in mm and angles in rad.
 
@@ -54,6 +54,10 @@ class Arm:
     def n(self) -> int:
         """Number of joints."""
         return len(self.prismatic)
+
+    def __repr__(self) -> str:
+        """What tells arms apart, without their arrays."""
+        return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
 
 
 def load(path: str | PathLike[str]) -> Arm:
