@@ -207,6 +207,6 @@ def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) 
         columns = np.ascontiguousarray(flat_q[start : start + soa.CHUNK].T)
         if columns.shape[1] < soa.CHUNK <= len(flat_q):
             workspace = straight.workspace(columns.shape[1])
-        for k, entry in enumerate(straight.run(columns, workspace)):
+        for k, entry in enumerate(straight.run(list(columns), workspace)):
             flat_out[start : start + soa.CHUNK, k] = entry
     return out

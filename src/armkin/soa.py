@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 Entry = Any  # float | Array: numpy arithmetic accepts both, and the type checker cannot tell them apart
 Pose = list[Entry]
 

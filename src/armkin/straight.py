@@ -30,7 +30,7 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
     def __init__(self, trace: _Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...]) -> None:
         self.trace, self.op, self.args, self.axes = trace, op, args, axes
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Node:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
             raise TypeError(f"{ufunc.__name__}.{method} cannot be recorded")
         return self.trace.simplify(ufunc.__name__, inputs)
@@ -171,7 +171,7 @@ class Straight:
 
     def _single_code(self) -> Callable[..., tuple[Any, ...]]:
         """One Python expression a line and branch, branch axes unrolled."""
-        names = {id(node): {(): f"i{k}"} for k, node in enumerate(self._inputs)}
+        names: dict[int, dict[tuple[int, ...], str]] = {id(node): {(): f"i{k}"} for k, node in enumerate(self._inputs)}
         lines = []
 
         def name(x: Any, index: tuple[int, ...]) -> str:
@@ -216,7 +216,9 @@ _PYTHON = {
 }
 
 
-def _compiled(parameters: list[str], lines: list[str], outputs: list[str], scope: dict[str, Any]) -> Callable[..., tuple[Any, ...]]:
+def _compiled(
+    parameters: list[str], lines: list[str], outputs: list[str], scope: dict[str, Any]
+) -> Callable[..., tuple[Any, ...]]:
     """A function made of these lines. They consist of names and numbers written by this module alone."""
     source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(outputs)},)"])
     exec(source, scope)

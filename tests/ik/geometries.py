@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from oracle import Screws, rotation, screws
+from oracle import Screws, screws
 
 from armkin.arm import Arm, build
 from armkin.robot_file import RobotFile
@@ -220,7 +220,8 @@ def wrist(rng: Rng, arm: str, shoulder: bool = False) -> Fields:
 
 
 for _t in itertools.product("RP", repeat=3):
-    add(f"{''.join(_t)} and spherical wrist", "pose", lambda r, p="".join(_t): wrist(r, p))
+    _p = "".join(_t)
+    add(f"{_p} and spherical wrist", "pose", lambda r, p=_p: wrist(r, p))
 add("spherical wrist, modified DH", "pose", lambda r: dh(
     r, "RRRRRR", [_N, 90.0, 0.0, 90.0, -90.0, 90.0], [0.0, 0.0, _N, _N, 0.0, 0.0], [_N, 0.0, _N, _N, 0.0, 0.0],
     convention="modified", **anywhere(r)))  # fmt: skip

@@ -231,7 +231,9 @@ def branches(screw: Screws, goals: Goal, starts: int, seed: int, span: Array | N
     rng = np.random.default_rng(seed)
     n, count = len(screw.prismatic), len(goals.T)
     width = np.where(screw.prismatic, screw.size, np.pi) if span is None else span
-    q, size = newton(screw, goals.take(np.repeat(np.arange(count), starts)), rng.uniform(-width, width, (count * starts, n)))
+    q, size = newton(
+        screw, goals.take(np.repeat(np.arange(count), starts)), rng.uniform(-width, width, (count * starts, n))
+    )
     mm, rad = missing(screw, goals.take(np.repeat(np.arange(count), starts)), q)
     good = (size < 1e-11) & (mm < 1e-8 * screw.size) & (rad < 1e-8)
     out = []

@@ -169,13 +169,40 @@ def test_arms_that_move_a_point_in_a_plane_are_refused(name: str) -> None:
     plane = {"PRP": "xzy", "RPP": "zxy", "PPR": "xyz"}[name]
     rng = np.random.default_rng(0)
     arm = case(spatial(rng, name, [AXIS[k] for k in plane], [None] * 3), "xyz").arm
-    with pytest.raises(UsageError, match="cannot place a point"):
+    with pytest.raises(UsageError, match="can meet 2 at a time"):
         armkin.ik(arm, armkin.fk(arm, rng.uniform(-1, 1, (20, 3)))[:, :3, 3], "xyz")
+
+
+@pytest.mark.parametrize(("kinds", "task"), [("RRR", "xyz"), ("PPPPPP", "pose"), ("RRRRRR", "pose")])
+def test_arms_whose_axes_are_all_parallel_are_refused(kinds: str, task: str) -> None:
+    """Such an arm reaches its own poses, on curves of solutions: 'unreachable' or 'complete' would be wrong."""
+    from geometries import AXIS, case, spatial
+
+    rng = np.random.default_rng(0)
+    n = len(kinds)
+    arm = case(spatial(rng, kinds, [AXIS["z"]] * n, [None] * n), task).arm
+    with pytest.raises(UsageError, match="infinitely many solutions or none"):
+        armkin.ik(arm, armkin.fk(arm, arm.home) if task == "pose" else [1, 2, 3], task)
+
+
+def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
+    """No branch at all leaves no branch to name."""
+    from geometries import AXIS, case, spatial
+
+    arm = case(spatial(np.random.default_rng(0), "RR", [AXIS["z"], AXIS["x"]], [None] * 2), "pose").arm
+    far = np.eye(4)
+    far[:3, 3] = 1e9
+    s = armkin.ik(arm, far, "pose")
+    assert (s.status, s.valid.any()) == (Status.UNREACHABLE, False)
+    six = case(spatial(np.random.default_rng(0), "RRRRRR", [None] * 6, [None] * 6), "pose").arm
+    assert not armkin.ik(six, far, "pose").valid.any()
 
 
 def test_no_target_is_too_odd() -> None:
     """Zeros, huge numbers and axis-aligned targets: no nan in an answer, no warning (they are errors here)."""
-    targets = [v * np.array([x, y, z]) for v in (0.0, 1.0, 100.0, 1e6, 1e12) for x in (0, 1) for y in (0, -1) for z in (0, 1)]
+    targets = [
+        v * np.array([x, y, z]) for v in (0.0, 1.0, 100.0, 1e6, 1e12) for x in (0, 1) for y in (0, -1) for z in (0, 1)
+    ]
     for name in ("three_dof", "yaw_two_link"):
         s = armkin.ik(load(name), targets)
         assert np.isfinite(s.q[s.valid]).all()

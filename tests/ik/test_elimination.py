@@ -1,6 +1,5 @@
 """The general solver: laws of its algebra, and every branch of arms with and without closed forms."""
 
-
 import numpy as np
 import pytest
 from general_arms import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from checks import Report, examine, not_found, random_joints
 from geometries import CLASSES, random_case
-from oracle import Screws, forward, screws
+from oracle import Screws, exponential, forward, screws
 
 import armkin
 from armkin.arm import Arm
@@ -46,17 +46,12 @@ def shipped(name: str) -> tuple[Arm, Screws]:
     arm = armkin.load(ROBOTS / f"{name}.yaml")
     screw = screws(arm.file)
     if name == "panda":  # seven joints: one of them is held
-        held = armkin.lock(arm, {"J3": 0.35})
-        P = forward(screw._replace(M=np.eye(4)), np.array([0, 0, 0.35, 0, 0, 0, 0])) if False else None
-        assert P is None
-        return held, _locked(screw, 2, 0.35)
+        return armkin.lock(arm, {"J3": 0.35}), locked(screw, 2, 0.35)
     return arm, screw
 
 
-def _locked(screw: Screws, joint: int, value: float) -> Screws:
+def locked(screw: Screws, joint: int, value: float) -> Screws:
     """The screws of what is left when one joint is held."""
-    from oracle import exponential
-
     E = exponential(screw, joint, np.array(value))
     w, p = screw.w.copy(), screw.p.copy()
     w[joint + 1 :] = w[joint + 1 :] @ E[:3, :3].T
@@ -95,18 +90,20 @@ SEEDS = 50
 def test_fifty_random_arms(name: str) -> None:
     for seed in range(SEEDS):
         case = random_case(name, seed)
-        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 60, seed)))
+        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 40, seed)))
 
 
 def is_special(name: str) -> bool:
     return "spherical" in name or (name.startswith("three parallel") and not name.endswith("none meet"))
 
 
-@pytest.mark.parametrize("name", sorted(name for name in COSTLY if is_special(name) and "1, 2, 3" not in name and "4, 5, 6" not in name))
+@pytest.mark.parametrize(
+    "name", sorted(name for name in COSTLY if is_special(name) and "1, 2, 3" not in name and "4, 5, 6" not in name)
+)
 def test_fifty_random_arms_with_six_joints(name: str) -> None:
     for seed in range(SEEDS):
         case = random_case(name, seed)
-        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 30, seed))
+        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
         check(report)
         assert report.solutions.method != "general elimination"
 
@@ -126,8 +123,10 @@ def test_random_arms_against_the_oracle(name: str) -> None:
         assert not not_found(report, np.arange(10), 60, seed)
 
 
-@pytest.mark.parametrize("name", ["RRR and spherical wrist", "RPR and spherical wrist", "spherical shoulder", "UR table",
-                                  "three parallel axes 2, 3, 4", "three parallel axes 3, 4, 5"])  # fmt: skip
+@pytest.mark.parametrize("name", [
+    "RRR and spherical wrist", "RPR and spherical wrist", "spherical shoulder", "UR table",
+    "three parallel axes 2, 3, 4", "three parallel axes 3, 4, 5",
+])  # fmt: skip
 def test_random_arms_with_six_joints_against_the_oracle(name: str) -> None:
     case = random_case(name, 300)
     report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 12, 1))

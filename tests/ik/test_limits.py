@@ -15,7 +15,17 @@ from armkin.arm import from_links
 from armkin.ik.limits import nearest_copy, turns
 
 ROBOTS = Path(__file__).parents[2] / "robots"
-LIMITS = [(0, 360), (19, 341), (-360, 360), (-180, 180), (-120, 120), (350, 370), (-725, 90), (-np.inf, np.inf), (10, np.inf)]
+LIMITS = [
+    (0, 360),
+    (19, 341),
+    (-360, 360),
+    (-180, 180),
+    (-120, 120),
+    (350, 370),
+    (-725, 90),
+    (-np.inf, np.inf),
+    (10, np.inf),
+]
 
 
 @pytest.mark.parametrize("limits", LIMITS)

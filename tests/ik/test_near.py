@@ -45,7 +45,8 @@ def check(name: str, off: float, seed: int, count: int) -> Report:
 @pytest.mark.parametrize(
     "name",
     [
-        "RRR 1 || 2", "RRR 2 || 3", "RRR 1 meets 2", "RRR 2 meets 3", "RRR orthogonal, 1 meets 2", "RRR anthropomorphic",
+        "RRR 1 || 2", "RRR 2 || 3", "RRR 1 meets 2", "RRR 2 meets 3", "RRR orthogonal, 1 meets 2",
+        "RRR anthropomorphic",
         "RPR right angles", "PRR right angles", "RRP spherical", "RPP cylindrical",
         "planar RR", "planar RRR", "planar RRP", "planar PRR", "planar PRP", "SCARA, P at 1", "SCARA, P at 3",
         "pitch arm, 4 joints, usual table", "pitch arm, 5 joints, usual table", "pitch arm, 4 joints, slide first",
@@ -59,7 +60,13 @@ def test_short_arms(name: str, off: float) -> None:
 @pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
 @pytest.mark.parametrize(
     "name",
-    ["spherical wrist, elbow", "RPR and spherical wrist", "spherical shoulder", "UR table", "three parallel axes 3, 4, 5"],
+    [
+        "spherical wrist, elbow",
+        "RPR and spherical wrist",
+        "spherical shoulder",
+        "UR table",
+        "three parallel axes 3, 4, 5",
+    ],
 )
 def test_six_joints(name: str, off: float) -> None:
     report = check(name, off, 1, 30)
@@ -70,7 +77,9 @@ def test_six_joints(name: str, off: float) -> None:
         assert "corrected on the true arm" in s.why
 
 
-@pytest.mark.parametrize("name", ["spherical wrist, elbow", "UR table", "pitch arm, 5 joints, usual table", "RRR 1 || 2"])
+@pytest.mark.parametrize(
+    "name", ["spherical wrist, elbow", "UR table", "pitch arm, 5 joints, usual table", "RRR 1 || 2"]
+)
 def test_as_many_branches_as_the_ideal_arm(name: str) -> None:
     """Away from singular postures a small change of the arm neither makes nor loses branches."""
     case = random_case(name, 3)

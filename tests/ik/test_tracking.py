@@ -50,7 +50,9 @@ def test_the_published_circle() -> None:
     for wanted in ([0, 107.282, -124.565], [0, -17.282, 124.565]):
         b = np.abs(first - wanted).max(axis=1).argmin()
         np.testing.assert_allclose(first[b], wanted, atol=1e-3)
-        assert np.degrees(s.q[np.arange(111), (s.branch == s.branch[0, b]).argmax(axis=1)])[0] == pytest.approx(wanted, abs=1e-3)
+        assert np.degrees(s.q[np.arange(111), (s.branch == s.branch[0, b]).argmax(axis=1)])[0] == pytest.approx(
+            wanted, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "irb120", "three_dof", "labvolt_5150", "cobra600", "stanford"])

@@ -15,7 +15,7 @@ from armkin.arm import from_links
 from armkin.ik.geometry import Geometry
 from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task, task_for
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -40,17 +40,21 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             found = solve(_pose(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
-        return Geometry(inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels, ordered=inner.ordered)
+        return Geometry(
+            inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels, ordered=inner.ordered
+        )
     solve_rows = inner.rows
     assert solve_rows is not None
 
-    def rows(goal: Array) -> tuple[Array, Array]:
+    def rows(goal: Array) -> tuple[Array, Bool]:
         T = np.empty((len(goal), 4, 4))
         soa.write(_pose(list(goal.T)), T)
         q, doubt = solve_rows(T)
         return q[:, :, :5], doubt
 
-    return Geometry(inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered)
+    return Geometry(
+        inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered
+    )
 
 
 def _pose(goal: list[Entry]) -> soa.Pose:

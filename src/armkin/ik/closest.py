@@ -39,9 +39,7 @@ class Closest:
     converged: bool
 
 
-def closest(
-    arm: Arm, target: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None
-) -> Closest:
+def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Closest:
     """The pose within limits that misses the target least.
 
     target: one target (m,) or (4, 4). What is minimised is the squared distance plus the

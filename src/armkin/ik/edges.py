@@ -118,9 +118,7 @@ def _self_motion(
     return moving, joints
 
 
-def _null_directions(
-    n: int, V: Array, nullity: NDArray[np.int64]
-) -> Iterator[tuple[NDArray[np.intp], Array]]:
+def _null_directions(n: int, V: Array, nullity: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.intp], Array]]:
     """Which branches to push, and where: (m,) indices and (m, n) directions.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors:

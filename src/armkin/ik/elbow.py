@@ -16,7 +16,7 @@ from armkin.ik.chain import FLIP, Chain, inverse, is_parallel
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
 from armkin.ik.tasks import Task
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -42,9 +42,7 @@ class Elbow:
         self.two_link = TwoLink(upper[:2], fore[:2], sense3)
         self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
 
-    def solve(
-        self, p: list[Entry], past: list[Entry], prefer: Prefer
-    ) -> tuple[list[Pair], Array]:
+    def solve(self, p: list[Entry], past: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         """Angles of the three joints that bring the tip to p.
 
         p: position in the base, entries (N,); past: an offset added to the tip in the frame
@@ -82,7 +80,7 @@ class TwoLink:
         self.sense = sense
         self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
 
-    def solve(self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None) -> tuple[Pair, Pair, Array]:
+    def solve(self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None) -> tuple[Pair, Pair, Bool]:
         """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,)."""
         lx, ly, mx, my = self.lx, self.ly, self.mx, self.my
         # |r|^2 = |l + Rz(q3) m|^2

@@ -16,7 +16,7 @@ from armkin.ik import elimination, numeric
 from armkin.ik.chain import inverse
 from armkin.ik.geometry import Geometry
 from armkin.ik.tasks import Task
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -32,7 +32,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         prepared = elimination.prepare(arm.link, arm.prismatic)
         return Geometry(
             "general elimination",
-            "no axes meet or run parallel in a way that a closed form could use: numeric elimination, up to 16 branches",
+            "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches",
             prepared.complete,
             rows=lambda T: elimination.solve(prepared, T),
             ordered=False,
@@ -40,7 +40,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     link, prismatic = _padded(arm)
     prepared = elimination.prepare(link, prismatic)
 
-    def rows(T: Array) -> tuple[Array, Array]:
+    def rows(T: Array) -> tuple[Array, Bool]:
         q, _ = elimination.solve(prepared, T)
         n = arm.n
         with np.errstate(invalid="ignore"):
@@ -52,7 +52,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             own[k, b] = np.where((size < 1e-12)[:, None], better, np.nan)
         width = max(int((~np.isnan(own[:, :, 0])).sum(axis=1).max(initial=0)), 1)
         order = np.argsort(np.isnan(own[:, :, 0]), axis=1, kind="stable")[:, :width]
-        return np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > (~np.isnan(own[:, :, 0])).sum(axis=1)
+        return np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > (~np.isnan(own[:, :, 0])).sum(
+            axis=1
+        )
 
     return Geometry(
         "general elimination",
@@ -63,7 +65,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     )
 
 
-def _padded(arm: Arm) -> tuple[Array, Array]:
+def _padded(arm: Arm) -> tuple[Array, Bool]:
     """The arm's chain with virtual revolute joints after its tool, up to six joints."""
     rng = np.random.default_rng(7)
     links = list(arm.link)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.errors import UsageError
 from armkin.ik.subproblems import Candidates, Prefer
-from armkin.ik.tasks import Task, default_task, task_for
+from armkin.ik.tasks import Task, default_task, rank, task_for
 from armkin.soa import Array, Entry
 
 if TYPE_CHECKING:
@@ -63,6 +63,15 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
             f"{surplus} degree{'s' if surplus > 1 else ''} of freedom: fix {surplus} of "
             f"{', '.join(arm.joint_names)} with --lock JOINT=VALUE, or try values with --sweep JOINT=FROM:TO:COUNT"
+        )
+    effective = rank(arm, task, 1e-9)
+    if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
+        usual = default_task(arm)
+        fix = f"fix {arm.n - effective} of {', '.join(arm.joint_names)} with --lock JOINT=VALUE"
+        way_out = fix if usual in (None, task.name) else f"its usual task is {usual}"
+        raise UsageError(
+            f"{arm.name}: task {task.name} has {task.constraints} constraints, of which its {arm.n} joints can meet "
+            f"{effective} at a time:\nthere would be infinitely many solutions or none; {way_out}"
         )
     for name in _CLASSES:
         module: Any = import_module(f"armkin.ik.{name}")

@@ -27,7 +27,7 @@ from armkin.ik import numeric
 from armkin.ik.subproblems import Pair
 from armkin.ik.tasks import targets_of
 from armkin.kinematics import fk
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -48,13 +48,15 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
     """A name for each branch index; indices as flattened from the branch axes."""
     sizes = [2 if label else 1 for label in geometry.labels]
     named = int(np.prod(sizes)) if geometry.labels else 0
-    if named != (geometry.branches or count) or named > count:
+    if not named or named != (geometry.branches or count) or named > count:
         return tuple(f"branch {i + 1}" for i in range(count))
     postures, q, valid = _look(arm, task, geometry)
     shape = (len(q), *sizes)
     own = _own_branch(arm, postures, q, valid)
     swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
-    signs = np.stack(np.unravel_index(np.maximum(own, 0), shape[1:]), axis=1)  # (postures, 3), of those that are found again
+    signs = np.stack(
+        np.unravel_index(np.maximum(own, 0), shape[1:]), axis=1
+    )  # (postures, 3), of those that are found again
     found = own >= 0
     if "shoulder" in swap and found.any():
         # the first posture found again is the one most like home
@@ -102,7 +104,7 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
     return hits
 
 
-def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Array]:
+def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
     """Some postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
     rng = np.random.default_rng(3)
     near_home = arm.home + rng.uniform(-0.35, 0.35, (24, arm.n)) * np.where(arm.prismatic, arm.reach / 20, 1.0)
@@ -125,7 +127,7 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Array
     return postures, q, valid
 
 
-def _own_branch(arm: Arm, postures: Array, q: Array, valid: Array) -> Array:
+def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
     """Index of the branch that is the posture itself: (M,), -1 where it is not found again."""
     distance = np.where(valid, numeric.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
     index = distance.argmin(axis=1)
@@ -133,7 +135,7 @@ def _own_branch(arm: Arm, postures: Array, q: Array, valid: Array) -> Array:
 
 
 def _bent_wrist(arm: Arm, postures: Array) -> Array:
-    """Sine of the wrist's middle joint from straight: how joint 6 leans to the side of joint 4, about joint 5's axis."""
+    """Sine of the wrist's middle joint from straight: how joint 6 leans to joint 4's side, about joint 5's axis."""
     c, s = np.cos(postures[:, 4]), np.sin(postures[:, 4])
     A, b = arm.link[4][:3, :3], arm.link[5][:3, 2]
     z4 = A.T @ [0.0, 0.0, 1.0]

@@ -23,7 +23,7 @@ from armkin.ik import elbow, general, numeric, planar, position, spherical, thre
 from armkin.ik.chain import Chain
 from armkin.ik.geometry import NEAR, Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Pair
+from armkin.ik.subproblems import Candidates, Pair
 from armkin.ik.tasks import PARALLEL, Task, targets_of
 from armkin.kinematics import fk
 from armkin.soa import Array
@@ -47,7 +47,7 @@ class _Corrected(NamedTuple):
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes were moved by up to `NEAR`, or `PARALLEL` where nothing else fits."""
+    """Arms that a closed form would fit if their axes moved by up to `NEAR`; by `PARALLEL` where nothing else fits."""
     if task.orientation == "axis":
         return None  # see `armkin.ik.axis`
     classes = ((planar, PARALLEL), (elbow, PARALLEL), (position, NEAR), (spherical, NEAR), (three_parallel, NEAR))
@@ -107,7 +107,7 @@ def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array, off: float = 0.
         most = np.max(np.stack([np.broadcast_to(v, shape) for v in outside]), axis=0) if outside else np.zeros(shape)
         # what is not quite on the circle only because the arm is not quite of the class comes later
         doubt = doubt | ((most > 1e-12 + 10.0 * off) & (most < 100.0 * off))
-    return q, np.broadcast_to(doubt, shape).reshape(-1, len(target)).any(axis=0)
+    return q, np.asarray(np.broadcast_to(doubt, shape).reshape(-1, len(target)).any(axis=0))
 
 
 def _fallback(arm: Arm, task: Task) -> Callable[[Array], Array] | None:
@@ -128,7 +128,7 @@ def _fallback(arm: Arm, task: Task) -> Callable[[Array], Array] | None:
         return elimination
     if task.name == "xyz":
         quartic = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], 0.0)
-        geometry = Geometry("", "", False, lambda goal, prefer: position.Candidates(*quartic.solve(goal, prefer)))
+        geometry = Geometry("", "", False, lambda goal, prefer: Candidates(*quartic.solve(goal, prefer)))
         return lambda target: _seeds(arm, task, geometry, target)[0]
     return None
 
@@ -168,7 +168,7 @@ def _solve(
 
 
 def _beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Seeds for the other of two branches that all but touch: q (N, B, n) moved to both sides along its weakest direction."""
+    """Seeds for the other of two branches that all but touch: q (N, B, n) moved both ways where it is weakest."""
     N, B, n = q.shape
     flat = np.nan_to_num(q.reshape(-1, n))
     _, V, _ = numeric.null_space(arm, task, flat, np.repeat(target, B, axis=0))
@@ -193,10 +193,10 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     weak = min(0.05, 1.5 * np.sqrt(off)) + 1e-6
     unsure = np.where(good, moved | (strength < weak), rough < 1e-9 + 30.0 * off)
     doubt = doubt | unsure.reshape(N, B).any(axis=1)
-    q, good = q.reshape(N, B, n), good.reshape(N, B)
+    branch, good = q.reshape(N, B, n), good.reshape(N, B)
     for i in range(B):
         for j in range(i):
             with np.errstate(invalid="ignore"):
-                same = numeric.wrapped_distance(arm, q[:, i], q[:, j]) < 1e-6
+                same = numeric.wrapped_distance(arm, branch[:, i], branch[:, j]) < 1e-6
             doubt |= same & good[:, i] & good[:, j]
-    return _Corrected(q, size.reshape(N, B), doubt)
+    return _Corrected(branch, size.reshape(N, B), doubt)

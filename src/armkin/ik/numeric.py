@@ -55,7 +55,7 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tu
         size = np.linalg.norm(r, axis=1)
         # a singular value below the residual's own size would throw the step out of the linear range
         U, S, Vt = np.linalg.svd(J, full_matrices=False)
-        gain = np.where(S > np.maximum(1e-10, 0.1 * size)[:, None], 1.0 / np.maximum(S, 1e-300), 0.0)
+        gain = np.where(np.maximum(1e-10, 0.1 * size)[:, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
         step = np.einsum("mij,mi->mj", Vt, gain * np.einsum("mji,mj->mi", U, r))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         q[active] += step * unit

@@ -20,12 +20,12 @@ from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
 from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
-Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Array]]
+Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Bool]]
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -90,7 +90,7 @@ def _two(chain: Chain) -> Solve:
     virtual = Chain(np.array([np.eye(4), *chain.link]), np.array([True, *chain.prismatic]))
     position = Position(virtual, chain.link[2][:3, 3])
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         pairs, doubt = position.solve([goal[0], goal[1], 0.0 * goal[0]], [Pair(0.0, None), *prefer])
         return pairs[1:], doubt
 
@@ -106,7 +106,7 @@ def _two_turning(chain: Chain) -> Solve:
     two_link = TwoLink(L1[:2, 3], (L1[:3, :3] @ tip)[:2], float(sense2))
     start = soa.constant(inverse(base))
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         # height does not matter: any point above or below the target will do
         p = soa.apply(start, [goal[0], goal[1], 0.0])
         first, second, doubt = two_link.solve(p[0], p[1], *prefer)
@@ -154,7 +154,7 @@ def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
     back = soa.constant(inverse(chain.link[3]))
     two = _two(Chain(chain.link[:3], chain.prismatic[:2]))
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         R = _direction(goal, task, chain)
         x, y, _ = soa.turn(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
@@ -171,7 +171,7 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
     two = _two(Chain(back.link[:3], back.prismatic[:2]))
     axis = [float(v) for v in chain.link[0][:2, 3]]
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         c, s = soa.cos_sin(goal[-1] - task.offsets[0])
         x, y = axis[0] - goal[0], axis[1] - goal[1]
         (third, second), doubt = two([c * x + s * y, c * y - s * x], [prefer[2], prefer[1]])
@@ -184,7 +184,7 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joints 1 and 3 slide, joint 2 turns: its angle is given, two equations linear in the slides."""
     link = [soa.constant(L) for L in chain.link]
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         second = _rest(goal, task, weights, [None, None, None], 1)
         P = soa.times(link[0], link[1])
         a = link[0][6:8]

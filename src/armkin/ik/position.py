@@ -24,10 +24,10 @@ from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
 from armkin.ik.geometry import EXACT, NEAR, Geometry
 from armkin.ik.subproblems import (
+    TOUCHING,
     Candidates,
     Pair,
     Prefer,
-    TOUCHING,
     linear,
     normalised,
     quadratic,
@@ -35,7 +35,7 @@ from armkin.ik.subproblems import (
     trig_quadratic,
 )
 from armkin.ik.tasks import Task, rank
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -71,7 +71,7 @@ class Position:
         self.tolerance = tolerance
         self.close = False
         # the true arm's roots may be real where these of a similar one only just miss
-        self.touching = 0.1 if tolerance >= NEAR else TOUCHING
+        self.touching = 0.3 if tolerance >= NEAR else TOUCHING
         self.why = self._split()
 
     def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
@@ -102,7 +102,7 @@ class Position:
         return "general axes: a quartic in joint 3" if self.regular else "special axes: joint 3 alone, then joint 2"
 
     def _unit(self, pair: Pair) -> Pair:
-        """On the unit circle, so that the residual shows where there is no real root; `near` looks at the length itself."""
+        """On the unit circle, so that the residual shows a missing root; `near` looks at the length itself."""
         return pair if self.tolerance >= NEAR else normalised(pair)
 
     def _is_regular(self, off: float) -> bool:
@@ -114,7 +114,7 @@ class Position:
         """Quadratic form G with ``b^T G b = |rows b|^2`` (3 x 3); prismatic powers above two stay inside."""
         return np.asarray(rows.T @ rows)
 
-    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Array]:
+    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
         p1 = [np.atleast_1d(np.asarray(v, dtype=float)) for v in soa.apply(self.from_base, p)]
         p1 = list(np.broadcast_arrays(*p1))
@@ -166,7 +166,7 @@ class Position:
             six[5] = 0.0
         return six
 
-    def _quartic(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
+    def _quartic(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         inverse_A = np.linalg.inv(self.A)
         g = [self._affine(row, known) for row in inverse_A]  # coefficients of gx, gy
         if self.prismatic[2]:
@@ -189,9 +189,7 @@ class Position:
         q, doubt = trig_quadratic(list(six), self.touching)
         return self._turn(g, Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :]), doubt, prefer)
 
-    def _turn(
-        self, g: list[Array], third: Pair, doubt: Array, prefer: Prefer
-    ) -> tuple[Pair, Pair, Array]:
+    def _turn(self, g: list[Array], third: Pair, doubt: Bool, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         """Joint 2 from the known g, given as six coefficients each."""
         last = 2 if third.s is not None else 3
         b2 = third.s if third.s is not None else third.c**2
@@ -200,7 +198,7 @@ class Position:
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, self.scale, prefer[1])
         return third, second, doubt | doubt2
 
-    def _rank_one(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
+    def _rank_one(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
             d, doubt = quadratic(alone[3], alone[1], alone[0], 0, self.scale)
@@ -215,12 +213,10 @@ class Position:
         b2 = third.c**2 if third.s is None else third.s
         right = main[0] + main[1] * b1 + (main[3] if third.s is None else main[2]) * b2
         ax, ay = self.main @ self.A
-        second, doubt2 = linear(
-            ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1]
-        )
+        second, doubt2 = linear(ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1])
         return third, self._unit(second), doubt | doubt2
 
-    def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Array]:
+    def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         """Joint 2 prismatic: g = y + d2 z."""
         across = [
             [known[k] - self.rows[k] @ self.Y[:, 0], -(self.rows[k] @ self.Y[:, 1]), -(self.rows[k] @ self.Y[:, 2])]
@@ -271,7 +267,7 @@ class Position:
             third = Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :])
         return third, Pair(self._at(d2, third), None), doubt
 
-    def _one_unknown(self, coefficients: list[Array], prefer: Prefer) -> tuple[Pair, Array]:
+    def _one_unknown(self, coefficients: list[Array], prefer: Prefer) -> tuple[Pair, Bool]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         if self.prismatic[2]:
             slope = coefficients[1]

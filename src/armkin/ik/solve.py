@@ -46,7 +46,14 @@ class _Out(NamedTuple):
     free: Bool
 
     def part(self, rows: slice) -> _Out:
-        return _Out(*(a[rows] for a in self))
+        return _Out(
+            self.q[rows],
+            self.valid[rows],
+            self.within[rows],
+            self.branch[rows],
+            self.status[rows],
+            self.free[rows],
+        )
 
 
 def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Solutions:
@@ -71,7 +78,10 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         raise UsageError("near holds nan or infinity; every joint value must be finite")
     each = close.reshape(-1, arm.n) if close.ndim > 1 else np.broadcast_to(close, (len(target), arm.n))
     one = close if close.ndim == 1 else None
-    out = _closed(arm, definition, geometry, target, each, one) if geometry.pairs else _rows(arm, definition, geometry, target, each)
+    if geometry.pairs:
+        out = _closed(arm, definition, geometry, target, each, one)
+    else:
+        out = _rows(arm, definition, geometry, target, each)
     if not geometry.ordered:
         out.branch[...] = follow(arm, definition, out.q, target)
     names = branch_names(arm, definition, geometry, out.q.shape[1])

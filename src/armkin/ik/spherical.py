@@ -7,6 +7,8 @@ first three axes meet is the same arm walked from the tool to the base.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,10 +30,13 @@ from armkin.ik.subproblems import (
     spin,
 )
 from armkin.ik.tasks import Task
-from armkin.soa import Array, Entry, Pose
+from armkin.soa import Array, Bool, Entry, Pose
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
+
+
+Place = Callable[..., tuple[list[Pair], Bool]]
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -96,7 +101,7 @@ class SphericalWrist:
         self.close = False  # the first three joints are almost special: see `Position`
         if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], tolerance) and not chain.prismatic[0]:
             elbow = Elbow(chain, after3)
-            self.place = lambda p, prefer: elbow.solve(p, [0.0, 0.0, 0.0], prefer)
+            self.place: Place = partial(elbow.solve, past=[0.0, 0.0, 0.0])
             self.why = "axes 2 and 3 are parallel"
             self.straight = True
             self.labels = ("shoulder", "elbow", "wrist")
@@ -126,7 +131,7 @@ class SphericalWrist:
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
         centre = soa.apply(goal, self.centre)
-        pairs, doubt = self.place(centre, prefer[:3])
+        pairs, doubt = self.place(centre, prefer=prefer[:3])
         P = self.links[0]
         for i, pair in enumerate(pairs):
             P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, *pair)
@@ -145,7 +150,7 @@ class SphericalWrist:
 
     def _around(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
-    ) -> tuple[Pair, Pair, Array, Entry]:
+    ) -> tuple[Pair, Pair, Bool, Entry]:
         """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
 
         across: the square of z's part across joint 4, if the wrist can reach every z.
@@ -162,7 +167,7 @@ class SphericalWrist:
         return fourth, Pair(c6, s6), doubt4, wrong
 
     def _mirrored(
-        self, pairs: list[Pair], doubt: Array, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
+        self, pairs: list[Pair], doubt: Bool, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
     ) -> Candidates:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]

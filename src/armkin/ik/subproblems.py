@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin import soa
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Bool, Entry
 
 TANGENT = 1e-13  # relative discriminant below which two roots may be one: 6e-7 rad apart
 TOUCHING = 1e-4  # [rad] complex roots this close to the real line may be a double root seen through rounding
@@ -45,7 +45,7 @@ class Candidates(NamedTuple):
     """
 
     pairs: list[Pair]
-    doubt: Array
+    doubt: Bool
     miss: Entry | None = None
     angles: Sequence[Entry | None] = ()
 
@@ -86,13 +86,14 @@ def signs(axis: int) -> Array:
 
 def linear(
     a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair | None, disc: Entry | None = None
-) -> tuple[Pair, Array]:
+) -> tuple[Pair, Bool]:
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
     a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
     length that makes a and b dimensionless; prefer: the angle to give where the equation
-    leaves it free, or None to do without (such targets are in doubt and looked at again); disc: ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a boolean array: True where the roots are
-    about to merge or the angle is free. Without a real root the pair is that of the closest
+    leaves it free, or None to do without (such targets are in doubt and looked at again); disc:
+    ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a
+    boolean array: True where the roots are about to merge or the angle is free. Without a real root the pair is that of the closest
     angle, not normalised; the caller finds by its residual that it is no solution.
     """
     sign = signs(axis)
@@ -129,7 +130,7 @@ def rotation_between(
     scale: float,
     prefer: Pair | None,
     length2: Entry | None = None,
-) -> tuple[Pair, Array]:
+) -> tuple[Pair, Bool]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
     length2: the squared length that u and v both have if the target is reached, where the
@@ -149,14 +150,14 @@ def rotation_between(
     return _prefer(Pair(c * inverse, s * inverse), free, prefer), free
 
 
-def _prefer(pair: Pair, free: Array, prefer: Pair | None) -> Pair:
+def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     """The pair, with the preferred angle where it is free."""
     if prefer is None or not np.any(free):
         return pair
     return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
 
 
-def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Array, Array]:
+def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Array, Bool]:
     """Solve ``a d^2 + b d + c = 0`` for both roots d; scale: a length of the size of d.
 
     With d = scale tan(q/2) this is a `linear` problem, in which a vanishing a is no special
@@ -174,7 +175,7 @@ def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Ar
     return scale * np.where(np.abs(t) < 1e9, t, 1e9), doubt
 
 
-def trig_quadratic(e: list[Entry], near: float = TOUCHING) -> tuple[Array, Array]:
+def trig_quadratic(e: list[Entry], near: float = TOUCHING) -> tuple[Array, Bool]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
     e: [e0, ec, es, ecc, ecs, ess], entries broadcastable to (N,). Returns q (4, N) [rad],

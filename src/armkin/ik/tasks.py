@@ -9,15 +9,16 @@ Every task is a choice of four kinds of constraints:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.errors import UsageError
 from armkin import soa
+from armkin.errors import UsageError
 from armkin.ik.chain import Chain, axes
 from armkin.soa import Array, Entry
 from armkin.straight import Straight
@@ -97,7 +98,9 @@ def default_task(arm: Arm) -> str | None:
         5: ("xyz_pitch_roll", "xyz_axis"),
     }.get(arm.n, ("pose",) if arm.n > 5 else ())
     for name in order:
-        build = {"xyz_yaw": _yaw, "xyz_pitch": _pitch, "xyz_pitch_roll": _pitch}.get(name, _planar if "xy" in name and "z" not in name else _free)
+        build = {"xyz_yaw": _yaw, "xyz_pitch": _pitch, "xyz_pitch_roll": _pitch}.get(
+            name, _planar if "xy" in name and "z" not in name else _free
+        )
         if not isinstance(task := build(arm, name), str) and rank(arm, task) == min(task.constraints, arm.n):
             return name
     return None
@@ -149,6 +152,7 @@ def _rotation_check() -> Straight:
 def _are_rotations(T: Array) -> bool:
     """Whether (N, 4, 4) hold rotations to 1e-6."""
     check, entries = _rotation_check(), soa.read(T)
+    worst: Sequence[Any]
     if len(T) == 1:
         worst = check.single([float(e[0]) for e in entries])
     else:
@@ -243,19 +247,21 @@ def _joints(arm: Arm) -> str:
     return f"{arm.n} joints ({kinds})"
 
 
-def rank(arm: Arm, task: Task) -> int:
-    """Rank of the task's Jacobian at poses in general position."""
+def rank(arm: Arm, task: Task, tolerance: float = 1e-4) -> int:
+    """Rank of the task's Jacobian at poses in general position; tolerance: of the reach, and in rad."""
     from armkin.kinematics import fk, jacobian
 
     q = np.random.default_rng(1).uniform(-2.0, 2.0, (4, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
     Jt = axis_projected(task, task_jacobian(task, jacobian(arm, q)), fk(arm, q))
     Jt[:, : task.position] /= arm.reach
     Jt = Jt * np.where(arm.prismatic, arm.reach, 1.0)
-    return int(max(np.linalg.matrix_rank(Jt, tol=1e-4)))
+    return int(max(np.linalg.matrix_rank(Jt, tol=tolerance)))
 
 
 def _plain(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
-    return Task(name, position, np.asarray(sums, dtype=float).reshape(-1, arm.n), np.asarray(offsets, dtype=float), "none")
+    return Task(
+        name, position, np.asarray(sums, dtype=float).reshape(-1, arm.n), np.asarray(offsets, dtype=float), "none"
+    )
 
 
 def _free(arm: Arm, name: str) -> Task:

@@ -1,0 +1,136 @@
+"""Every branch of every class of arms, by the thousand: hit rates, branch counts and accuracy as a table.
+
+    python tests/bench/check_ik.py [--robots] [--classes] [--near] [--oracle] [--poses 10000] [--arms 50] [--only TEXT]
+
+Without a choice all four tables are made. The oracle is a multi-start Newton iteration on screws that shares
+no code with armkin; EAIK is compared as well where it is installed and fits the arm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "ik"))
+
+import oracle
+from checks import Report, examine, not_found, random_joints
+from geometries import CLASSES, random_case
+from test_every_branch import NAMES, shipped
+from test_near import OFF, moved
+
+HEAD = "method | poses | lost | branches | mm | deg | twice | us/pose"
+
+
+def row(name: str, reports: list[Report], seconds: float, extra: str = "") -> None:
+    """One line of a table; lost: generating joints that are not among the branches."""
+    poses = sum(len(r.q) for r in reports)
+    methods = ", ".join(sorted({r.solutions.method for r in reports}))
+    mean = np.mean([r.counts.mean() for r in reports])
+    most = max(r.counts.max() for r in reports)
+    print(
+        f"| {name} | {methods} | {poses} | {sum(int(r.lost.sum()) for r in reports)} | {mean:.2f} / {most} "
+        f"| {max(r.mm for r in reports):.0e} | {max(r.deg for r in reports):.0e} "
+        f"| {sum(r.duplicates for r in reports)} | {1e6 * seconds / poses:.0f} |{extra}",
+        flush=True,
+    )
+
+
+def eaik_counts(report: Report) -> str:
+    """Share of poses on which EAIK finds as many branches, where it can solve the arm."""
+    try:
+        from eaik.IK_DH import DhRobot
+    except ImportError:
+        return ""
+    rows = [joint.dh for joint in report.arm.file.joints] if report.arm.file else []
+    if report.solutions.task.name != "pose" or len(rows) != 6 or report.arm.file.convention != "standard":
+        return ""
+    alpha, a, d, theta = (np.array([getattr(r, key) for r in rows]) for key in ("alpha", "a", "d", "theta"))
+    if theta.any() or not np.allclose(report.arm.base, np.eye(4)) or report.arm.prismatic.any():
+        return ""
+    robot = DhRobot(np.radians(alpha), a / 1000, d / 1000)
+    same = 0
+    for T, count in zip(report.goals.T[:1000], report.counts[:1000], strict=True):
+        pose = T.copy()
+        pose[:3, 3] /= 1000
+        answer = robot.IK(pose)
+        same += int((~np.array(answer.is_LS, dtype=bool)).sum()) == count
+    return f" EAIK agrees on {same} of {min(len(report.q), 1000)}"
+
+
+def robots(poses: int, only: str) -> None:
+    print(f"\n| shipped robot | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
+    for name in NAMES:
+        if only in name:
+            arm, screw = shipped(name)
+            begin = time.perf_counter()
+            report = examine(arm, screw, None, random_joints(screw, poses, 1))
+            row(name, [report], time.perf_counter() - begin, eaik_counts(report))
+
+
+def classes(poses: int, arms: int, only: str) -> None:
+    print(f"\n| class, {arms} random arms | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
+    for name in CLASSES:
+        if only in name:
+            begin, reports = time.perf_counter(), []
+            for seed in range(arms):
+                case = random_case(name, seed)
+                q = random_joints(case.screw, max(poses // arms, 1), seed)
+                reports.append(examine(case.arm, case.screw, case.task, q))
+            row(name, reports, time.perf_counter() - begin)
+
+
+def near(poses: int, only: str) -> None:
+    print(f"\n| class, off by | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
+    for name in CLASSES:
+        if only in name and "general" not in name:
+            for off in OFF:
+                case = random_case(name, 1)
+                arm, screw = moved(case.arm, off, 1)
+                begin = time.perf_counter()
+                report = examine(arm, screw, case.task, random_joints(screw, max(poses // 10, 1), 1))
+                row(f"{name}, {off:.0e}", [report], time.perf_counter() - begin)
+
+
+def against_oracle(poses: int, only: str) -> None:
+    print("\n| class | poses | oracle's branches missing | |\n|---|---|---|---|")
+    for name in CLASSES:
+        if only in name:
+            case = random_case(name, 0)
+            count = max(poses // 10, 1)
+            report = examine(case.arm, case.screw, case.task, random_joints(case.screw, count, 2))
+            missing = []
+            for begin in range(0, count, 50):
+                part = np.arange(begin, min(begin + 50, count))
+                missing += not_found(report, part, 60 if case.arm.n < 4 else 250, 3)
+            weak = [f"{oracle.weakness(report.screw, report.goals.take([k]), q[None])[0]:.0e}" for k, q in missing]
+            print(f"| {name} | {count} | {len(missing)} | {' '.join(weak[:5])} |", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    for choice in ("robots", "classes", "near", "oracle"):
+        parser.add_argument(f"--{choice}", action="store_true")
+    parser.add_argument(
+        "--poses", type=int, default=10_000, help="for each robot or class; a tenth for --near and --oracle"
+    )
+    parser.add_argument("--arms", type=int, default=50)
+    parser.add_argument("--only", default="", help="robots or classes whose name holds this")
+    args = parser.parse_args()
+    everything = not (args.robots or args.classes or args.near or args.oracle)
+    if args.robots or everything:
+        robots(args.poses, args.only)
+    if args.classes or everything:
+        classes(args.poses, args.arms, args.only)
+    if args.near or everything:
+        near(args.poses, args.only)
+    if args.oracle or everything:
+        against_oracle(args.poses, args.only)
+
+
+if __name__ == "__main__":
+    main()
