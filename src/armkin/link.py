@@ -10,7 +10,7 @@ import hashlib
 import os
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any, Protocol
@@ -175,13 +175,9 @@ def _cannot_open(name: str, error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number == 2 or "FileNotFound" in reason:
         found = ", ".join(port.device for port in list_ports())
-        return (
-            f"there is no port {name}; armkin ports lists them ({found or 'none is plugged in'}), or use sim"
-        )
+        return f"there is no port {name}; armkin ports lists them ({found or 'none is plugged in'}), or use sim"
     if number == 13 or "PermissionError" in reason:
-        return (
-            f"port {name}: permission denied; on Linux add yourself to the group dialout, then log in again"
-        )
+        return f"port {name}: permission denied; on Linux add yourself to the group dialout, then log in again"
     if "exclusively lock" in reason or number in (11, 16):
         return f"port {name} is in use by another program (a serial monitor, another armkin?): close it first"
     return f"port {name} cannot be opened: {reason}"
@@ -242,8 +238,7 @@ class _Lock:
             holder = _read_pid(file)
             file.close()
             raise LinkError(
-                f"port {name} is in use by armkin (process {holder}): wait for it, "
-                f"or armkin stop --port {name}"
+                f"port {name} is in use by armkin (process {holder}): wait for it, or armkin stop --port {name}"
             )
         file.seek(0)
         file.truncate()
@@ -288,16 +283,3 @@ def _read_pid(file: IO[str]) -> int | None:
     file.seek(0)
     text = file.read(20)
     return int(text) if text.isdigit() else None
-
-
-__all__: Sequence[str] = (
-    "BAUD",
-    "SIM",
-    "Found",
-    "Port",
-    "SerialPort",
-    "SimPort",
-    "holder",
-    "list_ports",
-    "open_port",
-)

@@ -48,17 +48,6 @@ _WHY = {
 }
 
 
-@dataclass(frozen=True)
-class Report:
-    """What `armkin status` tells."""
-
-    status: Status
-    position: Position
-    configured: bool  # for this robot file
-    counts: tuple[int, ...]  # of the arm's motors
-    joints: Array | None  # (n,) [rad | mm], None if the position is lost
-
-
 class Machine:
     """An arm on the board behind an open port.
 
@@ -101,13 +90,6 @@ class Machine:
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
         return joints_of(self.arm, self.counts())
-
-    def report(self) -> Report:
-        """Where it stands, read now."""
-        self.status = self.session.status()
-        position = self.position()
-        known = position != "lost" and self.status.state == State.IDLE
-        return Report(self.status, position, self.configured, self.counts(), self.joints() if known else None)
 
     # Getting ready
 
@@ -193,7 +175,7 @@ class Machine:
         Returns the status at the end, where the last plan ends, or raises LinkError.
         """
         end: Counts | None = None
-        total = done = 0.0
+        total = 0.0
 
         def frames() -> Iterator[_Batch | None]:
             nonlocal end, total
@@ -206,7 +188,7 @@ class Machine:
                     yield from self._batches(move, self.configuration.axes, plan.clock)
                 end = plan.end
 
-        self._stream(frames(), lambda left: progress(max(total - left, done), total))
+        self._stream(frames(), lambda left: progress(max(total - left, 0.0), total))
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "

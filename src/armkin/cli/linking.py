@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
 
 PortName = Annotated[
     str,
-    typer.Option(
-        "--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."
-    ),
+    typer.Option("--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."),
 ]
 Baud = Annotated[int, typer.Option("--baud", metavar="N", help="The firmware's rate.")]
 AssumeHome = Annotated[
@@ -77,9 +74,7 @@ def machine(arm: Arm, configuration: Configuration, port: str, baud: int) -> Ite
         link = open_port(port, board=configuration.board, baud=baud)
         try:
             if link.simulated:
-                output.note(
-                    "the simulated board starts with the arm in its home pose, and forgets all at the end"
-                )
+                output.note("the simulated board starts with the arm in its home pose, and forgets all at the end")
             one = Machine(link, arm, configuration, stop)
             try:
                 yield one
@@ -127,14 +122,3 @@ def where_text(arm: Arm, found: dict[str, Any]) -> str:
     tool = [["", "x/mm", "y/mm", "z/mm"], ["tool", *map(render.fixed, found["position_mm"])]]
     tables = [render.table(part) for part in (rows, pulses, tool)]
     return "\n".join([f"{arm.name}: position {found['position']}", *tables, ""])
-
-
-def pid_alive(pid: int) -> bool:
-    """Whether a process exists."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
