@@ -48,6 +48,10 @@ def position(arm: Arm, q: ArrayLike) -> Array:
     """Position of the tool alone, at about half the cost of `fk`.
 
     q: (..., n) [rad | mm]. Returns (..., 3) [mm].
+
+    >>> import armkin, numpy as np
+    >>> position(armkin.load("robots/planar_2dof.yaml"), np.deg2rad([20, 50])).round(6).tolist()
+    [290.544567, 350.311815, 0.0]
     """
     return _batched(arm, as_joints(arm, q), (3,), _point)
 

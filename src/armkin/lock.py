@@ -22,6 +22,10 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
 
     held: joint name -> value [rad | mm]. Raises UsageError for an unknown joint or if none is
     left. Branches of the result go back to the full arm with `unlock`.
+
+    >>> import armkin
+    >>> lock(armkin.load("robots/panda.yaml"), {"J3": 0.35}).joint_names
+    ('J1', 'J2', 'J4', 'J5', 'J6', 'J7')
     """
     for name in held:
         joint_index(arm, name)
@@ -50,7 +54,12 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
 
 
 def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
-    """Joint values of a locked arm as those of the full one: (..., n - held) -> (..., n)."""
+    """Joint values of a locked arm as those of the full one: (..., n - held) -> (..., n).
+
+    >>> import armkin
+    >>> unlock(armkin.load("robots/three_dof.yaml"), {"q2": 0.5}, [0.1, 0.2]).tolist()
+    [0.1, 0.5, 0.2]
+    """
     values = np.asarray(q, dtype=float)
     missing = np.isnan(values).any(axis=-1)
     out = np.empty((*values.shape[:-1], arm.n))

@@ -24,7 +24,7 @@ def rpy(R: ArrayLike) -> Array:
     upright = level < 1e-9
     roll = np.where(upright, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
     yaw = np.where(upright, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
-    return np.stack([roll, pitch, yaw], axis=-1)
+    return np.stack([roll, pitch, yaw], axis=-1) + 0.0  # no negative zeros
 
 
 def quaternion(R: ArrayLike) -> Array:

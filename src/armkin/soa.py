@@ -26,7 +26,11 @@ CHUNK = 4096  # poses worked on at once: long enough to hide the calls, short en
 
 
 def mul(a: Entry, b: Entry) -> Entry:
-    """Product that skips known zeros and ones."""
+    """Product that skips known zeros and ones.
+
+    >>> mul(0.0, np.array([1.0, 2.0])), mul(-1.0, 3.0)
+    (0.0, -3.0)
+    """
     if isinstance(a, float):
         if a == 0.0:
             return 0.0

@@ -47,6 +47,11 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     as a quarter of the reach. Projected Levenberg-Marquardt from many starts (`near`, home
     and a fixed spread within limits); the best local minimum is returned, ties going to the
     one nearest to `near`.
+
+    >>> import armkin
+    >>> found = closest(armkin.load("robots/planar_2dof.yaml"), [600, 0])
+    >>> float(found.position[0].round(6)), round(found.distance, 6)
+    (500.0, 100.0)
     """
     definition = task_for(arm, task)
     goal, lead = read_targets(definition, target)

@@ -62,7 +62,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
         raise UsageError(
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
             f"{surplus} degree{'s' if surplus > 1 else ''} of freedom: fix {surplus} of "
-            f"{', '.join(arm.joint_names)} with --lock JOINT=VALUE, or try values with --sweep JOINT=FROM:TO:COUNT"
+            f"{', '.join(arm.joint_names)} with --lock JOINT=VALUE, or try values with --sweep JOINT=LOW:HIGH:COUNT"
         )
     effective = rank(arm, task, 1e-9)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete

@@ -70,6 +70,11 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
 
     q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n). An unlimited revolute
     joint has copies without end: it gives the one nearest to `near` alone.
+
+    >>> import armkin
+    >>> arm = armkin.load("robots/ur5e.yaml")  # limits of +-360 degrees, joint 3 of +-180
+    >>> len(turns(arm, [0.3, -1.0, 1.2, -0.4, 0.9, 0.7]))
+    32
     """
     row = np.asarray(q, dtype=float)
     close = arm.home if near is None else np.asarray(near, dtype=float)

@@ -84,6 +84,9 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
     """Indices of the branches that a name means; its words may come in any order, and not all of them.
 
     Raises UsageError, which lists the names, if there are none.
+
+    >>> find(("left, elbow up", "left, elbow down", "right, elbow up"), "upper elbow, left angle")
+    [0]
     """
     text = " ".join(wanted.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
     if text in (name.replace(",", "") for name in names):

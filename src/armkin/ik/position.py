@@ -92,14 +92,14 @@ class Position:
             self.regular = not self.prismatic[0] and self._is_regular(abs(float(self.rows[0, 2])))
             if self.prismatic[0] and np.abs(self.A).max() < 1e-9:
                 raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
-            return "joint 2 slides: its value is eliminated, joint 3 follows"
+            return "joint 2 slides, so its value is eliminated first"
         U, S, _ = np.linalg.svd(scaled)
         if S[0] < 1e-9:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
         self.regular = self._is_regular(float(S[1] / S[0]))
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
         self.main = U[:, 0] * weight  # the one that gives q2
-        return "general axes: a quartic in joint 3" if self.regular else "special axes: joint 3 alone, then joint 2"
+        return "a quartic gives joint 3" if self.regular else "special axes give joint 3 by itself"
 
     def _unit(self, pair: Pair) -> Pair:
         """On the unit circle, so that the residual shows a missing root; `near` looks at the length itself."""

@@ -70,7 +70,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     def solve(goal: Pose, prefer: Prefer) -> Candidates:
         return shoulder.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
-    why = f"axes 1, 2 and 3 meet in a point; from the tool {shoulder.why}"
+    why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {shoulder.why}"
     return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight, ordered=shoulder.ordered)
 
 

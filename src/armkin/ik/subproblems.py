@@ -63,7 +63,11 @@ class Candidates(NamedTuple):
 
 
 def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:
-    """``Rz(q) v``."""
+    """``Rz(q) v``.
+
+    >>> spin(0.0, 1.0, [2.0, 0.0, 5.0])
+    [0.0, 2.0, 5.0]
+    """
     x, y = v[0], v[1]
     return [soa.sub(soa.mul(c, x), soa.mul(s, y)), soa.add(soa.mul(s, x), soa.mul(c, y)), v[2]]
 
@@ -93,8 +97,10 @@ def linear(
     length that makes a and b dimensionless; prefer: the angle to give where the equation
     leaves it free, or None to do without (such targets are in doubt and looked at again); disc:
     ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a
-    boolean array: True where the roots are about to merge or the angle is free. Without a real root the pair is that of the closest
-    angle, not normalised; the caller finds by its residual that it is no solution.
+    boolean array: True where the roots are about to merge or the angle is free.
+
+    Without a real root the pair is that of the closest angle, not normalised; the caller finds by
+    its residual that it is no solution, or normalises it where the residual would not show.
     """
     sign = signs(axis)
     h2 = soa.add(soa.mul(a, a), soa.mul(b, b))

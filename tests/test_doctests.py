@@ -1,0 +1,19 @@
+"""The examples in the core's docstrings are true."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+MODULES = [
+    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.limits", "ik.closest", "ik.names", "ik.subproblems", "soa",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).parents[1])  # they load robots/...
+    result = doctest.testmod(import_module(f"armkin.{name}"))
+    assert result.attempted > 0
+    assert result.failed == 0
