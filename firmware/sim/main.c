@@ -170,7 +170,7 @@ int main(int argc, char **argv) {
         printf("{\"board\": \"%s\", \"port\": \"%s\"}\n", b->name, port_path());
     else if (!quiet)
         printf("%s runs behind %s (Ctrl-C ends it; type help for what it can do to the board). Try:\n\n"
-               "    armkin send robots/three_dof.yaml -30 5 -5 --port %s\n\n",
+               "    armkin send robots/three_dof.yaml -30 5 -5 --port %s --assume-home\n\n",
                b->name, port_path(), port_path());
     fflush(stdout);
     loop();

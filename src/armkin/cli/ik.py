@@ -188,5 +188,5 @@ def _summary(answer: dict[str, Any]) -> str:
         text += f"; free: {', '.join(answer['free_joints'])}"
     if count > len(answer["branches"]):
         text += " (--all-branches lists all)"
-    sure = "no real branch is missing" if answer["complete"] else "there may be more"
+    sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
     return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")

@@ -180,7 +180,7 @@ def _solver(answer: dict[str, Any]) -> str:
         offset = f", pitch offset {short(answer['pitch_offset'])} deg" if answer["pitch_offset"] else ""
         lines.append(f"  task     {answer['task']}: target {wanted}{offset}")
     if solver := answer["solver"]:
-        sure = "no real branch is missing" if solver["complete"] else "branches may be missing"
+        sure = "no real branch is missing" if solver["complete"] else "there may be more branches"
         lines.append(wrapped(f"{solver['method']} ({solver['why']}): {sure}", "  ik       ", " " * 11))
     if answer["ik_refuses"]:
         lines.append(wrapped(answer["ik_refuses"], "  ik       ", " " * 11))

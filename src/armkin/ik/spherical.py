@@ -110,7 +110,7 @@ class SphericalWrist:
             self.close, self.ordered = position.close, not position.regular
             self.place = position.solve
             self.straight = False
-            self.why = f"joints 1, 2 and 3: {position.why}"
+            self.why = f"of the other three, {position.why}"
         self.links = [soa.constant(L) for L in chain.link[:4]]
         self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
         L3 = chain.link[3]
