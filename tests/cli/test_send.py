@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -100,6 +101,34 @@ def test_an_answer_without_a_best_branch_is_refused() -> None:
     assert "no branch within limits" in done.err
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("best", False, "damaged"),
+        ("branches", [1], "no joints to send"),
+        ("branches", [None], "no joints to send"),
+        ("pulses", [1, 2, 3.5], "damaged"),
+        ("pulses", ["1", "2", "3"], "damaged"),
+        ("pulses", [True, False, True], "damaged"),
+        ("joints", [10**400, 0, 0], "finite"),
+        ("joints", [float("nan"), 0, 0], "finite"),
+    ],
+)
+def test_a_damaged_answer_is_refused(key: str, value: object, message: str) -> None:
+    words = ("ik", THREE_DOF, 390, 80, 300) if key in ("best", "branches") else ("pulses", THREE_DOF, *POSE)
+    answer = {**run(*words, "--json").json, key: value}
+    if key == "joints":
+        del answer["pulses"]
+    done = run("send", "--port", "sim", stdin=json.dumps(answer).encode())
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+
+
+def test_an_answer_may_begin_with_a_byte_order_mark() -> None:
+    answer = run("fk", THREE_DOF, *POSE, "--json")
+    assert run("send", "--dry-run", stdin=b"\xef\xbb\xbf" + answer.out.encode()).code == 0
+
+
 def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
     shutil.copy(ROOT / THREE_DOF, mine)
@@ -117,6 +146,7 @@ def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
         (b"q1 = 5\n", "no JSON"),
         (b"[1, 2]", "names no robot_file"),
         (b'{"robot_file": "robots/three_dof.yaml", "robot_sha256": 5, "joints": [1, 2, 3]}', "names no robot_file"),
+        (b"\xff\xfe{\x00}\x00", "no JSON"),
     ],
 )
 def test_what_is_no_answer_is_refused(stdin: bytes, message: str) -> None:
@@ -269,7 +299,7 @@ def started(*words: object) -> subprocess.Popen[bytes]:
 
 def moving(board: PtyBoard, *words: object) -> subprocess.Popen[bytes]:
     """A send that is well under way."""
-    sender = started("send", THREE_DOF, *POSE, "--port", board.port, *words)
+    sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", 40, *words)
     board.wait(State.MOVING, 20)
     time.sleep(0.7)
     return sender
@@ -358,7 +388,7 @@ def test_a_cut_line(board: PtyBoard) -> None:
 
 
 def test_stop_from_another_terminal(board: PtyBoard) -> None:
-    sender = moving(board, "--assume-home")
+    sender = moving(board, "--assume-home", "--speed", 5)
     busy = process("send", THREE_DOF, *POSE, "--port", board.port)
     assert busy.code == 5
     assert f"process {sender.pid}" in busy.err
@@ -428,15 +458,15 @@ def test_a_board_behind_a_socket() -> None:
 
         def serve() -> None:
             line, _ = server.accept()
-            with line:
+            with line, suppress(ConnectionError):  # the host hangs up when it has heard enough
                 last = time.monotonic()
                 while True:
                     ready, _, _ = select.select([line], [], [], 0.002)
                     data = line.recv(4096) if ready else b""
                     if ready and not data:
-                        return  # the host has hung up
+                        return
                     now = time.monotonic()
-                    board.advance(now - last)
+                    board.advance(min(now - last, 0.2))
                     last = now
                     board.receive(data)
                     line.sendall(board.take())

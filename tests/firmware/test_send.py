@@ -62,8 +62,19 @@ def on_the_line(now: Sequence[int], start: Sequence[int], end: Sequence[int]) ->
 
 
 def moving(board: EmulatedBoard, *words: object) -> subprocess.Popen[bytes]:
-    """A send to the pose that is at full speed."""
-    command = [sys.executable, "-m", "armkin", "send", THREE_DOF, *map(str, POSE), "--port", board.port]
+    """A send to the pose that is at its full speed, half of the joints'."""
+    command = [
+        sys.executable,
+        "-m",
+        "armkin",
+        "send",
+        THREE_DOF,
+        *map(str, POSE),
+        "--port",
+        board.port,
+        "--speed",
+        "50",
+    ]
     sender = subprocess.Popen([*command, *map(str, words)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     end = time.monotonic() + 30
     while net(board)[1] > -3000:
