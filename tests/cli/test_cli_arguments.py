@@ -66,6 +66,9 @@ def test_counts() -> None:
     for text in ("1.5", "0", "101"):
         with pytest.raises(UsageError, match="whole number from 1 to 100"):
             whole(text, "count", 1, 100)
+    assert whole("2e9", "--samples", 1, 10**15) == 2_000_000_000
+    with pytest.raises(UsageError, match=r"up to 1e\+15"):
+        whole("1e18", "--samples", 1, 10**15)
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,11 @@
 import csv
 import io
 import json
+import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,6 +84,8 @@ def test_pulses() -> None:
         (b"1,2,3\n1 2 3\n", "with commas, not with ' '"),
         (b"1,2,3\nq1,q2,q3\n", "row 2: q1: 'q1' is not a number"),
         (b"1,2,3\n" + b"9" * 300_000, "row 2"),
+        (b'1,2,3\n"4,5",6\n', "row 2: q1: '\"4' is not a number"),
+        (b"1,2,3\n4,5," + b"0" * 99_994 + b"6,\n", "row 2: this is no CSV of numbers"),
     ],
 )
 def test_a_malformed_row_stops_the_run(text: bytes, complaint: str, tmp_path: Path) -> None:
@@ -92,6 +96,32 @@ def test_a_malformed_row_stops_the_run(text: bytes, complaint: str, tmp_path: Pa
     file = run("fk", THREE_DOF, "--batch", "-", "--out", tmp_path / "out.csv", stdin=text)
     assert file == (2, "", result.err)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_endless_line_is_not_read_on() -> None:
+    """One piece of it tells; thousands of pieces would be gathered before the first is looked at."""
+
+    class Endless(io.RawIOBase):
+        read_so_far = 0
+
+        def readable(self) -> bool:
+            return True
+
+        def readinto(self, space: Any) -> int:
+            self.read_so_far += len(space)
+            space[:] = bytes(len(space))
+            return len(space)
+
+    endless = Endless()
+    with pytest.raises(UsageError, match="row 1: this is no CSV"):
+        list(_chunks_of(io.BufferedReader(endless)))
+    assert endless.read_so_far < 1_000_000
+
+
+def _chunks_of(file: io.BufferedReader) -> Iterator[Chunk]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdin", io.TextIOWrapper(file))
+        yield from batch_rows("-", ["q1"], "an arm")
 
 
 def test_a_malformed_row_far_down_is_named_by_its_line() -> None:
@@ -115,10 +145,7 @@ def test_a_malformed_row_far_down_is_named_by_its_line() -> None:
     ],
 )
 def test_dialects(text: bytes) -> None:
-    assert (
-        run("fk", THREE_DOF, "--batch", "-", stdin=text).out
-        == run("fk", THREE_DOF, "--batch", "-", stdin=GOOD).out
-    )
+    assert run("fk", THREE_DOF, "--batch", "-", stdin=text).out == run("fk", THREE_DOF, "--batch", "-", stdin=GOOD).out
 
 
 def test_an_empty_batch_is_an_error() -> None:
@@ -159,9 +186,7 @@ def test_memory_does_not_grow_with_the_rows(tmp_path: Path) -> None:
     def peak(limit: int) -> int:
         tracemalloc.start()
         some = (chunk for i, chunk in enumerate(chunks()) if i < limit)
-        run_batch(
-            some, str(tmp_path / "out"), False, lambda c: ({} for _ in c.values), ["n"], lambda n, _: [[n]]
-        )
+        run_batch(some, str(tmp_path / "out"), False, lambda c: ({} for _ in c.values), ["n"], lambda n, _: [[n]])
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size

@@ -6,7 +6,6 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from armkin.cli import output
@@ -146,8 +145,13 @@ def _opened(source: str) -> Iterator[IO[bytes]]:
 
 
 def _lines(file: IO[bytes], source: str) -> list[bytes]:
+    lines: list[bytes] = []
     try:
-        return list(islice(iter(lambda: file.readline(LONGEST), b""), ROWS))
+        while len(lines) < ROWS and (line := file.readline(LONGEST)):
+            lines.append(line)
+            if len(line) >= LONGEST:  # no use in reading on
+                break
+        return lines
     except OSError as error:
         raise FileError(f"{_name(source)}: cannot read: {error.strerror or error}") from None
 
@@ -184,7 +188,9 @@ def _chunk(lines: list[bytes], first: int, names: Sequence[str], what: str, sour
 def _all_plain(lines: list[bytes], count: int) -> list[float] | None:
     """All numbers of lines that hold nothing but the right count of ordinary numbers: the fast way."""
     text = b"".join(lines)
-    if text.translate(None, _PLAIN) or any(line.count(b",") != count - 1 for line in lines):
+    if len(lines[-1]) >= LONGEST or text.translate(None, _PLAIN):
+        return None
+    if any(line.count(b",") != count - 1 for line in lines):
         return None
     try:
         values = [float(cell) for line in lines for cell in line.split(b",")]
@@ -203,7 +209,7 @@ def _row(line: bytes, number: int, names: Sequence[str], what: str) -> list[floa
         raise UsageError("this is no CSV of numbers")
     if not text or text.startswith("#"):
         return None
-    cells = [cell.strip().strip('"').strip() for cell in text.split(",")]
+    cells = [_unquoted(cell.strip()) for cell in text.split(",")]
     if number == 1 and [cell.lower() for cell in cells] == [name.lower() for name in names]:
         return None
     if len(cells) == 1 and len(names) > 1:
@@ -211,3 +217,8 @@ def _row(line: bytes, number: int, names: Sequence[str], what: str) -> list[floa
             if len(text.split(separator)) == len(names):
                 raise UsageError(f"separate the numbers with commas, not with {separator!r}")
     return numbers(cells, names, what)
+
+
+def _unquoted(cell: str) -> str:
+    """A quote on one side alone stays: what it quotes has a comma in it, and is no number."""
+    return cell[1:-1].strip() if len(cell) >= 2 and cell[0] == cell[-1] == '"' else cell

@@ -11,8 +11,8 @@ LARGEST = 1e9
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
-def number(text: str, name: str) -> float:
-    """One finite number; name: what it is, for the message.
+def number(text: str, name: str, largest: float = LARGEST) -> float:
+    """One finite number up to `largest` in size; name: what it is, for the message.
 
     >>> number("-1e3", "q1")
     -1000.0
@@ -22,8 +22,8 @@ def number(text: str, name: str) -> float:
     if not _NUMBER.fullmatch(plain):
         raise UsageError(f"{name}: {_why_not(plain, shown)}")
     value = float(plain)
-    if abs(value) > LARGEST:
-        raise UsageError(f"{name}: '{shown}' is too large; numbers here go up to {LARGEST:g}")
+    if abs(value) > largest:
+        raise UsageError(f"{name}: '{shown}' is too large; numbers here go up to {largest:g}")
     return value
 
 
@@ -53,7 +53,7 @@ def listed(text: str, names: Sequence[str], what: str) -> list[float]:
 
 def whole(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
-    value = number(text, name)
+    value = number(text, name, max(high, LARGEST))
     if value != int(value) or not low <= value <= high:
         raise UsageError(f"{name}: '{text}' must be a whole number from {low} to {high}")
     return int(value)

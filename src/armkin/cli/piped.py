@@ -9,7 +9,8 @@ from typing import Any
 
 from armkin.errors import NoSolutionError, UsageError
 
-_LARGEST = 100_000_000  # characters
+_LARGEST = 100_000_000  # bytes
+_NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,10 @@ def read(robot: str | None) -> Piped:
             "nothing to send: give joint values, --target X,Y,Z or --batch FILE,\n"
             "or pipe an answer in: armkin ik ROBOT 390 80 300 --json | armkin send --port PORT"
         )
-    text = sys.stdin.read(_LARGEST)
+    try:
+        text = sys.stdin.buffer.read(_LARGEST).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise UsageError(_NO_JSON) from None
     if not text.strip():
         raise UsageError("nothing to send: standard input is empty (did the command before the pipe fail?)")
     answers = [_parsed(part) for part in _parts(text)]
@@ -49,9 +53,7 @@ def read(robot: str | None) -> Piped:
         if (answer["robot_file"], answer["robot_sha256"]) != (first["robot_file"], first["robot_sha256"]):
             raise UsageError("the answers on standard input are of different robot files: send one at a time")
     if robot is not None and robot != first["robot_file"]:
-        raise UsageError(
-            f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input"
-        )
+        raise UsageError(f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input")
     return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
 
 
@@ -64,7 +66,7 @@ def _parsed(text: str) -> dict[str, Any]:
     try:
         answer = json.loads(text)
     except (ValueError, RecursionError):
-        raise UsageError("standard input is no JSON: give --json to the command before the pipe") from None
+        raise UsageError(_NO_JSON) from None
     if not isinstance(answer, dict) or not all(
         isinstance(answer.get(key), str) for key in ("robot_file", "robot_sha256")
     ):
@@ -77,18 +79,21 @@ def _pose(answer: dict[str, Any]) -> Pose:
         best = answer.get("best")
         branches = answer["branches"]
         if best is None:
-            raise NoSolutionError(
-                "the answer on standard input has no branch within limits: nothing was moved"
-            )
-        if not isinstance(best, int) or not isinstance(branches, list) or not 0 <= best < len(branches):
+            raise NoSolutionError("the answer on standard input has no branch within limits: nothing was moved")
+        if type(best) is not int or not isinstance(branches, list) or not 0 <= best < len(branches):
             raise UsageError("the answer on standard input is damaged: its best branch is not there")
-        return Pose(_numbers(branches[best].get("joints")), None)
+        branch = branches[best]
+        return Pose(_numbers(branch.get("joints") if isinstance(branch, dict) else None), None)
     pulses = answer.get("pulses")
-    whole = isinstance(pulses, list) and all(type(p) is int for p in pulses)
-    return Pose(_numbers(answer.get("joints")), pulses if whole else None)
+    if pulses is not None and not (isinstance(pulses, list) and all(type(p) is int for p in pulses)):
+        raise UsageError("the answer on standard input is damaged: its pulses are not whole numbers")
+    return Pose(_numbers(answer.get("joints")), pulses)
 
 
 def _numbers(values: Any) -> list[float]:
     if not isinstance(values, list) or not values or not all(type(v) in (int, float) for v in values):
         raise UsageError("the answer on standard input has no joints to send")
-    return [float(v) for v in values]
+    try:
+        return [float(v) for v in values]
+    except OverflowError:
+        raise UsageError("joint values must be finite to be sent") from None

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from armkin.cli import units
+from armkin.cli import output, units
 from armkin.cli.numbers import number, whole
 from armkin.errors import UsageError
 
@@ -115,6 +115,9 @@ def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
     for text in words or ():
         name, value = _named(arm, text, "--lock", "J3=20", found)
         found[name] = number(value, f"--lock {name}")
+        low, high = units.limits_out(arm)[arm.joint_names.index(name)]
+        if not low <= found[name] <= high:
+            output.warn(f"--lock {text}: the limits of {name} are {low:g} to {high:g}: all branches are outside")
     return found
 
 
