@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 MODULES = [
-    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.limits", "ik.closest", "ik.names", "ik.subproblems", "soa",
+    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.limits", "ik.closest", "ik.names", "ik.subproblems",
+    "soa",
 ]  # fmt: skip
 
 
