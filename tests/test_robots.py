@@ -87,3 +87,34 @@ def test_step_chains_give_the_steps_that_the_sources_print() -> None:
         assert [motor.pulses_per_unit() for motor in motors] == pytest.approx(steps_per_degree, abs=1e-3), (
             name
         )
+
+
+def test_screws_shed_the_rounding_of_a_printed_table(tmp_path: Path) -> None:
+    """An axis printed as (0.7071, 0.7071, 0) is still one: the arm turns about it and keeps its shape."""
+    text = """
+name: rounded
+convention: screws
+zero_pose: {xyz: [300, 0, 115]}
+joints:
+  - {name: q1, screw: {w: [0.7071, 0.7071, 0], v: [0, 0, 10]}}
+  - {name: q2, screw: {w: [0, 0.7071, 0.7071], q: [0, 0, 115]}}
+  - {name: q3, type: prismatic, screw: {w: [0, 0, 0], v: [0.577, 0.577, 0.577]}}
+"""
+    path = tmp_path / "rounded.yaml"
+    path.write_text(text, encoding="utf-8")
+    arm, q = load(path), [1.3, 0.4, 20.0]
+    expected = np.eye(4)
+    for joint, value in zip(arm.file.joints, q, strict=True):
+        expected = expected @ exponential(*map(np.array, joint.twist()), value)
+    expected = expected @ [[1, 0, 0, 300], [0, 1, 0, 0], [0, 0, 1, 115], [0, 0, 0, 1]]
+    assert fk(arm, q) == pytest.approx(expected, abs=1e-11)
+
+
+def exponential(w: np.ndarray, v: np.ndarray, value: float) -> np.ndarray:
+    """exp([S] q), Lynch & Park, Modern Robotics, eq. 3.88."""
+    W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    s, c = math.sin(value), math.cos(value)
+    T = np.eye(4)
+    T[:3, :3] = np.eye(3) + s * W + (1 - c) * W @ W
+    T[:3, 3] = (value * np.eye(3) + (1 - c) * W + (value - s) * W @ W) @ v
+    return T

@@ -216,13 +216,11 @@ def _dh(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
 def _screw(joint: Joint) -> tuple[Array, Array, Array]:
     """exp([S] q) = B Z(q) B^-1 with B's z axis on the screw's axis (Lynch & Park, Modern Robotics, 3.3.2)."""
     assert joint.screw is not None
-    w = np.array(joint.screw.w, dtype=float)
+    w, v = (np.array(part, dtype=float) for part in joint.twist())
     if joint.type == "prismatic":
-        direction, point = np.array(joint.screw.v, dtype=float), np.zeros(3)
-    elif joint.screw.q is not None:
-        direction, point = w, np.array(joint.screw.q, dtype=float)
+        direction, point = v, np.zeros(3)
     else:
-        direction, point = w, np.cross(w, np.array(joint.screw.v, dtype=float))
+        direction, point = w, np.cross(w, v) if joint.screw.q is None else np.array(joint.screw.q, dtype=float)
     B = np.eye(4)
     B[:3, 2] = direction
     B[:3, 0] = _perpendicular(direction)
@@ -238,9 +236,9 @@ def _screw(joint: Joint) -> tuple[Array, Array, Array]:
 
 def _perpendicular(z: Array) -> Array:
     """A unit vector perpendicular to z, exact for axis-aligned z."""
-    helper = np.zeros(3)
-    helper[int(np.argmin(np.abs(z)))] = 1.0
-    x = helper - (helper @ z) * z
+    across = np.zeros(3)
+    across[int(np.argmin(np.abs(z)))] = 1.0
+    x = across - (across @ z) * z
     return np.asarray(x / np.linalg.norm(x))
 
 
