@@ -1,14 +1,16 @@
-"""The public names: all there, found lazily, and cheap to import."""
+"""The public names: all there, found lazily, cheap to import, and firm about what they are given."""
 
 import ast
 import subprocess
 import sys
 from importlib import import_module
+from typing import Any
 
+import numpy as np
 import pytest
 
 import armkin
-from command_line import ROOT
+from command_line import ROOT, THREE_DOF
 
 HEAVY = ("numpy", "pydantic", "yaml", "serial", "rich", "matplotlib")
 
@@ -55,8 +57,74 @@ def test_functions_stay_functions_when_their_modules_are_imported(name: str) -> 
 )
 def test_start_up_imports_nothing_heavy(code: str) -> None:
     report = f"{code}\nimport sys; print('LOADED', *sorted({{m.partition('.')[0] for m in sys.modules}}))"
-    done = subprocess.run(
-        [sys.executable, "-c", report], capture_output=True, text=True, check=True, cwd=ROOT
-    )
+    done = subprocess.run([sys.executable, "-c", report], capture_output=True, text=True, check=True, cwd=ROOT)
     loaded = done.stdout.rpartition("LOADED")[2].split()
     assert not set(HEAVY) & set(loaded)
+
+
+BAD = {
+    "text": "abc",
+    "numbers in quotes": ["1", "2", "3"],
+    "lists of unequal lengths": [[1, 2, 3], [1, 2]],
+    "complex": np.zeros(3, dtype=complex),
+    "dates": np.array(["2020-01-01"] * 3, dtype="M8[D]"),
+    "a mapping": {},
+    "one number": 1.0,
+    "two of three": [1, 2],
+}
+
+
+@pytest.mark.parametrize("bad", BAD)
+@pytest.mark.parametrize(
+    "name", ["fk", "frames", "jacobian", "manipulability", "ik", "closest", "turns", "pulses", "joints", "best_pulses"]
+)
+def test_what_is_no_array_of_joint_values_is_refused(name: str, bad: str) -> None:
+    arm = armkin.load(ROOT / THREE_DOF)
+    with pytest.raises(armkin.UsageError):
+        getattr(armkin, name)(arm, BAD[bad])
+    if name in ("ik", "closest", "turns"):
+        with pytest.raises(armkin.UsageError):
+            getattr(armkin, name)(arm, [390, 80, 300], near=BAD[bad])
+
+
+def test_ordinary_arrays_of_any_kind_are_taken() -> None:
+    arm = armkin.load(ROOT / THREE_DOF)
+    rows = np.random.default_rng(0).integers(-3, 3, (6, 3)).astype(float)
+    kinds = [rows.tolist(), rows.astype(np.float32), rows.astype(int), rows.astype(object), np.asfortranarray(rows)]
+    for kind in (*kinds, rows[::-1][::-1], np.broadcast_to(rows, (6, 3))):
+        assert np.array_equal(armkin.fk(arm, kind), armkin.fk(arm, rows))
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "ur5e", "jaco_j2n6s300", "planar_3dof"])
+@pytest.mark.parametrize("lead", [(0,), (2, 0)])
+def test_a_batch_of_nothing_is_a_batch(robot: str, lead: tuple[int, ...]) -> None:
+    arm = armkin.load(ROOT / f"robots/{robot}.yaml")
+    one = armkin.ik(arm, armkin.fk(arm, arm.home), task="pose") if arm.n == 6 else armkin.ik(arm, [300.0, 10.0, 100.0])
+    s = armkin.ik(arm, np.zeros((*lead, *one.target.shape)))
+    assert s.q.shape[: len(lead)] == s.valid.shape[: len(lead)] == lead
+    assert s.q.shape[-1] == arm.n
+    assert s.status.shape == lead
+    assert armkin.fk(arm, np.zeros((*lead, arm.n))).shape == (*lead, 4, 4)
+
+
+def test_targets_beyond_arithmetic_are_refused() -> None:
+    arm = armkin.load(ROOT / THREE_DOF)
+    assert armkin.ik(arm, [1e15, 0, 0]).status == armkin.Status.UNREACHABLE
+    for function in (armkin.ik, armkin.closest):
+        with pytest.raises(armkin.UsageError, match="beyond"):
+            function(arm, [1e300, 0, 0])
+
+
+def test_joint_values_that_are_not_there_have_measures_that_are_not() -> None:
+    """`Solutions.q` has rows of nan; what is computed from it keeps its shape."""
+    arm = armkin.load(ROOT / THREE_DOF)
+    q = np.array([[0.1, 0.2, 0.3], [np.nan] * 3])
+    assert np.isnan(armkin.manipulability(arm, q)).tolist() == [False, True]
+    assert np.isnan(armkin.condition(arm, q)).tolist() == [False, True]
+    assert np.isnan(armkin.fk(arm, [np.inf, 0, 0])).any()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, "0.5", [1, 2], 1j, None])
+def test_a_joint_is_held_at_a_number(value: Any) -> None:
+    with pytest.raises(armkin.UsageError):
+        armkin.lock(armkin.load(ROOT / THREE_DOF), {"q1": value})

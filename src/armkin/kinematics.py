@@ -106,7 +106,10 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
         rows = slice(0, 3) if arm.n <= 3 else slice(0, 6)
     J = jacobian(arm, q)
     J[..., :3, :] /= scale
-    return np.asarray(np.linalg.svd(J[..., rows, :], compute_uv=False))
+    J = J[..., rows, :]
+    known = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # not so for the nan rows of `Solutions.q`
+    values = np.linalg.svd(np.where(known, J, 0.0), compute_uv=False)
+    return np.where(known[..., 0], values, np.nan)
 
 
 def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
@@ -114,9 +117,19 @@ def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
     return soa.slide(P, value) if arm.prismatic[joint] else soa.rotate(P, *soa.cos_sin(value))
 
 
+def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
+    """``q`` as the finite joint values (n,) of one pose; what: its name, for the message."""
+    values = as_joints(arm, q)
+    if values.ndim != 1 or not np.isfinite(values).all():
+        raise UsageError(
+            f"{what}: expected the {arm.n} finite joint values of one pose, got shape {values.shape} or nan"
+        )
+    return values
+
+
 def as_joints(arm: Arm, q: ArrayLike) -> Array:
     """``q`` as a float array with the arm's number of joints on its last axis."""
-    values = np.asarray(q, dtype=np.float64)
+    values = soa.real(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n:
         got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
         raise UsageError(
@@ -186,7 +199,7 @@ def _single(arm: Arm, q: Array) -> Array:
         if arm.prismatic[i]:
             Z[2, 3] = q[i]
         else:
-            c, s = math.cos(q[i]), math.sin(q[i])
+            c, s = (math.cos(q[i]), math.sin(q[i])) if math.isfinite(q[i]) else (math.nan, math.nan)
             Z[0, 0], Z[0, 1], Z[1, 0], Z[1, 1] = c, -s, s, c
         T = T @ Z @ arm.link[i + 1]
     return np.asarray(T)

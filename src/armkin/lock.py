@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin import soa
 from armkin.errors import UsageError
 from armkin.soa import Array
 
@@ -27,8 +28,11 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     >>> lock(armkin.load("robots/panda.yaml"), {"J3": 0.35}).joint_names
     ('J1', 'J2', 'J4', 'J5', 'J6', 'J7')
     """
-    for name in held:
+    for name, value in held.items():
         joint_index(arm, name)
+        number = soa.real(value, name)
+        if number.ndim or not np.isfinite(number):
+            raise UsageError(f"{name} cannot be held at {value}: give one finite number")
     if len(held) >= arm.n:
         raise UsageError(f"{arm.name}: with {', '.join(held)} held no joint is left to solve for")
     links, frame, kept = [arm.link[0]], [], []

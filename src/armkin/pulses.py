@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin import soa
 from armkin.errors import UsageError
 from armkin.kinematics import as_joints, position
 from armkin.soa import Array
@@ -97,7 +98,7 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     [-30.009375, 4.998371, -4.995]
     """
     inverse = joints_per_pulse(arm)
-    values = np.asarray(p, dtype=np.float64)
+    values = soa.real(p, "pulses")
     m = len(arm.motor_gain)
     if values.ndim == 0 or values.shape[-1] != m:
         got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
@@ -151,9 +152,7 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     for start in range(0, len(flat_q), block):
         part = slice(start, start + block)
         chosen[part] = _nearest(arm, flat_q[part], flat_x[part], around)
-    return Best(
-        rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(around) + 1
-    )
+    return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(around) + 1)
 
 
 def resolution(arm: Arm) -> Array:

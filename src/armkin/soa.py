@@ -15,7 +15,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.errors import UsageError
 
 Array = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -23,6 +25,23 @@ Entry = Any  # float | Array: numpy arithmetic accepts both, and the type checke
 Pose = list[Entry]
 
 CHUNK = 4096  # poses worked on at once: long enough to hide the calls, short enough for a core's cache
+
+
+def real(values: ArrayLike, what: str) -> Array:
+    """Values from outside as an array of floats; what: their name, for the message.
+
+    Raises UsageError for text, dates, complex numbers and lists of unequal lengths. nan and infinity pass.
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "biufO":  # O: numbers that numpy does not know, such as fractions
+            return array.astype(np.float64)
+        found = f"an array of {array.dtype}"
+    except (TypeError, ValueError):
+        found = type(values).__name__
+    raise UsageError(f"{what}: expected an array of real numbers, got {found}")
 
 
 def mul(a: Entry, b: Entry) -> Entry:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.ik import numeric
 from armkin.ik.tasks import Task, read_targets, residual, task_for
-from armkin.kinematics import fk
+from armkin.kinematics import fk, one_pose
 from armkin.soa import Array
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
     high = np.where(np.isfinite(arm.upper), arm.upper, np.maximum(span, arm.home + span))
-    close = arm.home if near is None else np.asarray(near, dtype=float)
+    close = one_pose(arm, arm.home if near is None else near, "near")
     starts = np.concatenate([[close, arm.home], rng.uniform(low, high, (STARTS, arm.n))])
     q = np.clip(starts, arm.lower, arm.upper)
     q = _descend(arm, definition, q, np.repeat(goal, len(q), axis=0))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin.kinematics import one_pose
 from armkin.soa import Array, Entry
 
 if TYPE_CHECKING:
@@ -54,6 +55,8 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
     out = q.copy()
     inside = np.ones(q.shape[:-1], bool)
+    if not q.size:
+        return out, inside
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         if arm.prismatic[i]:
@@ -76,8 +79,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
     >>> len(turns(arm, [0.3, -1.0, 1.2, -0.4, 0.9, 0.7]))
     32
     """
-    row = np.asarray(q, dtype=float)
-    close = arm.home if near is None else np.asarray(near, dtype=float)
+    row = one_pose(arm, q, "q")
+    close = one_pose(arm, arm.home if near is None else near, "near")
     choices = []
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])

@@ -71,7 +71,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     """
     definition, geometry = solver(arm, task)
     target, lead = read_targets(definition, targets)
-    close = arm.home if near is None else np.asarray(near, dtype=float)
+    close = arm.home if near is None else soa.real(near, "near")
     if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
     if not np.isfinite(close).all():
@@ -85,15 +85,16 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     if not geometry.ordered:
         out.branch[...] = follow(arm, definition, out.q, target)
     names = branch_names(arm, definition, geometry, out.q.shape[1])
+    each_branch = (*lead, out.q.shape[1])
     return Solutions(
         arm=arm,
         task=definition,
         target=target.reshape(lead + target.shape[1:]),
         near=np.broadcast_to(close, (*lead, arm.n)),
-        q=out.q.reshape(*lead, *out.q.shape[1:]),
-        valid=out.valid.reshape(*lead, -1),
-        within_limits=out.within.reshape(*lead, -1),
-        branch=out.branch.reshape(*lead, -1),
+        q=out.q.reshape(*each_branch, arm.n),
+        valid=out.valid.reshape(each_branch),
+        within_limits=out.within.reshape(each_branch),
+        branch=out.branch.reshape(each_branch),
         status=out.status.reshape(lead),
         free=out.free.reshape(*lead, arm.n),
         names=names,

@@ -37,6 +37,7 @@ LABELS = {
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
 PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
+LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,15 +111,17 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     """Targets as a flat batch and its leading shape.
 
     (..., m) -> (N, m), or (N, 4, 4) for poses. Raises UsageError for a wrong shape,
-    numbers that are not finite, an axis of no length or a matrix that is no pose.
+    numbers that are not finite or too large, an axis of no length or a matrix that is no pose.
     """
-    values = np.asarray(targets, dtype=np.float64)
+    values = soa.real(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
     if values.shape[-len(shape) :] != shape or values.ndim < len(shape):
         expected = "(..., 4, 4)" if task.orientation == "full" else f"(..., {shape[0]}): {' '.join(task.labels)}"
         raise UsageError(f"task {task.name} takes targets of shape {expected}; got {values.shape}")
     if not np.isfinite(values).all():
         raise UsageError("a target holds nan or infinity; every number must be finite")
+    if np.abs(values).max(initial=0.0) > LARGEST:
+        raise UsageError(f"a target holds a number beyond {LARGEST:g}; no arm reaches there")
     lead = values.shape[: values.ndim - len(shape)]
     flat = values.reshape(-1, *shape)
     if task.orientation == "axis":
