@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from armkin.ik import numeric
 from armkin.ik.solutions import Status
 from armkin.ik.tasks import Task
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
-Bool = NDArray[np.bool_]
 
 SOLUTION = 1e-9  # of the reach: what counts as a solution
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion

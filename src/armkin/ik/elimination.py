@@ -43,9 +43,8 @@ from armkin.ik.merge import Answers, concatenate, merge, pack, projection
 from armkin.ik.pencil import Pencil, build
 from armkin.ik.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.ik.roles import Role, roles
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
-Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
 CHUNK = 256  # poses worked on at once: more of them leave the cache

@@ -15,8 +15,8 @@ import numpy as np
 from armkin.ik import line_features
 from armkin.ik.chain import inverse
 from armkin.ik.nudge import nudged
-from armkin.ik.roles import Bool, Role
-from armkin.soa import Array
+from armkin.ik.roles import Role
+from armkin.soa import Array, Bool
 
 # The columns of Q as (b, a).  The five that give the joints back come last: with Q = (orthonormal)(triangle)
 # they follow from the last five rows of the triangle alone.

@@ -50,11 +50,10 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         if len(k):
             better, size = numeric.correct(arm, task, q[k, b, :n], T[k])
             own[k, b] = np.where((size < 1e-12)[:, None], better, np.nan)
-        width = max(int((~np.isnan(own[:, :, 0])).sum(axis=1).max(initial=0)), 1)
-        order = np.argsort(np.isnan(own[:, :, 0]), axis=1, kind="stable")[:, :width]
-        return np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > (~np.isnan(own[:, :, 0])).sum(
-            axis=1
-        )
+        missing = np.isnan(own[:, :, 0])
+        count = (~missing).sum(axis=1)
+        order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
+        return np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > count
 
     return Geometry(
         "general elimination",

@@ -3,13 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.ik.chain import inverse
 from armkin.ik.polish import shrink
-from armkin.soa import Array
-
-Bool = NDArray[np.bool_]
+from armkin.soa import Array, Bool
 
 NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
 

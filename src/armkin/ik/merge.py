@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.ik.polish import pose_error, tip
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
-Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
 SAME = 1e-6  # answers closer than this [rad, scaled length] are one

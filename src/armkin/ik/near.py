@@ -16,7 +16,6 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin import soa
 from armkin.ik import elbow, general, numeric, planar, position, spherical, three_parallel
@@ -26,12 +25,11 @@ from armkin.ik.position import Position
 from armkin.ik.subproblems import Candidates, Pair
 from armkin.ik.tasks import PARALLEL, Task, targets_of
 from armkin.kinematics import fk
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
-Bool = NDArray[np.bool_]
 
 CHUNK = 1024  # poses corrected at once
 ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad

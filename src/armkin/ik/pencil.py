@@ -35,8 +35,8 @@ from numpy.typing import NDArray
 
 from armkin.ik import ends, line_features
 from armkin.ik.ends import Ends
-from armkin.ik.roles import Bool, Role, links_by_part
-from armkin.soa import Array
+from armkin.ik.roles import Role, links_by_part
+from armkin.soa import Array, Bool
 
 # Products of (1, cos q, sin q) with cos(q/2) and sin(q/2), in (cos 3f, sin 3f, cos f, sin f), f = q/2.
 _HALF_ANGLE: Array = 0.5 * np.array(

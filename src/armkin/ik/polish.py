@@ -7,12 +7,9 @@ columns and its origin, so that a constant link is one matrix product and a join
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.ik.nudge import nudged
-from armkin.soa import Array
-
-Bool = NDArray[np.bool_]
+from armkin.soa import Array, Bool
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
 CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower

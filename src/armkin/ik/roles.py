@@ -12,12 +12,9 @@ One of the middle joints m1, m2, m3 is hidden (it becomes the eigenvalue), one d
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.ik.chain import inverse
-from armkin.soa import Array
-
-Bool = NDArray[np.bool_]
+from armkin.soa import Array, Bool
 
 _X = 5  # index of the link of the loop that carries the pose
 

@@ -14,8 +14,7 @@ from armkin.ik.ends import eliminate
 from armkin.ik.nudge import nudged
 from armkin.ik.pencil import Pencil
 from armkin.ik.polish import advance, turn
-from armkin.ik.roles import Bool
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 Int = NDArray[np.int64]
 

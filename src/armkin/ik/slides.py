@@ -13,12 +13,9 @@ are found; the pair is one where B33 is an extreme value of (1).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.ik.line_features import joint_motion
-from armkin.soa import Array
-
-Bool = NDArray[np.bool_]
+from armkin.soa import Array, Bool
 
 
 def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:

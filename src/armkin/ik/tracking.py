@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.ik.tasks import Task
-from armkin.soa import Array
+from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
-Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
 CHUNK = 2048  # targets linked at once
