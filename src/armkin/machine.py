@@ -121,7 +121,7 @@ class Machine:
         image = self.configuration.image.pack()
         piece = self.info.frame - 8
         for offset in range(0, len(image), piece):
-            self._call(partial(_config, at=offset, data=image[offset : offset + piece]))
+            self._call(partial(protocol.config, offset=offset, data=image[offset : offset + piece]))
         self._call(lambda tag: protocol.commit(tag, len(image), self.configuration.image.crc()))
         self._renew()
 
@@ -333,10 +333,6 @@ class _Batch:
 
 
 _DONE = object()
-
-
-def _config(tag: int, at: int, data: bytes) -> bytes:
-    return protocol.config(tag, at, data)
 
 
 def describe(arm: Arm, q: Array) -> str:
