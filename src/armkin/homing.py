@@ -15,6 +15,7 @@ import numpy as np
 
 from armkin import protocol
 from armkin.errors import UsageError
+from armkin.lock import joint_index
 from armkin.pulses import pulses
 
 if TYPE_CHECKING:
@@ -60,8 +61,7 @@ def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) 
     assert arm.file is not None
     joints = arm.file.joints
     for name in names:
-        if name not in arm.joint_names:
-            raise UsageError(f"{arm.name} has no joint {name}; it has {', '.join(arm.joint_names)}")
+        joint_index(arm, name)
     wanted = [j for j, joint in enumerate(joints) if not names or joint.name in names]
     wanted = [j for group in _groups(arm, wanted) for j in group]
     bare = [joints[j].name for j in wanted if joints[j].homing is None]

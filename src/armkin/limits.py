@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,3 +25,18 @@ def outside(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
     """
     values = np.asarray(q, dtype=float)
     return (values < arm.lower - SLACK) | (values > arm.upper + SLACK)
+
+
+def said(arm: Arm, joint: int, value: float) -> str:
+    """A joint outside its limits in words.
+
+    value: [rad | mm].
+
+    >>> import armkin, math
+    >>> said(armkin.load("robots/three_dof.yaml"), 1, math.radians(130))
+    'q2 = 130 deg is outside -20 to 120 deg'
+    """
+    size, unit = (1.0, "mm") if arm.prismatic[joint] else (math.pi / 180, "deg")
+    ends = (arm.lower[joint], arm.upper[joint])
+    low, high = (f"{end / size + 0.0:.10g}" if math.isfinite(end) else "any" for end in ends)
+    return f"{arm.joint_names[joint]} = {value / size:.10g} {unit} is outside {low} to {high} {unit}"

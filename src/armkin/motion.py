@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.kinematics import frames
-from armkin.limits import outside
+from armkin.limits import outside, said
 from armkin.pulses import joints as joints_of
 from armkin.pulses import motor_names, pulses
 from armkin.segments import CLOCK, EASE, MIN_INTERVAL, Counts, Move, line, progress
@@ -150,14 +150,8 @@ def check_limits(arm: Arm, targets: Array) -> None:
     if not np.all(np.isfinite(targets)):
         raise UsageError("joint values must be finite to be sent")
     for row, joint in np.argwhere(outside(arm, targets)):
-        unit = 1.0 if arm.prismatic[joint] else math.pi / 180
-        name, word = arm.joint_names[joint], "mm" if arm.prismatic[joint] else "deg"
-        low, high = arm.lower[joint] / unit, arm.upper[joint] / unit
         which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
-        raise NoSolutionError(
-            f"{which}{name} = {targets[row, joint] / unit:.10g} {word} is outside its limits "
-            f"{low:.10g} to {high:.10g}: nothing was moved"
-        )
+        raise NoSolutionError(f"{which}{said(arm, joint, targets[row, joint])}: nothing was moved")
 
 
 def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, min_interval: int) -> Move:

@@ -109,7 +109,12 @@ def test_ik_branch_chooses() -> None:
     assert every["branches"][every["best"]]["name"] == "left, elbow down"
     outside = run("ik", THREE_DOF, 390, 80, 300, "--branch", "right", "--json")
     assert outside.code == 3
+    assert "'right, elbow up' is outside limits: q1, q2; " in outside.err
     assert outside.json["best"] is None
+    nearest = outside.json["closest"]  # it reaches the target, but not in the way asked for: it says so
+    assert (nearest["branch"], nearest["distance_mm"]) == ("left, elbow up", pytest.approx(0, abs=1e-6))
+    T = armkin.fk(armkin.load(ROOT / THREE_DOF), np.deg2rad(nearest["joints"]))
+    assert T[:3, 3] == pytest.approx([390, 80, 300])
     unknown = run("ik", THREE_DOF, 390, 80, 300, "--branch", "rihgt")
     assert (unknown.code, unknown.out) == (2, "")
     assert "left, elbow up" in unknown.err

@@ -89,6 +89,7 @@ class Goals:
                     "branches_within_limits": legal,
                     "closest": {"distance_mm": nearest.distance},
                 },
+                answer.refused,
             )
         return answer.branches[answer.best].q[None]
 

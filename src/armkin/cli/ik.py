@@ -27,6 +27,7 @@ from armkin.cli.render import fixed
 if TYPE_CHECKING:
     from armkin.arm import Arm
     from armkin.ik.tasks import Task
+    from armkin.soa import Array
 
 
 def ik(
@@ -86,51 +87,84 @@ def ik(
         if tally.unsolved:
             raise render.unsolved_rows(tally)
         return
-    [answer] = _answers(request, what, one_row(inputs.target(what, target)), all_branches, turns, with_closest=True)
+    values = one_row(inputs.target(what, target)).values
+    goal = units.targets_in(what.labels, values)
+    [found] = solving.solve(request, goal)
+    answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None:
-        raise render.unsolved(arm, answer)
+        raise render.unsolved(arm, answer, found.refused)
 
 
 def _answers(
     request: solving.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
 ) -> Iterator[dict[str, Any]]:
-    arm = request.arm
     targets = units.targets_in(task.labels, chunk.values)
     answers = solving.solve(request, targets)
     for values, goal, found in zip(chunk.values.tolist(), targets, answers, strict=True):
-        listed, best = found.branches, found.best
-        if not all_branches:
-            listed, best = ([], None) if best is None else ([listed[best]], 0)
-        answer = {
-            **render.head(arm),
-            "task": task.name,
-            "target": values,
-            "target_labels": task.labels,
-            "near": request.near_out,
-            "status": found.status,
-            "method": found.method,
-            "why": found.why,
-            "complete": found.complete,
-            "joint_units": units.names(arm),
-            "branch_count": len(found.branches),
-            "branches_within_limits": sum(branch.within_limits for branch in found.branches),
-            "branches": [_branch(request, branch, turns) for branch in listed],
-            "best": best,
-            "closest": None,
-            "free_joints": found.free,
+        yield _answer(request, task, values, goal, found, all_branches, turns, with_closest=with_closest)
+
+
+def _answer(
+    request: solving.Request,
+    task: Task,
+    values: list[float],
+    goal: Array,
+    found: solving.Answer,
+    all_branches: bool,
+    turns: bool,
+    *,
+    with_closest: bool,
+) -> dict[str, Any]:
+    arm = request.arm
+    listed, best = found.branches, found.best
+    if not all_branches:
+        listed, best = ([], None) if best is None else ([listed[best]], 0)
+    return {
+        **render.head(arm),
+        "task": task.name,
+        "target": values,
+        "target_labels": task.labels,
+        "near": request.near_out,
+        "status": found.status,
+        "method": found.method,
+        "why": found.why,
+        "complete": found.complete,
+        "joint_units": units.names(arm),
+        "branch_count": len(found.branches),
+        "branches_within_limits": sum(branch.within_limits for branch in found.branches),
+        "branches": [_branch(request, branch, turns) for branch in listed],
+        "best": best,
+        "closest": _closest(request, goal, found) if best is None and with_closest else None,
+        "free_joints": found.free,
+    }
+
+
+def _closest(request: solving.Request, goal: Array, found: solving.Answer) -> dict[str, Any]:
+    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for."""
+    import armkin
+
+    arm = request.arm
+    if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
+        legal = found.branches[0]
+        return {
+            "joints": legal.joints,
+            "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
+            "distance_mm": legal.residual_mm,
+            "angle_deg": legal.residual_deg,
+            "converged": True,
+            "branch": legal.name,
         }
-        if best is None and with_closest:
-            nearest = solving.closest(request, goal)
-            answer["closest"] = {
-                "joints": units.joints_out(arm, nearest.q).tolist(),
-                "position_mm": nearest.position.tolist(),
-                "distance_mm": nearest.distance,
-                "angle_deg": float(units.angles_out(nearest.angle)),
-                "converged": nearest.converged,
-            }
-        yield answer
+    nearest = solving.closest(request, goal)
+    return {
+        "joints": units.joints_out(arm, nearest.q).tolist(),
+        "position_mm": nearest.position.tolist(),
+        "distance_mm": nearest.distance,
+        "angle_deg": float(units.angles_out(nearest.angle)),
+        "converged": nearest.converged,
+        "branch": None,
+    }
 
 
 def _branch(request: solving.Request, branch: solving.Branch, turns: bool) -> dict[str, Any]:

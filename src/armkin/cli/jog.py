@@ -36,11 +36,11 @@ def jog(
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
     itself when this command falls silent, and before the joint limits if the position is known.
     """
+    from armkin.lock import joint_index
+
     arm = inputs.load(robot)
     configuration = linking.configured(arm)
-    if joint not in arm.joint_names:
-        raise UsageError(f"{arm.name} has no joint {joint}; it has {', '.join(arm.joint_names)}")
-    j = arm.joint_names.index(joint)
+    j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")
     if not 0 < time <= _LONGEST:

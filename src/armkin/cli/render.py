@@ -42,9 +42,10 @@ def finite(value: float) -> float | None:
 
 def said(arm: Arm, violation: dict[str, Any]) -> str:
     """One violation in words: ``q2 = 130 deg is outside -20 to 120 deg``."""
-    unit = units.names(arm)[arm.joint_names.index(violation["joint"])]
-    low, high = (short(violation[key]) if violation[key] is not None else "any" for key in ("lower", "upper"))
-    return f"{violation['joint']} = {short(violation['value'])} {unit} is outside {low} to {high} {unit}"
+    from armkin import limits
+
+    joint = arm.joint_names.index(violation["joint"])
+    return limits.said(arm, joint, violation["value"] * (1.0 if arm.prismatic[joint] else units.DEGREE))
 
 
 def to_json(value: Any) -> str:
@@ -113,14 +114,18 @@ def joint_headings(arm: Arm) -> list[str]:
     return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
 
 
-def unsolved(arm: Arm, answer: dict[str, Any]) -> NoSolutionError:
-    """Why there is no best branch, and how far away the nearest legal pose is."""
+def unsolved(arm: Arm, answer: dict[str, Any], refused: str | None = None) -> NoSolutionError:
+    """Why there is no best branch, and how far away the nearest legal pose is.
+
+    refused: why the branch that was asked for will not do.
+    """
     nearest = answer["closest"]
     away = f"the nearest pose within limits is {nearest['distance_mm']:.4f} mm away"
     if answer["status"] == "unreachable":
         return NoSolutionError(f"{arm.name} cannot reach this target; {away}")
-    if answer["branches_within_limits"]:
-        return NoSolutionError("no branch of that name is within limits, but others are: --all-branches lists them")
+    if refused is not None:
+        listed = "ik --all-branches lists all"
+        return NoSolutionError(f"{refused}; {listed if answer['branches_within_limits'] else away}")
     return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
 
 

@@ -61,6 +61,7 @@ class Answer:
     free: list[str]
     branches: list[Branch]  # within limits first, then by motion
     best: int | None
+    refused: str | None = None  # why no branch of the name asked for is the best one
 
 
 def solve(request: Request, targets: Array) -> list[Answer]:
@@ -215,6 +216,9 @@ def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answ
     both = [(branch, branch.name in wanted) for _, answer, wanted in found for branch in answer.branches]
     both.sort(key=lambda item: (not item[0].within_limits, item[0].motion))
     best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
+    refused = None
+    if request.branch is not None and best is None:
+        refused = _refused(request, [branch for branch, named in both if named])
     return Answer(
         first.status,
         first.method,
@@ -223,4 +227,16 @@ def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answ
         sorted({name for _, answer, _ in found for name in answer.free}),
         [branch for branch, _ in both],
         best,
+        refused,
     )
+
+
+def _refused(request: Request, named: Sequence[Branch]) -> str:
+    """What keeps the branches of the name asked for from being taken: all of them are outside limits."""
+    if not named:
+        return f"no branch called '{request.branch}' reaches this target"
+    said: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
+    for branch in named:
+        joints = ", ".join(request.arm.joint_names[i] for i in branch.outside)
+        said.setdefault(branch.name, f"'{branch.name}' is outside limits" + (f": {joints}" if joints else ""))
+    return "; ".join(said.values())

@@ -80,7 +80,9 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             return task, geometry
     usual = default_task(arm)
     hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
-    raise UsageError(f"{arm.name}: task {task.name} does not fit its {arm.n} joints{hint}")
+    locked = arm.file is not None and len(arm.file.joints) > arm.n
+    joints = f"the {arm.n} joints left after --lock" if locked else f"its {arm.n} joints"
+    raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}")
 
 
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
