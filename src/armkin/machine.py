@@ -175,20 +175,27 @@ class Machine:
         Returns the status at the end, where the last plan ends, or raises LinkError.
         """
         end: Counts | None = None
-        total = 0.0
+        total = begun = done = 0.0
 
         def frames() -> Iterator[_Batch | None]:
-            nonlocal end, total
+            nonlocal end, total, begun
             for plan in plans:
                 if plan is None:
                     yield None
                     continue
                 total += plan.duration
                 for move in plan.moves:
-                    yield from self._batches(move, self.configuration.axes, plan.clock)
+                    for batch in self._batches(move, self.configuration.axes, plan.clock):
+                        begun += batch.seconds
+                        yield batch
                 end = plan.end
 
-        self._stream(frames(), lambda left: progress(max(total - left, 0.0), total))
+        def tell(left: float) -> None:
+            nonlocal done
+            done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
+            progress(done, total)
+
+        self._stream(frames(), tell)
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "

@@ -40,6 +40,7 @@ def test_the_first_command_just_works() -> None:
     assert "-10144" in done.out
     assert "5667" in done.out
     assert "starts with the arm in its home pose" in done.err
+    assert done.out.endswith("read back: as planned, 1.975 s\n")
 
 
 def test_json_tells_plan_and_arrival() -> None:
@@ -169,7 +170,7 @@ def test_nothing_to_send_and_a_terminal_as_input() -> None:
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        ((THREE_DOF, 0, 130, 0, "--port", "sim"), 3, "q2 = 130 deg is outside its limits -20 to 120"),
+        ((THREE_DOF, 0, 130, 0, "--port", "sim"), 3, "q2 = 130 deg is outside -20 to 120 deg"),
         ((THREE_DOF, 0, 90, "--port", "sim"), 2, "takes 3 numbers"),
         ((THREE_DOF, *POSE), 2, "--port is missing"),
         ((THREE_DOF, *POSE, "--port", "/dev/ttyNOWHERE"), 5, "there is no port /dev/ttyNOWHERE"),
@@ -251,6 +252,7 @@ def test_grip() -> None:
     closed = run("grip", THREE_DOF, "closed", "--port", "sim", "--json")
     assert closed.json["counts"] == 1833
     assert run("grip", THREE_DOF, 75, "--port", "sim", "--json").json["counts"] == 1333
+    assert run("grip", THREE_DOF, 30, "--port", "sim").out == "gripper: 29.97 deg (833 us)\n"
     assert run("grip", THREE_DOF, 130, "--port", "sim").code == 2
     assert "has no max_speed" in run("grip", "robots/planar_2dof.yaml", "open", "--port", "sim").err
 

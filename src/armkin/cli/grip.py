@@ -13,6 +13,7 @@ from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
+    from armkin.arm import Arm
     from armkin.configuration import Configuration, Grip
     from armkin.machine import Machine
 
@@ -59,10 +60,11 @@ def grip(
             machine.run_axis(move, gripper.axis, board.clock)
         at = machine.status.counts[gripper.axis]
     if at != target:
-        raise LinkError(f"the gripper stands at {at} instead of {target} counts: please report this as a bug")
+        there, wanted = _said(arm, gripper, at), _said(arm, gripper, target)
+        raise LinkError(f"the gripper stands at {there} instead of {wanted}: please report this as a bug")
     found: dict[str, Any] = {**render.head(arm), "port": port, "gripper": gripper.value(at), "counts": at}
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else f"gripper: {gripper.value(at):.10g} ({at} counts)\n")
+        write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
 
 
 def _gripper(name: str, configuration: Configuration) -> Grip:
@@ -73,6 +75,14 @@ def _gripper(name: str, configuration: Configuration) -> Grip:
         if rate is None:
             raise UsageError(f"the gripper has no {key}: motion needs one; add {key}: to gripper:")
     return gripper
+
+
+def _said(arm: Arm, gripper: Grip, count: int) -> str:
+    """A count in words: ``29.97 deg (833 us)``."""
+    drive = None if arm.file is None else arm.file.gripper
+    assert drive is not None
+    unit = "deg" if drive.lead is None else "mm"
+    return f"{render.short(gripper.value(count))} {unit} ({count} {'us' if drive.kind == 'servo' else 'steps'})"
 
 
 def _count(gripper: Grip, text: str, what: str) -> int:

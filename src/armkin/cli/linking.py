@@ -28,6 +28,7 @@ AssumeHome = Annotated[
     ),
 ]
 BAUD = 250_000
+_AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
 
 class Stop:
@@ -64,8 +65,13 @@ def stoppable() -> Iterator[Stop]:
 
 
 @contextmanager
-def machine(arm: Arm, configuration: Configuration, port: str, baud: int) -> Iterator[Machine]:
-    """The arm on the board behind a port, given back at the end; a signal stops the arm first."""
+def machine(
+    arm: Arm, configuration: Configuration, port: str, baud: int, *, simulated: str = _AT_HOME
+) -> Iterator[Machine]:
+    """The arm on the board behind a port, given back at the end; a signal stops the arm first.
+
+    simulated: what to say of a board in this process.
+    """
     from armkin.link import open_port
     from armkin.machine import Machine
     from armkin.session import StoppedError
@@ -74,7 +80,7 @@ def machine(arm: Arm, configuration: Configuration, port: str, baud: int) -> Ite
         link = open_port(port, board=configuration.board, baud=baud)
         try:
             if link.simulated:
-                output.note("the simulated board starts with the arm in its home pose, and forgets all at the end")
+                output.note(simulated)
             one = Machine(link, arm, configuration, stop)
             try:
                 yield one

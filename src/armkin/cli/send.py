@@ -93,14 +93,17 @@ def send(
         planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
             source: Iterable[Plan | None] = goals.plans(planner.plan, began)
+            whole = None  # how many rows will come is not known
         else:
-            source = _all(planner, goals, began)  # every refusal before anything moves
-            _write_trace(arm, source, trace)
-        with output.progress("ms of motion", None) as tick:
-            machine.run(planner.noted(source), lambda done, total: tick(round(1000 * done)))
-        found = {**planner.summary(planner.done, began), "port": port, **linking.where(machine)}
+            source = plans = _all(planner, goals, began)  # every refusal before anything moves
+            _write_trace(arm, plans, trace)
+            whole = round(1000 * sum(plan.duration for plan in plans))
+        with output.progress("ms of motion", whole) as tick:
+            machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
+        planned = planner.summary(planner.done, began)
+        found = {**planned, "port": port, **linking.where(machine)}
     with output.destination(None) as write:
-        write(render.to_json({**render.head(arm), **found}) + "\n" if json else linking.where_text(arm, found))
+        write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
 
@@ -206,6 +209,22 @@ def _write_trace(arm: Arm, plans: Sequence[Plan], path: str | None) -> None:
             )
             write("".join(csv_line([time, *joints, *where]) + "\n" for time, joints, where in rows))
             began += plan.duration
+
+
+def _arrived(arm: Arm, planned: dict[str, Any], found: dict[str, Any]) -> str:
+    """Where the arm stands, and whether that is where the plan ends."""
+    text = linking.where_text(arm, found)
+    if found["pulses"] is None:
+        return text
+    off = [
+        f"{name} {there - here:+d} {unit}"
+        for name, unit, here, there in zip(
+            found["motors"], found["pulse_units"], planned["pulses"], found["pulses"], strict=True
+        )
+        if there != here
+    ]
+    differs = f"not as planned: {', '.join(off)}" if off else "as planned"
+    return f"{text}read back: {differs}, {found['duration_s']:.3f} s\n"
 
 
 def _text(arm: Arm, found: dict[str, Any]) -> str:

@@ -19,7 +19,8 @@ def status(robot: Robot, port: PortName, baud: Baud = linking.BAUD, json: Json =
     still keeps its position.)
     """
     arm = inputs.load(robot)
-    with linking.machine(arm, linking.configured(arm), port, baud) as machine:
+    new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
+    with linking.machine(arm, linking.configured(arm), port, baud, simulated=new) as machine:
         found = _found(machine)
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else linking.where_text(arm, found) + _text(found))
