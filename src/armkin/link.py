@@ -25,6 +25,7 @@ BAUD = 250_000
 SIM = "sim"
 
 _READ = 0.005  # [s] a read waits at most
+_MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
 
 
 class Port(Protocol):
@@ -117,8 +118,8 @@ class SerialPort:
 
     def _read_some(self) -> bytes:
         data: bytes = self._serial.read(1)
-        while data and (waiting := self._serial.in_waiting):
-            more: bytes = self._serial.read(waiting)
+        while 0 < len(data) < _MOST and (waiting := self._serial.in_waiting):
+            more: bytes = self._serial.read(min(waiting, _MOST))
             if not more:
                 break
             data += more

@@ -287,6 +287,27 @@ def test_ports_and_stop() -> None:
 # ---- behind a terminal, in real time
 
 
+def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One read gives back what it has; the clock and Ctrl-C are looked at between reads."""
+    from armkin.link import SerialPort
+
+    class Flood:
+        in_waiting, given = 1000, 0
+
+        def read(self, size: int) -> bytes:
+            self.given += size
+            assert self.given < 100_000, "one read does not come to an end"
+            return b"A" * size
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr("armkin.link._open_serial", lambda name, baud: Flood())
+    port = SerialPort("flood")
+    assert len(port.read(0.1)) >= 1000
+    port.close()
+
+
 @pytest.fixture
 def board() -> Iterator[PtyBoard]:
     with PtyBoard() as one:
