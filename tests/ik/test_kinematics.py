@@ -1,0 +1,55 @@
+"""Forward kinematics, frames and Jacobian of every arm against products of exponentials."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from checks import random_joints
+from oracle import forward, forward_and_jacobian, screws
+
+import armkin
+
+ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*.yaml"))
+POSES = 10_000
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
+    arm = armkin.load(path)
+    screw = screws(arm.file)
+    q = random_joints(arm, POSES, 6)
+    T, J = armkin.fk(arm, q), armkin.jacobian(arm, q)
+    expected, jacobian = forward_and_jacobian(screw, q)
+    assert np.abs(T - expected).max() < 1e-9
+    assert np.abs(J - jacobian).max() < 1e-9
+    assert np.abs(T[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2) - np.eye(3)).max() < 1e-14
+    one = np.array([armkin.fk(arm, row) for row in q[:50]])
+    assert np.abs(one - expected[:50]).max() < 1e-9
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+def test_frames_begin_at_the_base_and_end_at_the_tool(path: Path) -> None:
+    arm = armkin.load(path)
+    q = random_joints(arm, 200, 7)
+    frames = armkin.frames(arm, q)
+    assert frames.shape == (200, arm.n + 2, 4, 4)
+    assert np.array_equal(frames[:, 0], np.broadcast_to(arm.base, (200, 4, 4)))
+    assert np.abs(frames[:, -1] - forward(screws(arm.file), q)).max() < 1e-9
+
+
+def test_the_jacobian_is_the_derivative() -> None:
+    arm = armkin.load(ROBOTS[0].parent / "stanford.yaml")
+    q = random_joints(arm, 20, 8)
+    J, h = armkin.jacobian(arm, q), 1e-6
+    for i in range(arm.n):
+        step = np.eye(arm.n)[i] * h
+        slope = (armkin.fk(arm, q + step)[:, :3, 3] - armkin.fk(arm, q - step)[:, :3, 3]) / (2 * h)
+        assert np.abs(slope - J[:, :3, i]).max() < 1e-5
+
+
+def test_manipulability_and_condition_tell_a_singularity() -> None:
+    arm = armkin.load(ROBOTS[0].parent / "puma560.yaml")
+    regular, singular = np.radians([10, 20, 30, 40, 50, 60]), np.radians([10, 20, 30, 40, 0, 60])
+    assert armkin.manipulability(arm, regular) > 1e6
+    assert armkin.manipulability(arm, singular) < 1e-6
+    assert armkin.condition(arm, regular) < 100 < 1e12 < armkin.condition(arm, singular)
