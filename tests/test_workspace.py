@@ -134,6 +134,14 @@ def test_volume_of_a_surface_is_nothing(arm: Arm, dimensions: int, why: str) -> 
     assert (size.dimensions, size.value, size.error, size.method) == (dimensions, 0.0, 0.0, why)
 
 
+@pytest.mark.parametrize("degrees", [1e-300, 1e-9, 1e-8, 1e-7, 1e-6])
+def test_volume_of_an_arm_that_hardly_moves_is_next_to_nothing(degrees: float) -> None:
+    """Its section is narrower than floats can tell apart; no warning (they are errors here)."""
+    tight = np.deg2rad([-degrees, degrees])
+    size = extent(chain(np.eye(4), TURN_X, along(200), along(300), kinds="RRR", limits=[tight] * 3))
+    assert 0.0 <= size.value < 1e-6
+
+
 def test_volume_is_repeatable() -> None:
     assert extent(PLANAR, seed=5) == extent(PLANAR, seed=5)
 

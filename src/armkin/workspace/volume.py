@@ -102,7 +102,7 @@ def motion(arm: Arm) -> tuple[Array | None, int]:
     """The normal of the plane that the tip moves in (None: space), and the tip's freedoms."""
     low, high = span(arm)
     q = low + (high - low) * np.random.default_rng(1).random((64, arm.n))
-    J = jacobian(arm, q)[:, :3] * np.where(arm.prismatic, high - low, 1.0)
+    J = jacobian(arm, q)[:, :3] * (high - low)  # [mm] over a joint's whole range
     tolerance = 1e-9 * arm.reach
     freedoms = int((np.linalg.svd(J, compute_uv=False) > tolerance).sum(axis=-1).max())
     directions, sizes, _ = np.linalg.svd(np.moveaxis(J, 1, 0).reshape(3, -1), full_matrices=False)
@@ -161,7 +161,8 @@ class _Cells:
             side = 1 << (min(side, math.isqrt((1 << 20) // count)).bit_length() - 1)
         self.shape = (side,) * len(low)
         self.low, self.high = low, high
-        self.size = (high - low) / side
+        # Not below what floats can tell apart: an arm may hardly move.
+        self.size = np.maximum((high - low) / side, np.spacing(np.maximum(np.abs(low), np.abs(high))))
         cells = math.prod(self.shape) * count
         self.start_low = np.full(cells, np.inf)
         self.start_high = np.full(cells, -np.inf)
