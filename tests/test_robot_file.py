@@ -47,7 +47,7 @@ def test_hostile_file_is_refused_in_the_reviewed_words(name: str) -> None:
     assert text == snapshots()[f"[{name}]"]
     assert text.count("\n") <= 1, "one line, or two"
     assert all(len(line) <= 240 for line in text.splitlines())
-    assert seconds < 0.5  # 0.03 s at most on an idle machine
+    assert seconds < 2  # 0.03 s at most on an idle machine
 
 
 def test_every_snapshot_belongs_to_a_case() -> None:
