@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.kinematics import one_pose
+from armkin.limits import SLACK
 from armkin.soa import Array, Entry
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
 TURN = 2 * np.pi
-SLACK = 1e-9  # [rad | mm] a joint this far outside still counts as on its limit
 
 
 def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
@@ -25,7 +25,10 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     whether they are within [lower, upper]; where no copy is, the principal value.
     """
     if lower >= -np.pi and upper <= np.pi:
-        # the principal value is the only one that can be legal
+        # the principal value is the only one that can be legal, but for half a turn where both its copies are
+        if upper - lower > TURN - SLACK and (half := np.abs(value) > np.pi - SLACK).any():
+            other = value - np.copysign(TURN, value)
+            value = np.where(half & (np.abs(other - near) < np.abs(value - near)), other, value)
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     principal = value
     if not (isinstance(near, float) and near == 0.0):
