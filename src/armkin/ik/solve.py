@@ -16,19 +16,18 @@ from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik import edges
 from armkin.ik.geometry import Geometry, solver
-from armkin.ik.limits import SLACK, nearest_copy, nearest_row
+from armkin.ik.limits import nearest_copy, nearest_row
 from armkin.ik.names import branch_names
 from armkin.ik.solutions import Solutions, Status
 from armkin.ik.subproblems import Pair, Prefer, distance2, spin
 from armkin.ik.tasks import Task, read_targets
 from armkin.ik.tracking import follow
-from armkin.soa import Array, Entry
+from armkin.limits import SLACK
+from armkin.soa import Array, Bool, Entry
 from armkin.straight import Straight
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
-
-Bool = NDArray[np.bool_]
 
 ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
 ACCEPTED_MM = 5e-10  # and as a length
@@ -119,16 +118,15 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
     """Closed forms: chunks of poses that stay in the cache, entry by entry."""
     out: _Out | None = None
     runner = _runner(arm, task, geometry)
-    link = runner.link
     straight = runner.get(len(target))
     workspace: list[NDArray[np.generic]] = []
     for start in range(0, max(len(target), 1), soa.CHUNK):
         rows = slice(start, start + soa.CHUNK)
-        goal = target[rows]
+        goal, close = target[rows], near[rows] if one is None else one
         N = len(goal)
         entries = _entries(task, goal)
         if straight is None:
-            *values, miss, doubt = _candidates(arm, task, geometry, link, entries, _prefer(arm, near[rows], one))
+            *values, miss, doubt = runner.candidates(entries, _prefer(arm, close))
         elif N == 1:
             *values, miss, doubt = straight.single([float(e[0]) for e in entries])
         else:
@@ -137,41 +135,51 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
             *values, miss, doubt = straight.run(entries, workspace)
         shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))
         B = int(np.prod(shape[:-1]))
-        miss = np.broadcast_to(miss, shape).reshape(B, N)
-        valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
         if out is None:
             out = _empty(len(target), B, arm.n)
-        part = out.part(rows)
         if N == 0:
             break
-        within: Bool = valid.reshape(shape)
-        grid = np.moveaxis(part.q.reshape(N, *shape[:-1], arm.n), 0, -2)  # the branch axes in front of the poses
-        for i in range(arm.n):
-            value, inside = _legal(arm, i, values[i], near[rows] if one is None else one)
-            grid[..., i] = value
-            if inside is not True:
-                within = within & inside
-        part.valid[...] = valid.T
-        part.within[...] = within.reshape(B, N).T
-        part.branch[...] = np.arange(B, dtype=np.int8)
-        full = bool(valid.all())
-        count = np.full(N, B) if full else valid.sum(axis=0)
+        part = out.part(rows)
+        miss = np.broadcast_to(miss, shape).reshape(B, N)
+        valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
+        _fill(arm, part, values, valid.reshape(shape), close)
+        count = np.full(N, B) if valid.all() else valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE
-        edge = np.any(np.broadcast_to(doubt, np.broadcast_shapes(np.shape(doubt), (1, 1, 1, N))), axis=(0, 1, 2))
-        if not full:
-            edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
-        doubtful = np.flatnonzero(edge)
+        doubtful = _doubtful(miss, valid, doubt)
         if len(doubtful) and straight is not None:
             # again, with the preferred values for joints that are free
-            again = _candidates(
-                arm, task, geometry, link, _entries(task, goal[doubtful]), _prefer(arm, near[rows][doubtful], one)
+            again = runner.candidates(
+                _entries(task, goal[doubtful]), _prefer(arm, close[doubtful] if one is None else one)
             )
-            few = (*shape[:-1], len(doubtful))
             for i in range(arm.n):
-                part.q[doubtful, :, i] = np.broadcast_to(again[i], few).reshape(B, -1).T
+                few = np.broadcast_to(again[i], (*shape[:-1], len(doubtful)))
+                part.q[doubtful, :, i] = few.reshape(B, -1).T
         _tidy(arm, task, part, goal, near[rows], doubtful, count < B)
     assert out is not None
     return out
+
+
+def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) -> None:
+    """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
+    *axes, N = valid.shape
+    grid = np.moveaxis(part.q.reshape(N, *axes, arm.n), 0, -2)  # the branch axes in front of the poses
+    within = valid
+    for i in range(arm.n):
+        grid[..., i], inside = _legal(arm, i, values[i], close)
+        if inside is not True:
+            within = within & inside
+    part.valid[...] = valid.reshape(-1, N).T
+    part.within[...] = within.reshape(-1, N).T
+    part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
+
+
+def _doubtful(miss: Array, valid: Bool, doubt: Entry) -> NDArray[np.intp]:
+    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there; miss: (B, N)."""
+    shape = np.broadcast_shapes(np.shape(doubt), (1, 1, 1, miss.shape[1]))
+    edge = np.any(np.broadcast_to(doubt, shape), axis=(0, 1, 2))
+    if not valid.all():
+        edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
+    return np.flatnonzero(edge)
 
 
 def _entries(task: Task, goal: Array) -> list[Entry]:
@@ -179,9 +187,9 @@ def _entries(task: Task, goal: Array) -> list[Entry]:
     return soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
 
 
-def _prefer(arm: Arm, near: Array, one: Array | None) -> list[Pair]:
-    """What a free joint is given: near (N, n), or one (n,) for all."""
-    values = list(one) if one is not None else list(np.ascontiguousarray(near.T))
+def _prefer(arm: Arm, close: Array) -> list[Pair]:
+    """What a free joint is given: close (N, n), or (n,) for all."""
+    values = list(np.ascontiguousarray(close.T))
     return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
 
 
@@ -196,39 +204,31 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
     return value, (value >= lower - SLACK) & (value <= upper + SLACK)
 
 
-def _candidates(
-    arm: Arm, task: Task, geometry: Geometry, link: list[soa.Pose], goal: list[Entry], prefer: Prefer
-) -> list[Entry]:
-    """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
-    assert geometry.pairs is not None
-    found = geometry.pairs(goal, prefer)
-    miss = _miss(arm, task, link, found.pairs, goal) if found.miss is None else found.miss
-    values = found.values()
-    if len(task.sums):
-        miss = np.maximum(miss, _sum_miss(task, values, goal))
-    return [*values, miss, found.doubt]
-
-
 class _Runner:
-    """Records the candidates' formula as straight-line code once that pays: it takes some milliseconds."""
+    """A geometry's formula, recorded as straight-line code once that pays: it takes some milliseconds."""
 
     def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
-        self.what = (arm, task, geometry)
+        self.arm, self.task, self.geometry = arm, task, geometry
         self.link = [soa.constant(L) for L in arm.link]
         self.calls = 0
         self.straight: Straight | None = None
 
+    def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
+        """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
+        assert self.geometry.pairs is not None
+        found = self.geometry.pairs(goal, prefer)
+        miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
+        values = found.values()
+        if len(self.task.sums):
+            miss = np.maximum(miss, _sum_miss(self.task, values, goal))
+        return [*values, miss, found.doubt]
+
     def get(self, batch: int) -> Straight | None:
-        arm, task, geometry = self.what
+        """The recorded code, if there is any or this batch makes it worth while."""
         self.calls += 1
-        if self.straight is None and geometry.straight and (batch >= 64 or self.calls > 4):
-            link = self.link
-            inputs = 12 if task.orientation == "full" else len(task.labels)
-
-            def formula(goal: list[Entry]) -> list[Entry]:
-                return _candidates(arm, task, geometry, link, goal, [None] * arm.n)
-
-            self.straight = Straight(formula, inputs)
+        if self.straight is None and self.geometry.straight and (batch >= 64 or self.calls > 4):
+            inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
+            self.straight = Straight(lambda goal: self.candidates(goal, [None] * self.arm.n), inputs)
         return self.straight
 
 
