@@ -36,7 +36,7 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         low, high = float(np.min(near)) - np.pi, float(np.max(near)) + np.pi
     else:
         low, high = -np.pi, np.pi
-    if lower == -np.inf and upper == np.inf:
+    if lower <= low and upper >= high:
         return value, True
     below, above = value < lower - SLACK, value > upper + SLACK
     # another copy can only help if the limits reach beyond the turn around `near`
