@@ -26,7 +26,8 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     """
     if lower >= -np.pi and upper <= np.pi:
         # the principal value is the only one that can be legal, but for half a turn where both its copies are
-        if upper - lower > TURN - SLACK and (half := np.abs(value) > np.pi - SLACK).any():
+        wide = upper - lower > TURN - SLACK and not (isinstance(near, float) and near == 0.0)
+        if wide and (half := np.abs(value) > np.pi - SLACK).any():
             other = value - np.copysign(TURN, value)
             value = np.where(half & (np.abs(other - near) < np.abs(value - near)), other, value)
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
 ACCEPTED_MM = 5e-10  # and as a length
+BLOCK = 512  # poses whose rows are written joint by joint while they are in the cache
 NEARBY = 1e-6  # residual up to which a candidate is worth correcting
 
 
@@ -163,11 +164,16 @@ def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) 
     """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
     *axes, N = valid.shape
     grid = np.moveaxis(part.q.reshape(N, *axes, arm.n), 0, -2)  # the branch axes in front of the poses
-    within = valid
+    within, legal = valid, []
     for i in range(arm.n):
-        grid[..., i], inside = _legal(arm, i, values[i], close)
+        value, inside = _legal(arm, i, values[i], close)
+        legal.append(np.broadcast_to(value, valid.shape))
         if inside is not True:
             within = within & inside
+    for start in range(0, N, BLOCK):
+        some = slice(start, start + BLOCK)
+        for i, value in enumerate(legal):
+            grid[..., some, i] = value[..., some]
     part.valid[...] = valid.reshape(-1, N).T
     part.within[...] = within.reshape(-1, N).T
     part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)

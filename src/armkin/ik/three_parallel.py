@@ -138,13 +138,11 @@ class ThreeParallel:
         c23, s23 = _together(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, soa.mul(self.sense4, s * c23 - c * s23))
         doubt = doubt1 | doubt5 | doubt6 | doubt23
-        # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, its x
-        # axis, and the common direction
+        # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
+        # common direction; about that joint 4 takes whatever angle is left
         reached = spin(*second, self.two_link.reach(third))
         miss = distance2(reached, p[:2]) + (p[2] - self.height4) ** 2
         miss = miss * (1.0 / self.reach**2)
-        c234, s234 = _together(Pair(c23, s23), fourth, self.sense4)
-        miss = miss + distance2([c234, s234], [c, s]) + x[2] * x[2]
         along = soa.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         miss = miss + distance2(along, [0.0, 0.0, self.sense4])
         return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
