@@ -141,7 +141,7 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         if N == 0:
             break
         part = out.part(rows)
-        miss = np.broadcast_to(miss, shape).reshape(B, N)
+        miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
         valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
         _fill(arm, part, values, valid.reshape(shape), close)
         count = np.full(N, B) if valid.all() else valid.sum(axis=0)
@@ -163,17 +163,17 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
 def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) -> None:
     """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
     *axes, N = valid.shape
-    grid = np.moveaxis(part.q.reshape(N, *axes, arm.n), 0, -2)  # the branch axes in front of the poses
+    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
     within, legal = valid, []
     for i in range(arm.n):
         value, inside = _legal(arm, i, values[i], close)
-        legal.append(np.broadcast_to(value, valid.shape))
+        legal.append(value)
         if inside is not True:
             within = within & inside
     for start in range(0, N, BLOCK):
         some = slice(start, start + BLOCK)
         for i, value in enumerate(legal):
-            grid[..., some, i] = value[..., some]
+            grid[..., some, i] = value[..., some] if np.shape(value)[-1:] == (N,) else value
     part.valid[...] = valid.reshape(-1, N).T
     part.within[...] = within.reshape(-1, N).T
     part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
@@ -181,9 +181,12 @@ def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) 
 
 def _doubtful(miss: Array, valid: Bool, doubt: Entry) -> NDArray[np.intp]:
     """Which targets are on an edge: those in doubt, and those with a branch that is nearly there; miss: (B, N)."""
+    full = bool(valid.all())
+    if full and not np.any(doubt):
+        return np.empty(0, np.intp)
     shape = np.broadcast_shapes(np.shape(doubt), (1, 1, 1, miss.shape[1]))
     edge = np.any(np.broadcast_to(doubt, shape), axis=(0, 1, 2))
-    if not valid.all():
+    if not full:
         edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
     return np.flatnonzero(edge)
 
