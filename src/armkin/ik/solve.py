@@ -76,7 +76,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
     if not np.isfinite(close).all():
         raise UsageError("near holds nan or infinity; every joint value must be finite")
-    each = close.reshape(-1, arm.n) if close.ndim > 1 else np.broadcast_to(close, (len(target), arm.n))
+    many = close.ndim == 1 and len(target) != 1
+    each = np.broadcast_to(close, (len(target), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
         out = _closed(arm, definition, geometry, target, each, one)
@@ -90,7 +91,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         arm=arm,
         task=definition,
         target=target.reshape(lead + target.shape[1:]),
-        near=np.broadcast_to(close, (*lead, arm.n)),
+        near=close if close.shape == (*lead, arm.n) else np.broadcast_to(close, (*lead, arm.n)),
         q=out.q.reshape(*each_branch, arm.n),
         valid=out.valid.reshape(each_branch),
         within_limits=out.within.reshape(each_branch),
