@@ -180,6 +180,12 @@ def write(P: Pose, out: Array) -> None:
     out[..., 3, 3] = 1.0
 
 
+def read_one(T: Array) -> Pose:
+    """The entries of one pose (4, 4) as floats."""
+    rows = T.tolist()
+    return [rows[row][column] for column in range(4) for row in range(3)]
+
+
 def read(T: Array) -> Pose:
     """The entries of ``T (N, 4, 4)`` as contiguous arrays of length N."""
     flat = np.ascontiguousarray(T[:, :3, :].reshape(len(T), 12).T)

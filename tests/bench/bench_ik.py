@@ -76,20 +76,21 @@ def peer_job(tool: str | None, arm: armkin.Arm, T: np.ndarray) -> tuple[str, Cal
         except ImportError:
             return None
         rows = [j.dh for j in arm.file.joints]
-        robot = DhRobot(*(np.array([getattr(r, k) for r in rows]) * f for k, f in (("alpha", np.pi / 180), ("a", 1e-3), ("d", 1e-3))))
-        poses = [p for p in _metres(arm, T)]
+        alpha, a, d = (np.array([getattr(r, key) for r in rows]) for key in ("alpha", "a", "d"))
+        robot = DhRobot(np.radians(alpha), a * 1e-3, d * 1e-3)
+        poses = list(_metres(T))
         return "EAIK", lambda: robot.IK_batched(poses, 1), len(poses)
     if tool == "ssik":
         try:
             from ssik.prebuilt.kinova import jaco2_ik
         except ImportError:
             return None
-        poses = _metres(arm, T)[:300]
+        poses = _metres(T)[:300]
         return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in poses], len(poses)
     return None
 
 
-def _metres(arm: armkin.Arm, T: np.ndarray) -> np.ndarray:
+def _metres(T: np.ndarray) -> np.ndarray:
     out = T.copy()
     out[:, :3, 3] *= 1e-3
     return out
@@ -108,7 +109,7 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=10_000)
     parser.add_argument("--only", help="one robot")
     args = parser.parse_args()
-    print("| arm | task | method | hit % | branches | batch us/pose | one pose us | peer | peer us/pose | times faster |")
+    print("| arm | task | method | hit % | branches | us/pose | one pose us | peer | its us/pose | times faster |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for name, task_name, tool in ROWS:
         if args.only and name != args.only:

@@ -126,15 +126,15 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         rows = slice(start, start + soa.CHUNK)
         goal, close = target[rows], near[rows] if one is None else one
         N = len(goal)
-        entries = _entries(task, goal)
         if straight is None:
-            *values, miss, doubt = runner.candidates(entries, _prefer(arm, close))
+            *values, miss, doubt = runner.candidates(_entries(task, goal), _prefer(arm, close))
         elif N == 1:
-            *values, miss, doubt = straight.single([float(e[0]) for e in entries])
+            one_goal = soa.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()
+            *values, miss, doubt = straight.single(one_goal)
         else:
             if not workspace or workspace[-1].shape[-1] != N:
                 workspace = straight.workspace(N)
-            *values, miss, doubt = straight.run(entries, workspace)
+            *values, miss, doubt = straight.run(_entries(task, goal), workspace)
         shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))
         B = int(np.prod(shape[:-1]))
         if out is None:

@@ -154,13 +154,10 @@ def _rotation_check() -> Straight:
 
 def _are_rotations(T: Array) -> bool:
     """Whether (N, 4, 4) hold rotations to 1e-6."""
-    check, entries = _rotation_check(), soa.read(T)
-    worst: Sequence[Any]
+    check = _rotation_check()
     if len(T) == 1:
-        worst = check.single([float(e[0]) for e in entries])
-    else:
-        worst = check.run(entries, check.workspace(len(T)))[:1]
-    return bool(worst[0].max(initial=0.0) <= 1e-6)
+        return bool(check.single(soa.read_one(T[0]))[0] <= 1e-6)
+    return bool(check.run(soa.read(T), check.workspace(len(T)))[0].max(initial=0.0) <= 1e-6)
 
 
 def targets_of(task: Task, T: Array, q: Array) -> Array:
