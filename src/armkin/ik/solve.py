@@ -6,6 +6,7 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `e
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -135,8 +136,9 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
             if not workspace or workspace[-1].shape[-1] != N:
                 workspace = straight.workspace(N)
             *values, miss, doubt = straight.run(_entries(task, goal), workspace)
-        shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))
-        B = int(np.prod(shape[:-1]))
+        if runner.axes is None:
+            runner.axes = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))[:-1]
+        shape, B = (*runner.axes, N), math.prod(runner.axes)
         if out is None:
             out = _empty(len(target), B, arm.n)
         if N == 0:
@@ -145,9 +147,12 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
         valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
         _fill(arm, part, values, valid.reshape(shape), close)
-        count = np.full(N, B) if valid.all() else valid.sum(axis=0)
+        full = bool(valid.all())
+        doubtful = _doubtful(miss, valid, doubt, full)
+        if full and not len(doubtful):
+            continue
+        count = valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE
-        doubtful = _doubtful(miss, valid, doubt)
         if len(doubtful) and straight is not None:
             # again, with the preferred values for joints that are free
             again = runner.candidates(
@@ -180,9 +185,11 @@ def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) 
     part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
 
 
-def _doubtful(miss: Array, valid: Bool, doubt: Entry) -> NDArray[np.intp]:
-    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there; miss: (B, N)."""
-    full = bool(valid.all())
+def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
+    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
+
+    miss, valid: (B, N); full: valid everywhere.
+    """
     if full and not np.any(doubt):
         return np.empty(0, np.intp)
     shape = np.broadcast_shapes(np.shape(doubt), (1, 1, 1, miss.shape[1]))
@@ -222,6 +229,7 @@ class _Runner:
         self.link = [soa.constant(L) for L in arm.link]
         self.calls = 0
         self.straight: Straight | None = None
+        self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
         """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
