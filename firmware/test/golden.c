@@ -49,8 +49,8 @@ static void expect(const char *hex) {
     }
 }
 
-static void talk(const char *path) {
-    char line[4096];
+// A vector file, read from its first line by a board that has just been powered.
+static FILE *begin(const char *path) {
     FILE *file = fopen(path, "r");
     if (!file) {
         perror(path);
@@ -59,6 +59,12 @@ static void talk(const char *path) {
     where = path;
     line_number = 0;
     bench_power();
+    return file;
+}
+
+static void talk(const char *path) {
+    char line[4096];
+    FILE *file = begin(path);
     while (fgets(line, sizeof line, file)) {
         uint8_t bytes[2048], mask[2048];
         line_number++;
@@ -93,14 +99,7 @@ static void talk(const char *path) {
 // frames.txt: what the board sends must be byte for byte what is written there.
 static void frames(const char *path) {
     char line[4096];
-    FILE *file = fopen(path, "r");
-    if (!file) {
-        perror(path);
-        exit(2);
-    }
-    where = path;
-    line_number = 0;
-    bench_power();
+    FILE *file = begin(path);
     int seen = 0;
     while (fgets(line, sizeof line, file)) {
         line_number++;

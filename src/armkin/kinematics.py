@@ -78,7 +78,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Array:
 
 
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
-    """Yoshikawa's measure ``sqrt(det(J J^T))``, or ``|det J|`` products of singular values.
+    """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
 
     q: (..., n) [rad | mm]; rows: which rows of the Jacobian count, by default the linear
     ones for arms of up to three joints and all six otherwise. Returns (...). Lengths are in

@@ -1,6 +1,6 @@
 """Tasks: what a target prescribes, and which task fits an arm.
 
-Every task is a choice of four kinds of constraints:
+Every task is a choice of three kinds of constraints:
 
 - coordinates of the tool's position (`position`: 2 for planar arms, else 3),
 - sums of joint values modulo a turn (`sums`: theta, phi, yaw, roll),
@@ -73,17 +73,7 @@ def task_for(arm: Arm, name: str | None = None) -> Task:
         )
     if name not in LABELS:
         raise UsageError(f"unknown task '{name}'; tasks are {', '.join(LABELS)}")
-    build = {
-        "xy": _planar,
-        "xy_theta": _planar,
-        "xyz": _free,
-        "xyz_pitch": _pitch,
-        "xyz_pitch_roll": _pitch,
-        "xyz_yaw": _yaw,
-        "xyz_axis": _free,
-        "pose": _free,
-    }[name]
-    task = build(arm, name)
+    task = _BUILDERS[name](arm, name)
     if isinstance(task, str):
         raise UsageError(f"{arm.name}: task {name} does not fit its {_joints(arm)}: {task}")
     return task
@@ -98,10 +88,7 @@ def default_task(arm: Arm) -> str | None:
         5: ("xyz_pitch_roll", "xyz_axis"),
     }.get(arm.n, ("pose",) if arm.n > 5 else ())
     for name in order:
-        build = {"xyz_yaw": _yaw, "xyz_pitch": _pitch, "xyz_pitch_roll": _pitch}.get(
-            name, _planar if "xy" in name and "z" not in name else _free
-        )
-        if not isinstance(task := build(arm, name), str) and rank(arm, task) == min(task.constraints, arm.n):
+        if not isinstance(task := _BUILDERS[name](arm, name), str) and rank(arm, task) == min(task.constraints, arm.n):
             return name
     return None
 
@@ -326,3 +313,16 @@ def _pitch(arm: Arm, name: str) -> Task | str:
     roll = np.zeros(arm.n)
     roll[4] = arm.dh_sign[4]
     return _plain(arm, name, 3, [weights, roll], [offset, arm.dh_theta[4]])
+
+
+# Each gives the task for an arm, or says why it does not fit.
+_BUILDERS = {
+    "xy": _planar,
+    "xy_theta": _planar,
+    "xyz": _free,
+    "xyz_pitch": _pitch,
+    "xyz_pitch_roll": _pitch,
+    "xyz_yaw": _yaw,
+    "xyz_axis": _free,
+    "pose": _free,
+}
