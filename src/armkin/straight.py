@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from armkin.soa import Array
 
-_BOOL = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "logical_or", "equal"}
+_BOOL = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "equal"}
 
 
 class Node(np.lib.mixins.NDArrayOperatorsMixin):
@@ -34,6 +34,11 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
         if method != "__call__" or options:
             raise TypeError(f"{ufunc.__name__}.{method} cannot be recorded")
         return self.trace.simplify(ufunc.__name__, inputs)
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
+        if function is not np.where or len(inputs) != 3:
+            raise TypeError(f"{function.__name__} cannot be recorded")
+        return self.trace.record("where", inputs)
 
 
 class _Trace:
@@ -54,7 +59,7 @@ class _Trace:
             a, b = (a.args[0] if minus_a else a), (b.args[0] if minus_b else b)
             if op == "multiply":
                 for x, y in ((a, b), (b, a)):
-                    if np.ndim(x) == 0 and not isinstance(x, Node) and abs(x) in (0.0, 1.0):
+                    if not isinstance(x, Node) and np.ndim(x) == 0 and abs(x) in (0.0, 1.0):
                         if x == 0.0:
                             return 0.0
                         return self._signed(y, (x < 0) != (minus_a != minus_b))
@@ -166,8 +171,9 @@ class Straight:
             out = "out=" if node.op in ("minimum", "maximum") else ""
             lines.append(f"{node.op}({', '.join(arguments)}, {out}{names[id(node)]})")
         parameters = [names[id(x)] for x in self._inputs] + [f"b{k}" for k in range(len(self._buffers))]
-        scope = {**constants, **{node.op: getattr(np, node.op) for node in self._nodes}}
-        return _compiled(parameters, lines, list(map(name, self._outputs)), scope)
+        outputs = list(map(name, self._outputs))
+        scope = {**constants, **{node.op: getattr(np, node.op) for node in self._nodes}, "where": _where}
+        return _compiled(parameters, lines, outputs, scope)
 
     def _single_code(self) -> Callable[..., tuple[Any, ...]]:
         """One Python expression a line and branch, branch axes unrolled."""
@@ -202,18 +208,29 @@ _PYTHON = {
     "negative": "-{}",
     "absolute": "abs({})",
     "maximum": "max({}, {})",
+    "minimum": "min({}, {})",
     "square": "{0} * {0}",
     "power": "{} ** {}",
     "sqrt": "math.sqrt({})",
+    "cbrt": "math.cbrt({})",
     "tan": "math.tan({})",
     "arctan2": "math.atan2({}, {})",
     "rint": "float(round({}))",
     "sign": "math.copysign(1.0, {0}) if {0} else 0.0",
     "copysign": "math.copysign({}, {})",
     "less": "{} < {}",
+    "less_equal": "{} <= {}",
+    "greater": "{} > {}",
     "equal": "{} == {}",
     "bitwise_or": "{} or {}",
+    "bitwise_and": "{} and {}",
+    "where": "{1} if {0} else {2}",
 }
+
+
+def _where(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:
+    """`numpy.where` into a buffer, which may be that of a or b."""
+    np.copyto(out, np.where(mask, a, b))
 
 
 def _compiled(

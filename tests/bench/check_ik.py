@@ -96,19 +96,31 @@ def near(poses: int, only: str) -> None:
                 row(f"{name}, {off:.0e}", [report], time.perf_counter() - begin)
 
 
-def against_oracle(poses: int, only: str) -> None:
-    print("\n| class | poses | oracle's branches missing | |\n|---|---|---|---|")
-    for name in CLASSES:
+def against_oracle(poses: int, arms: int, only: str) -> None:
+    """Branches that the oracle knows and armkin does not: poses on shipped robots, and over random arms of a class."""
+    print("\n| robot or class | arms | poses | branches | oracle's branches missing | |\n|---|---|---|---|---|---|")
+    for name in [*NAMES, *CLASSES]:
         if only in name:
-            case = random_case(name, 0)
-            count = max(poses // 10, 1)
-            report = examine(case.arm, case.screw, case.task, random_joints(case.screw, count, 2))
-            missing = []
-            for begin in range(0, count, 50):
-                part = np.arange(begin, min(begin + 50, count))
-                missing += not_found(report, part, 60 if case.arm.n < 4 else 250, 3)
-            weak = [f"{oracle.weakness(report.screw, report.goals.take([k]), q[None])[0]:.0e}" for k, q in missing]
-            print(f"| {name} | {count} | {len(missing)} | {' '.join(weak[:5])} |", flush=True)
+            reports = []
+            for seed in range(arms if name in CLASSES else 1):
+                if name in CLASSES:
+                    case = random_case(name, seed)
+                    q = random_joints(case.screw, max(poses // arms, 1), seed + 1000)
+                    reports.append(examine(case.arm, case.screw, case.task, q))
+                else:
+                    arm, screw = shipped(name)
+                    reports.append(examine(arm, screw, None, random_joints(screw, poses, 2)))
+            weak = []
+            for report in reports:
+                for begin in range(0, len(report.q), 50):
+                    part = np.arange(begin, min(begin + 50, len(report.q)))
+                    missing = not_found(report, part, 60 if report.arm.n < 4 else 250, 3)
+                    weak += [oracle.weakness(report.screw, report.goals.take([k]), q[None])[0] for k, q in missing]
+            print(
+                f"| {name} | {len(reports)} | {sum(len(r.q) for r in reports)} | {sum(r.counts.sum() for r in reports)} "
+                f"| {len(weak)} | {' '.join(f'{w:.0e}' for w in weak[:5])} |",
+                flush=True,
+            )
 
 
 def main() -> None:
@@ -118,7 +130,7 @@ def main() -> None:
     parser.add_argument(
         "--poses", type=int, default=10_000, help="for each robot or class; a tenth for --near and --oracle"
     )
-    parser.add_argument("--arms", type=int, default=50)
+    parser.add_argument("--arms", type=int, default=50, help="random arms of a class, for --classes and --oracle")
     parser.add_argument("--only", default="", help="robots or classes whose name holds this")
     args = parser.parse_args()
     everything = not (args.robots or args.classes or args.near or args.oracle)
@@ -129,7 +141,7 @@ def main() -> None:
     if args.near or everything:
         near(args.poses, args.only)
     if args.oracle or everything:
-        against_oracle(args.poses, args.only)
+        against_oracle(max(args.poses // 10, 1), args.arms, args.only)
 
 
 if __name__ == "__main__":

@@ -75,8 +75,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name = "SCARA" if lift is not None else "planar"
     why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
-    turning = not prismatic.any()
-    return Geometry(name, why, True, solve, straight=turning, labels=("", "elbow", "") if turning else ())
+    return Geometry(name, why, True, solve, straight=True, labels=() if prismatic.any() else ("", "elbow", ""))
 
 
 def _two(chain: Chain) -> Solve:

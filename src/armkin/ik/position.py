@@ -28,10 +28,12 @@ from armkin.ik.subproblems import (
     Candidates,
     Pair,
     Prefer,
+    half_tangent,
     linear,
     normalised,
     quadratic,
     rotation_between,
+    spin,
     trig_quadratic,
 )
 from armkin.ik.tasks import Task, rank
@@ -116,172 +118,148 @@ class Position:
 
     def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
-        p1 = [np.atleast_1d(np.asarray(v, dtype=float)) for v in soa.apply(self.from_base, p)]
-        p1 = list(np.broadcast_arrays(*p1))
-        if self.prismatic[0]:
-            known = np.array([p1[0], p1[1]])
-        else:
-            known = np.array([p1[2], (p1[0] ** 2 + p1[1] ** 2 + p1[2] ** 2) / 2])
-        known = known - self.rest[:, None]
+        x, y, z = soa.apply(self.from_base, p)
+        known = [x, y] if self.prismatic[0] else [z, 0.5 * (x * x + y * y + z * z)]
+        known = [soa.sub(value, float(rest)) for value, rest in zip(known, self.rest, strict=True)]
         if self.prismatic[1]:
             third, second, doubt = self._slide(known, prefer)
         elif self.regular:
             third, second, doubt = self._quartic(known, prefer)
         else:
             third, second, doubt = self._rank_one(known, prefer)
-        y = self._tip(third)
-        if second.s is None:
-            g = [y[0], y[1], y[2] + second.c]
-        else:
-            g = [second.c * y[0] - second.s * y[1], second.s * y[0] + second.c * y[1], y[2]]
-        x = soa.apply(self.L1, g)
+        g = self._tip(third)
+        g = spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
+        there = soa.apply(self.L1, g)
         if self.prismatic[0]:
-            first = Pair(p1[2] - x[2], None)
+            first = Pair(z - there[2], None)
         else:
-            first, doubt1 = rotation_between(x[0], x[1], p1[0], p1[1], self.scale, prefer[0])
+            first, doubt1 = rotation_between(there[0], there[1], x, y, self.scale, prefer[0])
             doubt = doubt | doubt1
         return [first, second, third], doubt
 
-    def _tip(self, third: Pair) -> list[Array]:
-        if third.s is None:
-            return [self.Y[i, 0] + self.Y[i, 1] * third.c for i in range(3)]
-        return [self.Y[i, 0] + self.Y[i, 1] * third.c + self.Y[i, 2] * third.s for i in range(3)]
+    def _tip(self, third: Pair) -> list[Entry]:
+        """The tip in the frame of joint 2."""
+        return [_at(row.tolist(), third) for row in self.Y]
 
-    def _affine(self, weights: Array, known: Array) -> Array:
-        """``weights . (known - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2): (6, N)."""
-        height = self.Y[2]
-        total = np.zeros((6, known.shape[1]))
-        total[0] = weights @ known
+    def _affine(self, weights: Array, known: list[Entry]) -> list[Entry]:
+        """``weights . (known - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
+        fixed = np.zeros(6)
         for w, row, form in zip(weights, self.rows, self.forms, strict=True):
-            total[:3] -= (w * row[2] * height)[:, None]
-            total -= w * _six(form)[:, None]
-        return self._reduce(total)
-
-    def _reduce(self, six: Array) -> Array:
-        """|y|^2 is affine in (1, cos, sin) although its form is quadratic: use cos^2 + sin^2 = 1."""
+            fixed[:3] -= w * row[2] * self.Y[2]
+            fixed -= w * _six(form)
         if not self.prismatic[2]:
-            six = six.copy()
-            six[0] += six[5]
-            six[3] -= six[5]
-            six[5] = 0.0
+            # |y|^2 is affine in (cos, sin) although its form is quadratic: cos^2 + sin^2 = 1
+            fixed[[0, 3, 5]] += fixed[5] * np.array([1.0, -1.0, -1.0])
+        six: list[Entry] = fixed.tolist()
+        six[0] = soa.add(six[0], soa.dot(weights.tolist(), known))
         return six
 
-    def _quartic(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
-        inverse_A = np.linalg.inv(self.A)
-        g = [self._affine(row, known) for row in inverse_A]  # coefficients of gx, gy
-        if self.prismatic[2]:
+    def _quartic(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+        g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
+        across = (-_six(self.across)).tolist()
+        if not self.prismatic[2]:
+            third, doubt = self._roots(_sum(across, *(_product(six, six) for six in g)))
+        else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
-            k = [-c for c in _expand(_six(self.across)[:, None] * np.ones((1, known.shape[1])))]
+            k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
             for six in g:
                 quad = [six[0], six[1], six[3]]
                 for i in range(3):
                     for j in range(3):
-                        k[i + j] = k[i + j] + quad[i] * quad[j]
+                        k[i + j] = soa.add(k[i + j], soa.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
                 d, doubt = quadratic(k[2], k[1], k[0], 0, self.scale)
-                return self._turn(g, Pair(d, None), doubt, prefer)
-            k0, k1, k2, k3, k4 = (v * self.scale**i for i, v in enumerate(k))
-            ecc = (k4 + k0 - k2) / 4
-            form = [k2 / 2 + ecc, (k0 - k4) / 2, (k1 + k3) / 4, ecc, (k1 - k3) / 4, 0.0 * k0]
-            q, doubt = trig_quadratic(form, self.touching)
-            return self._turn(g, Pair(self.scale * np.tan(q / 2)[:, None, None, :], None), doubt, prefer)
-        six = -_six(self.across)[:, None] + sum(_square(affine) for affine in g)
-        q, doubt = trig_quadratic(list(six), self.touching)
-        return self._turn(g, Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :]), doubt, prefer)
-
-    def _turn(self, g: list[Array], third: Pair, doubt: Bool, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
-        """Joint 2 from the known g, given as six coefficients each."""
-        last = 2 if third.s is not None else 3
-        b2 = third.s if third.s is not None else third.c**2
-        gx, gy = (six[0] + six[1] * third.c + six[last] * b2 for six in g)
+                third = Pair(d, None)
+            else:
+                k0, k1, k2, k3, k4 = (soa.mul(v, self.scale**i) for i, v in enumerate(k))
+                ecc = 0.25 * (k4 + k0 - k2)
+                form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
+                turn, doubt = trig_quadratic(form, self.scale**2, self.touching)
+                third = Pair(self.scale * half_tangent(turn), None)
+        gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
         y = self._tip(third)
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, self.scale, prefer[1])
         return third, second, doubt | doubt2
 
-    def _rank_one(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _roots(self, six: list[Entry]) -> tuple[Pair, Bool]:
+        """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
+        pair, doubt = trig_quadratic(six, self.scale**2, self.touching)
+        return self._unit(pair), doubt
+
+    def _rank_one(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
             d, doubt = quadratic(alone[3], alone[1], alone[0], 0, self.scale)
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
-            third, doubt = linear(alone[1], alone[2], -alone[0], 0, self.scale, prefer[2])
+            third, doubt = linear(alone[1], alone[2], soa.mul(-1.0, alone[0]), 0, self.scale, prefer[2])
             third = self._unit(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
-        b1 = third.c
-        b2 = third.c**2 if third.s is None else third.s
-        right = main[0] + main[1] * b1 + (main[3] if third.s is None else main[2]) * b2
-        ax, ay = self.main @ self.A
-        second, doubt2 = linear(ax * y[0] + ay * y[1], ay * y[0] - ax * y[1], right, 1, self.scale, prefer[1])
+        right = _at([main[0], main[1], main[2] if third.s is not None else main[3]], third, 2)
+        ax, ay = (self.main @ self.A).tolist()
+        a, b = soa.add(soa.mul(ax, y[0]), soa.mul(ay, y[1])), soa.sub(soa.mul(ay, y[0]), soa.mul(ax, y[1]))
+        second, doubt2 = linear(a, b, right, 1, self.scale, prefer[1])
         return third, self._unit(second), doubt | doubt2
 
-    def _slide(self, known: Array, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _slide(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         """Joint 2 prismatic: g = y + d2 z."""
-        across = [
-            [known[k] - self.rows[k] @ self.Y[:, 0], -(self.rows[k] @ self.Y[:, 1]), -(self.rows[k] @ self.Y[:, 2])]
-            for k in range(2)
-        ]  # known_k - rows_k . y, coefficients of (1, b1, b2)
-        zero = np.zeros_like(known[0])
-        z0, z1 = self.rows[:, 2]
+        # known_k - rows_k . y, coefficients of (1, b1, b2)
+        across: list[list[Entry]] = (-self.rows @ self.Y).tolist()
+        for k in range(2):
+            across[k][0] = soa.add(across[k][0], known[k])
+        z0, z1 = self.rows[:, 2].tolist()
         if self.prismatic[0]:
             # two equations linear in d2: eliminate it, then take it from the larger one
-            only = [z1 * a - z0 * b + zero for a, b in zip(*across, strict=True)]
+            only = [soa.sub(soa.mul(z1, a), soa.mul(z0, b)) for a, b in zip(*across, strict=True)]
             third, doubt = self._one_unknown(only, prefer)
             k = 0 if abs(z0) >= abs(z1) else 1
-            second = Pair(self._at(across[k], third) / self.rows[k, 2], None)
-            return third, second, doubt
-        half = [self.square[0, 0] / 2, self.square[0, 1], self.square[0, 2]]  # |y|^2 / 2, R: affine in b
-        curved = 0.0
-        if self.prismatic[2]:
-            curved = self.square[1, 1] / 2
-        else:
-            half[0] += self.square[1, 1] / 2  # cos^2 and sin^2 have equal factors and no product
+            return third, Pair(_at(across[k], third) / float(self.rows[k, 2]), None), doubt
+        # |y|^2 / 2, for a revolute joint 3 affine in b: cos^2 and sin^2 have equal factors and no product
+        half = [self.square[0, 0] / 2, self.square[0, 1], self.square[0, 2]]
+        curved = self.square[1, 1] / 2
+        if not self.prismatic[2]:
+            half[0], curved = half[0] + curved, 0.0
+        half, curved = [float(v) for v in half], float(curved)
         if not self.regular:
             # the height does not feel d2: it gives joint 3, then the distance gives d2
-            third, doubt = self._one_unknown([v + zero for v in across[0]], prefer)
-            y = self._tip(third)
-            rest = self._at(across[1], third) - self._at(half, third)
+            third, doubt = self._one_unknown(across[0], prefer)
+            rest = soa.sub(_at(across[1], third), _at(half, third))
             if third.s is None:
-                rest = rest - curved * third.c**2
+                rest = soa.sub(rest, soa.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, y[2] + z1, -rest, 1, self.scale)
+            d, doubt2 = quadratic(0.5, soa.add(self._tip(third)[2], z1), -rest, 1, self.scale)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
-        d2 = [v / z0 + zero for v in across[0]]
-        yz = [self.Y[2, j] + zero for j in range(3)]
-        six = np.zeros((6, len(zero)))
-        for j, v in enumerate(across[1]):
-            six[j] -= v
-        for j, v in enumerate(half):
-            six[j] += v
-        for j in range(3):
-            six[j] += z1 * d2[j]
-        six[3] += curved
-        six += _product(d2, [v / 2 + w for v, w in zip(d2, yz, strict=True)])
+        d2 = [soa.mul(1.0 / z0, v) for v in across[0]]
+        constant = [soa.add(soa.sub(h, a), soa.mul(z1, d)) for h, a, d in zip(half, across[1], d2, strict=True)]
+        factor = [soa.add(soa.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
+        six = _sum([*constant, curved, 0.0, 0.0], _product(d2, factor))
         if self.prismatic[2]:
             d, doubt = quadratic(six[3], six[1], six[0], 0, self.scale)
             third = Pair(d, None)
         else:
-            q, doubt = trig_quadratic(list(six), self.touching)
-            third = Pair(np.cos(q)[:, None, None, :], np.sin(q)[:, None, None, :])
-        return third, Pair(self._at(d2, third), None), doubt
+            third, doubt = self._roots(six)
+        return third, Pair(_at(d2, third), None), doubt
 
-    def _one_unknown(self, coefficients: list[Array], prefer: Prefer) -> tuple[Pair, Bool]:
+    def _one_unknown(self, coefficients: list[Entry], prefer: Prefer) -> tuple[Pair, Bool]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
+        known, slope, other = coefficients
         if self.prismatic[2]:
-            slope = coefficients[1]
-            if np.abs(slope).max() < 1e-12:
+            if abs(slope) < 1e-12:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
-            return Pair((-coefficients[0] / slope)[None, None, None, :], None), np.zeros(1, bool)
-        third, doubt = linear(coefficients[1], coefficients[2], -coefficients[0], 0, self.scale, prefer[2])
+            return Pair(soa.mul(-1.0 / slope, known), None), np.zeros(1, bool)
+        third, doubt = linear(slope, other, soa.mul(-1.0, known), 0, self.scale, prefer[2])
         return self._unit(third), doubt
 
-    @staticmethod
-    def _at(coefficients: list[Entry], third: Pair) -> Array:
-        if third.s is None:
-            return np.asarray(coefficients[0] + coefficients[1] * third.c)
-        return np.asarray(coefficients[0] + coefficients[1] * third.c + coefficients[2] * third.s)
+
+def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
+    """``k0 + k1 b1 + k2 b2``, b2 the sine or, of a prismatic joint, that power of d: by default there is no b2."""
+    total = soa.add(coefficients[0], soa.mul(coefficients[1], third.c))
+    if third.s is not None:
+        return soa.add(total, soa.mul(coefficients[2], third.s))
+    return total if power == 1 else soa.add(total, soa.mul(coefficients[2], third.c * third.c))
 
 
 def _six(form: Array) -> Array:
@@ -289,28 +267,27 @@ def _six(form: Array) -> Array:
     return np.array([form[0, 0], 2 * form[0, 1], 2 * form[0, 2], form[1, 1], 2 * form[1, 2], form[2, 2]])
 
 
-def _product(u: list[Array], v: list[Array]) -> Array:
-    """Product of two affine functions of (b1, b2), as six coefficients (6, N)."""
-    return np.array(
-        [
-            u[0] * v[0],
-            u[0] * v[1] + u[1] * v[0],
-            u[0] * v[2] + u[2] * v[0],
-            u[1] * v[1],
-            u[1] * v[2] + u[2] * v[1],
-            u[2] * v[2],
-        ]
-    )
+def _product(u: list[Entry], v: list[Entry]) -> list[Entry]:
+    """Product of two affine functions of (b1, b2), as six coefficients; what follows the first three is not read."""
+
+    def mixed(i: int, j: int) -> Entry:
+        return soa.add(soa.mul(u[i], v[j]), soa.mul(u[j], v[i]))
+
+    return [
+        soa.mul(u[0], v[0]),
+        mixed(0, 1),
+        mixed(0, 2),
+        soa.mul(u[1], v[1]),
+        mixed(1, 2),
+        soa.mul(u[2], v[2]),
+    ]
 
 
-def _square(six: Array) -> Array:
-    """Square of an affine function given as six coefficients whose quadratic ones are zero."""
-    return _product(list(six[:3]), list(six[:3]))
-
-
-def _expand(six: Array) -> list[Array]:
-    """Six coefficients in (1, d, d^2) as b, to the powers d^0 ... d^4."""
-    return [six[0], six[1], six[3] + six[2], six[4], six[5]]
+def _sum(*terms: list[Entry]) -> list[Entry]:
+    total = terms[0]
+    for term in terms[1:]:
+        total = [soa.add(a, b) for a, b in zip(total, term, strict=True)]
+    return total
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -329,4 +306,4 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return Candidates(*position.solve(goal, prefer))
 
     # a quartic's roots come in no order
-    return Geometry("three joints", why, True, solve, ordered=not position.regular)
+    return Geometry("three joints", why, True, solve, straight=True, ordered=not position.regular)

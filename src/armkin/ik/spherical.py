@@ -55,7 +55,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
             why,
             True,
             wrist.solve,
-            straight=wrist.straight,
+            straight=True,
             labels=wrist.labels,
             ordered=wrist.ordered,
         )
@@ -71,7 +71,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return shoulder.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
     why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {shoulder.why}"
-    return Geometry("spherical shoulder", why, True, solve, straight=shoulder.straight, ordered=shoulder.ordered)
+    return Geometry("spherical shoulder", why, True, solve, straight=True, ordered=shoulder.ordered)
 
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
@@ -103,13 +103,11 @@ class SphericalWrist:
             elbow = Elbow(chain, after3)
             self.place: Place = partial(elbow.solve, past=[0.0, 0.0, 0.0])
             self.why = "axes 2 and 3 are parallel"
-            self.straight = True
             self.labels = ("shoulder", "elbow", "wrist")
         else:
             position = Position(chain, after3, tolerance)
             self.close, self.ordered = position.close, not position.regular
             self.place = position.solve
-            self.straight = False
             self.why = f"of the other three, {position.why}"
         self.links = [soa.constant(L) for L in chain.link[:4]]
         self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)

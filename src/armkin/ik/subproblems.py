@@ -174,65 +174,113 @@ def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Ar
     inverse = 1.0 / np.maximum(size, 1e-300)
     a, b, c = a * inverse, b * inverse, c * inverse
     pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, None)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # tan(q/2) = s / (1 + c) = (1 - c) / s: the form without cancellation
-        t = np.where(pair.c > 0.0, pair.s / (1.0 + pair.c), (1.0 - pair.c) / pair.s)
-    # a root at infinity is no answer, but inf would turn into nan on its way
-    return scale * np.where(np.abs(t) < 1e9, t, 1e9), doubt
+    return scale * half_tangent(pair), doubt
 
 
-def trig_quadratic(e: list[Entry], near: float = TOUCHING) -> tuple[Array, Bool]:
+def half_tangent(pair: Pair) -> Entry:
+    """``tan(q/2)``, 1e9 where it is infinite: inf would turn into nan on its way."""
+    # s / (1 + c) = (1 - c) / s: the form without cancellation
+    ahead = pair.c > 0.0
+    below = np.where(ahead, 1.0 + pair.c, pair.s)
+    above = np.where(ahead, pair.s, 1.0 - pair.c)
+    far = np.abs(below) < 1e-9
+    return np.where(far, 1e9, above / np.where(far, 1.0, below))
+
+
+def trig_quadratic(e: list[Entry], scale: float, near: float = TOUCHING) -> tuple[Pair, Bool]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
-    e: [e0, ec, es, ecc, ecs, ess], entries broadcastable to (N,). Returns q (4, N) [rad],
-    nan where a root is not real, and doubt (N,): roots that touch, complex ones that miss the
-    real line by less than `near` [rad], or a vanishing equation.
-    A quartic in the tangent of the half angle, its leading coefficient kept large by turning
-    the angle's origin first, solved as the eigenvalues of its companion matrix.
+    e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
+    roots on branch axes (2, 2, 1, N), and doubt: roots that touch, complex ones that miss the real
+    line by less than `near` [rad], or a vanishing equation. Without a real root the pair is
+    that of the closest angle, not normalised, as in `linear`.
+
+    The unit circle and a conic meet where the circle meets a pair of lines, a degenerate conic of
+    the pencil of the two (Richter-Gebert, Perspectives on Projective Geometry, 11.4). The pencil's cubic
+    always has a root between -sqrt(h) and sqrt(h), whose lines are real.
     """
-    e0, ec, es, ecc, ecs, ess = (np.atleast_1d(np.asarray(x, dtype=float)) for x in np.broadcast_arrays(*e))
-    size = np.abs([e0, ec, es, ecc, ecs, ess]).max(axis=0)
-    vanishing = size < 1e-300
-    inverse = 1.0 / np.where(vanishing, 1.0, size)
-    e0, ec, es, ecc, ecs, ess = (x * inverse for x in (e0, ec, es, ecc, ecs, ess))
+    e0, ec, es, ecc, ecs, ess = e
+    size = soa.add(abs(ecc), abs(ess))
+    for v in (e0, ec, es, ecs):
+        size = soa.add(size, abs(v))
+    inverse = 1.0 / np.maximum(size, 1e-12 * scale)
+    # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
+    a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
+    u, v = 0.5 * ec * inverse, 0.5 * es * inverse
+    w = (e0 + 0.5 * (ecc + ess)) * inverse
+    x = _line_pair(a, b, u, v, w)
+    M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
+    # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
+    columns = [
+        [v * v - M[1][1] * M[2][2], b * M[2][2] - u * v, u * M[1][1] - b * v],
+        [b * M[2][2] - u * v, u * u - M[0][0] * M[2][2], M[0][0] * v - b * u],
+        [u * M[1][1] - b * v, M[0][0] * v - b * u, b * b - M[0][0] * M[1][1]],
+    ]
+    squares = [columns[i][i] for i in range(3)]
+    column = _longest(squares, columns)
+    down = 1.0 / np.sqrt(np.maximum(np.maximum(squares[0], np.maximum(squares[1], squares[2])), 1e-15))
+    px, py, pz = (down * value for value in column)
+    rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
+    flipped = [list(row) for row in zip(*rows, strict=True)]
+    lines = [_longest([soa.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
+    lx, ly, lz = (np.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
+    # a line at infinity has no direction
+    lx = lx + 1e-100
+    h2 = lx * lx + ly * ly
+    disc = h2 - lz * lz
+    pair, _ = linear(lx, ly, -lz, 1, 1e-140, None, disc)
+    real = disc > -(TOUCHING**2) * h2
+    c, s = pair
+    for _ in range(2):
+        value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
+        slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
+        step = np.where(real, value * slope / (slope * slope + 1e-18), 0.0)
+        step = np.minimum(np.maximum(step, -0.01), 0.01)
+        c, s = c + s * step, s - c * step
+        shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
+        c, s = c * shorter, s * shorter
+    doubt = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < near * near * h2)) | (size < 1e-12 * scale)
+    return Pair(c, s), doubt
 
-    def f(c: Array, s: Array) -> Array:
-        return np.asarray(e0 + ec * c + es * s + ecc * c * c + ecs * c * s + ess * s * s)
 
-    trial = np.arange(7) * (2 * np.pi / 7) + 0.3  # any spread of origins does
-    values = np.abs([f(-np.cos(p) * np.ones(1), -np.sin(p) * np.ones(1)) for p in trial])
-    psi = trial[values.argmax(axis=0)]
-    c0, s0 = np.cos(psi), np.sin(psi)
-    # the same form in q' = q - psi
-    rc, rs = ec * c0 + es * s0, es * c0 - ec * s0
-    rcc = ecc * c0 * c0 + ecs * c0 * s0 + ess * s0 * s0
-    rss = ecc * s0 * s0 - ecs * c0 * s0 + ess * c0 * c0
-    rcs = 2 * (ess - ecc) * c0 * s0 + ecs * (c0 * c0 - s0 * s0)
-    k4, k3, k2 = e0 - rc + rcc, 2 * rs - 2 * rcs, 2 * e0 - 2 * rcc + 4 * rss
-    k1, k0 = 2 * rs + 2 * rcs, e0 + rc + rcc
-    vanishing |= np.abs(k4) < 1e-14
-    k4 = np.where(vanishing, 1.0, k4)
-    companion = np.zeros((len(k4), 4, 4))
-    companion[:, 0, :] = -np.stack([k3, k2, k1, k0], axis=1) / k4[:, None]
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
-    x = np.linalg.eigvals(companion).T  # (4, N)
-    # the imaginary part as an angle: double roots come back as close complex pairs
-    bend = 2 * np.abs(x.imag) / (1 + np.abs(x) ** 2)
-    q = psi + 2 * np.arctan(x.real)
-    for _ in range(3):
-        c, s = np.cos(q), np.sin(q)
-        slope = -ec * s + es * c + 2 * (ess - ecc) * c * s + ecs * (c * c - s * s)
-        curve = -ec * c - es * s + 2 * (ess - ecc) * (c * c - s * s) - 4 * ecs * c * s
-        value = f(c, s)
-        # towards the root, or towards the extremum where a pair has only just left the real line
-        flat = np.abs(slope) < 1e-7
-        newton = value / np.where(flat, 1.0, slope)
-        extremum = slope / np.where(np.abs(curve) < 1e-12, 1.0, curve)
-        q = q - np.clip(np.where(flat, extremum, newton), -0.01, 0.01) * (bend < 1e-2)
-    touching = (bend > 0) & (bend < near)
-    doubt = vanishing | touching.any(axis=0)
-    ordered = np.sort(np.where(bend < TOUCHING, q, np.inf), axis=0)
-    with np.errstate(invalid="ignore"):
-        doubt |= (np.diff(ordered, axis=0) < 2e-5).any(axis=0)
-    q = np.where((bend < TOUCHING) & ~vanishing, q, np.nan)
-    return q, doubt
+def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> Entry:
+    """The x in [-sqrt(h), sqrt(h)] farthest from being double for which the conic plus x times the circle degenerates.
+
+    ``x^3 - w x^2 + (r - h) x + rest = 0`` with h = a^2 + b^2 and r = u^2 + v^2 is not positive at
+    -sqrt(h) and not negative at sqrt(h).
+    """
+    h, r = a * a + b * b, u * u + v * v
+    rest = w * h + a * (v * v - u * u) - 2.0 * b * u * v
+    linear_ = r - h
+    third = w / 3.0
+    p = linear_ - w * third
+    q = 0.5 * (rest + third * linear_ - 2.0 * third * third * third)
+    p3 = p / 3.0
+    disc = q * q + p3 * p3 * p3
+    # one real root (Cardano) or three (Viete): the largest and the smallest of them
+    root = np.sqrt(np.abs(disc))
+    A = np.cbrt(np.abs(q) + root + 1e-300)
+    alone = np.copysign(A - p3 / A, -q)
+    size = 2.0 * np.sqrt(np.maximum(-p3, 0.0))
+    c, s = soa.cos_sin(np.arctan2(root, -q) / 3.0)
+    most = size * c
+    least = -0.5 * size * (c + np.sqrt(3.0) * s)
+    span = np.sqrt(h)
+    above = np.maximum(most + third - span, 0.0)
+    below = np.maximum(-span - least - third, 0.0)
+    # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
+    upper = (above < below) | ((above <= below) & (most + least > 0.0))
+    x = third + np.where(disc > 0.0, alone, np.where(upper, most, least))
+    for _ in range(2):
+        value = ((x - w) * x + linear_) * x + rest
+        slope = (3.0 * x - 2.0 * w) * x + linear_
+        x = x - value * slope / (slope * slope + 1e-30)
+    return x
+
+
+def _longest(sizes: list[Entry], vectors: list[list[Entry]]) -> list[Entry]:
+    """That of three vectors whose size is the largest."""
+    later = sizes[1] > sizes[0]
+    size = np.maximum(sizes[0], sizes[1])
+    last = sizes[2] > size
+    return [np.where(last, z, np.where(later, y, x)) for x, y, z in zip(*vectors, strict=True)]
