@@ -99,21 +99,27 @@ def _self_motion(
 ) -> tuple[Bool, Bool]:
     """Whether the joints can move while the target is kept, and which do.
 
-    A step along each null direction, both ways, pulled back onto the target: on a
-    self-motion it stays about as far from q as it went; from a double root it falls back.
+    Steps along each null direction, both ways, pulled back onto the target: on a self-motion
+    they stay about as far from q as they went, and apart; from a double root they fall back, and
+    from a branch of weak Jacobian they may arrive at its neighbour.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     moving = np.zeros(len(q), bool)
     joints = np.zeros(q.shape, bool)
     for who, direction in _null_directions(arm.n, V, nullity):
         # where several directions are lost at once, a short step would be drawn back into the corner
-        ways = (STEP, -STEP, 10 * STEP, -10 * STEP) if (nullity[who] > 1).any() else (STEP, -STEP)
-        for way in ways:
-            there, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=6)
-            moved = np.abs(there - q[who]) / unit
-            far = (moved.max(axis=1) > 0.3 * abs(way) * np.abs(direction).max(axis=1)) & (size < 1e-11)
-            moving[who] |= far
-            joints[who] |= far[:, None] & (moved > 1e-3 * STEP)
+        for step in (STEP, 10 * STEP) if (nullity[who] > 1).any() else (STEP,):
+            along, which = np.ones(len(who), bool), np.zeros((len(who), arm.n), bool)
+            for way in (step, -step):
+                far, size = numeric.correct(arm, task, q[who] + way * direction * unit, target[who], steps=6)
+                mid, size2 = numeric.correct(arm, task, q[who] + 0.6 * way * direction * unit, target[who], steps=6)
+                moved = np.abs(far - q[who]) / unit
+                least = 0.3 * step * np.abs(direction).max(axis=1)
+                apart = (np.abs(far - mid) / unit).max(axis=1) > 0.3 * least
+                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) < 1e-11)
+                which |= moved > 1e-3 * STEP
+            moving[who] |= along
+            joints[who] |= along[:, None] & which
     return moving, joints
 
 
