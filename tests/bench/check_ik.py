@@ -116,9 +116,9 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
                     part = np.arange(begin, min(begin + 50, len(report.q)))
                     missing = not_found(report, part, 60 if report.arm.n < 4 else 250, 3)
                     weak += [oracle.weakness(report.screw, report.goals.take([k]), q[None])[0] for k, q in missing]
+            count, branches = (sum(each) for each in zip(*((len(r.q), r.counts.sum()) for r in reports), strict=True))
             print(
-                f"| {name} | {len(reports)} | {sum(len(r.q) for r in reports)} | {sum(r.counts.sum() for r in reports)} "
-                f"| {len(weak)} | {' '.join(f'{w:.0e}' for w in weak[:5])} |",
+                f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {' '.join(f'{w:.0e}' for w in weak[:5])} |",
                 flush=True,
             )
 

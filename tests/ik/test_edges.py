@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import examine
 from geometries import CLASSES, random_case
 from oracle import forward, goal, missing, screws
 
@@ -196,6 +197,21 @@ def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
     assert (s.status, s.valid.any()) == (Status.UNREACHABLE, False)
     six = case(spatial(np.random.default_rng(0), "RRRRRR", [None] * 6, [None] * 6), "pose").arm
     assert not armkin.ik(six, far, "pose").valid.any()
+
+
+@pytest.mark.parametrize("name", [name for name in CLASSES if "P" in name and "UR" not in name])
+def test_slides_far_longer_than_the_links(name: str) -> None:
+    """Right-angled and random postures, slides of up to 20 reaches; what is farther does not claim to be complete."""
+    for seed in range(3):
+        c = random_case(name, seed)
+        rng = np.random.default_rng(seed)
+        shape = (200, c.arm.n)
+        turn = np.where(rng.random(shape) < 0.3, rng.uniform(-3, 3, shape), rng.integers(-1, 3, shape) * np.pi / 2)
+        q = np.where(c.screw.prismatic, c.arm.reach * rng.uniform(-12, 12, shape), turn)
+        report = examine(c.arm, c.screw, c.task, q)
+        assert not (report.lost & (report.solutions.status != Status.SINGULAR)).any()
+        q = np.where(c.screw.prismatic, 100 * q, q)
+        assert not examine(c.arm, c.screw, c.task, q).solutions.complete
 
 
 def test_no_target_is_too_odd() -> None:

@@ -119,21 +119,24 @@ class Position:
     def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
         x, y, z = soa.apply(self.from_base, p)
-        known = [x, y] if self.prismatic[0] else [z, 0.5 * (x * x + y * y + z * z)]
+        square = x * x + y * y + z * z
+        # a slide may be far longer than the links
+        size = np.sqrt(self.scale**2 + square) if any(self.prismatic) else self.scale
+        known = [x, y] if self.prismatic[0] else [z, 0.5 * square]
         known = [soa.sub(value, float(rest)) for value, rest in zip(known, self.rest, strict=True)]
         if self.prismatic[1]:
-            third, second, doubt = self._slide(known, prefer)
+            third, second, doubt = self._slide(known, size, prefer)
         elif self.regular:
-            third, second, doubt = self._quartic(known, prefer)
+            third, second, doubt = self._quartic(known, size, prefer)
         else:
-            third, second, doubt = self._rank_one(known, prefer)
+            third, second, doubt = self._rank_one(known, size, prefer)
         g = self._tip(third)
         g = spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
         there = soa.apply(self.L1, g)
         if self.prismatic[0]:
             first = Pair(z - there[2], None)
         else:
-            first, doubt1 = rotation_between(there[0], there[1], x, y, self.scale, prefer[0])
+            first, doubt1 = rotation_between(there[0], there[1], x, y, size, prefer[0])
             doubt = doubt | doubt1
         return [first, second, third], doubt
 
@@ -154,11 +157,11 @@ class Position:
         six[0] = soa.add(six[0], soa.dot(weights.tolist(), known))
         return six
 
-    def _quartic(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-_six(self.across)).tolist()
         if not self.prismatic[2]:
-            third, doubt = self._roots(_sum(across, *(_product(six, six) for six in g)))
+            third, doubt = self._roots(_sum(across, *(_product(six, six) for six in g)), size)
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
@@ -168,42 +171,42 @@ class Position:
                     for j in range(3):
                         k[i + j] = soa.add(k[i + j], soa.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
-                d, doubt = quadratic(k[2], k[1], k[0], 0, self.scale)
+                d, doubt = quadratic(k[2], k[1], k[0], 0, size)
                 third = Pair(d, None)
             else:
-                k0, k1, k2, k3, k4 = (soa.mul(v, self.scale**i) for i, v in enumerate(k))
+                k0, k1, k2, k3, k4 = (soa.mul(v, size**i) for i, v in enumerate(k))
                 ecc = 0.25 * (k4 + k0 - k2)
                 form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
-                turn, doubt = trig_quadratic(form, self.scale**2, self.touching)
-                third = Pair(self.scale * half_tangent(turn), None)
+                turn, doubt = trig_quadratic(form, size * size, self.touching)
+                third = Pair(size * half_tangent(turn), None)
         gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
         y = self._tip(third)
-        second, doubt2 = rotation_between(y[0], y[1], gx, gy, self.scale, prefer[1])
+        second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
 
-    def _roots(self, six: list[Entry]) -> tuple[Pair, Bool]:
+    def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Bool]:
         """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
-        pair, doubt = trig_quadratic(six, self.scale**2, self.touching)
+        pair, doubt = trig_quadratic(six, size * size, self.touching)
         return self._unit(pair), doubt
 
-    def _rank_one(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
-            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, self.scale)
+            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size)
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
-            third, doubt = linear(alone[1], alone[2], soa.mul(-1.0, alone[0]), 0, self.scale, prefer[2])
+            third, doubt = linear(alone[1], alone[2], soa.mul(-1.0, alone[0]), 0, size, prefer[2])
             third = self._unit(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
         right = _at([main[0], main[1], main[2] if third.s is not None else main[3]], third, 2)
         ax, ay = (self.main @ self.A).tolist()
         a, b = soa.add(soa.mul(ax, y[0]), soa.mul(ay, y[1])), soa.sub(soa.mul(ay, y[0]), soa.mul(ax, y[1]))
-        second, doubt2 = linear(a, b, right, 1, self.scale, prefer[1])
+        second, doubt2 = linear(a, b, right, 1, size, prefer[1])
         return third, self._unit(second), doubt | doubt2
 
-    def _slide(self, known: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         """Joint 2 prismatic: g = y + d2 z."""
         # known_k - rows_k . y, coefficients of (1, b1, b2)
         across: list[list[Entry]] = (-self.rows @ self.Y).tolist()
@@ -213,7 +216,7 @@ class Position:
         if self.prismatic[0]:
             # two equations linear in d2: eliminate it, then take it from the larger one
             only = [soa.sub(soa.mul(z1, a), soa.mul(z0, b)) for a, b in zip(*across, strict=True)]
-            third, doubt = self._one_unknown(only, prefer)
+            third, doubt = self._one_unknown(only, size, prefer)
             k = 0 if abs(z0) >= abs(z1) else 1
             return third, Pair(_at(across[k], third) / float(self.rows[k, 2]), None), doubt
         # |y|^2 / 2, for a revolute joint 3 affine in b: cos^2 and sin^2 have equal factors and no product
@@ -224,12 +227,12 @@ class Position:
         half, curved = [float(v) for v in half], float(curved)
         if not self.regular:
             # the height does not feel d2: it gives joint 3, then the distance gives d2
-            third, doubt = self._one_unknown(across[0], prefer)
+            third, doubt = self._one_unknown(across[0], size, prefer)
             rest = soa.sub(_at(across[1], third), _at(half, third))
             if third.s is None:
                 rest = soa.sub(rest, soa.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, soa.add(self._tip(third)[2], z1), -rest, 1, self.scale)
+            d, doubt2 = quadratic(0.5, soa.add(self._tip(third)[2], z1), -rest, 1, size)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [soa.mul(1.0 / z0, v) for v in across[0]]
@@ -237,20 +240,20 @@ class Position:
         factor = [soa.add(soa.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
         six = _sum([*constant, curved, 0.0, 0.0], _product(d2, factor))
         if self.prismatic[2]:
-            d, doubt = quadratic(six[3], six[1], six[0], 0, self.scale)
+            d, doubt = quadratic(six[3], six[1], six[0], 0, size)
             third = Pair(d, None)
         else:
-            third, doubt = self._roots(six)
+            third, doubt = self._roots(six, size)
         return third, Pair(_at(d2, third), None), doubt
 
-    def _one_unknown(self, coefficients: list[Entry], prefer: Prefer) -> tuple[Pair, Bool]:
+    def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Bool]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         known, slope, other = coefficients
         if self.prismatic[2]:
             if abs(slope) < 1e-12:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(soa.mul(-1.0 / slope, known), None), np.zeros(1, bool)
-        third, doubt = linear(slope, other, soa.mul(-1.0, known), 0, self.scale, prefer[2])
+        third, doubt = linear(slope, other, soa.mul(-1.0, known), 0, size, prefer[2])
         return self._unit(third), doubt
 
 

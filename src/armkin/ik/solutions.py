@@ -34,7 +34,8 @@ class Solutions:
     `near`; rows past the last branch are nan. valid: (..., B) the row reaches the target to
     1e-9 of the arm's reach. within_limits: (..., B). branch: (..., B) index into `names`, -1
     past the last. status: (...) of `Status`. free: (..., n) joints that a singular target
-    leaves free. complete: every isolated real branch is guaranteed to be there.
+    leaves free. complete: every isolated real branch is guaranteed to be there (never of a
+    sliding arm's targets more than 20 reaches away).
     """
 
     arm: Arm

@@ -20,7 +20,7 @@ from armkin.ik.geometry import Geometry, solver
 from armkin.ik.limits import nearest_copy, nearest_row
 from armkin.ik.names import branch_names
 from armkin.ik.solutions import Solutions, Status
-from armkin.ik.subproblems import Pair, Prefer, distance2, spin
+from armkin.ik.subproblems import Pair, Prefer, distance2, residual2, spin
 from armkin.ik.tasks import Task, read_targets
 from armkin.ik.tracking import follow
 from armkin.limits import SLACK
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
 ACCEPTED_MM = 5e-10  # and as a length
+FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete: rounding grows
 BLOCK = 512  # poses whose rows are written joint by joint while they are in the cache
 NEARBY = 1e-6  # residual up to which a candidate is worth correcting
 
@@ -102,8 +103,17 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         names=names,
         method=geometry.name,
         why=geometry.why,
-        complete=geometry.complete,
+        complete=geometry.complete and not _far(arm, definition, target),
     )
+
+
+def _far(arm: Arm, task: Task, target: Array) -> bool:
+    """Whether any target is so far from the arm's links, on a slide, that rounding may hide a branch."""
+    if not arm.prismatic.any():
+        return False
+    p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+    distance = np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1)
+    return bool((distance > FAR * arm.reach).any())
 
 
 def _empty(N: int, B: int, n: int) -> _Out:
@@ -317,7 +327,7 @@ def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: l
         columns = [soa.turn(link[i], v) for v in columns]
     full = task.orientation == "full"
     where = goal[9:12] if full else goal[: task.position]
-    total = soa.mul(1.0 / arm.reach**2, distance2(p, where))
+    total = residual2(p, where, arm.reach, bool(arm.prismatic.any()), link[0][9:12])
     wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
     for v, w in zip(columns, wanted, strict=False):
         total = total + distance2(v, w)

@@ -81,6 +81,17 @@ def distance2(u: list[Entry], v: list[Entry]) -> Entry:
     return total
 
 
+def residual2(p: list[Entry], where: list[Entry], reach: float, slides: bool, base: list[Entry]) -> Entry:
+    """Squared distance of a point p of the arm from where it should be, in units of the reach.
+
+    slides: the arm has sliding joints, which may be far longer than its links: rounding then grows
+    with the target's distance from base (3,), its first joint, and that is added to the reach.
+    """
+    if not slides:
+        return soa.mul(1.0 / reach**2, distance2(p, where))
+    return distance2(p, where) / (reach**2 + distance2(where, base))
+
+
 def signs(axis: int) -> Array:
     """[+1, -1] along branch axis 0, 1 or 2 of (b0, b1, b2, N)."""
     shape = [1, 1, 1, 1]
@@ -89,7 +100,7 @@ def signs(axis: int) -> Array:
 
 
 def linear(
-    a: Entry, b: Entry, c: Entry, axis: int, scale: float, prefer: Pair | None, disc: Entry | None = None
+    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None
 ) -> tuple[Pair, Bool]:
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
@@ -109,7 +120,7 @@ def linear(
     doubt = np.abs(disc) < TANGENT * h2
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
     least = FREE * scale * scale
-    if isinstance(h2, float):
+    if isinstance(h2, float) and isinstance(least, float):
         if h2 < least:
             doubt = (c == c) | doubt  # the equation says nothing about the angle, whatever the target
         inverse: Entry = 1.0 / max(h2, least)
@@ -133,7 +144,7 @@ def rotation_between(
     uy: Entry,
     vx: Entry,
     vy: Entry,
-    scale: float,
+    scale: Entry,
     prefer: Pair | None,
     length2: Entry | None = None,
 ) -> tuple[Pair, Bool]:
@@ -163,7 +174,7 @@ def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
 
 
-def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: float) -> tuple[Array, Bool]:
+def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: Entry) -> tuple[Array, Bool]:
     """Solve ``a d^2 + b d + c = 0`` for both roots d; scale: a length of the size of d.
 
     With d = scale tan(q/2) this is a `linear` problem, in which a vanishing a is no special
@@ -187,7 +198,7 @@ def half_tangent(pair: Pair) -> Entry:
     return np.where(far, 1e9, above / np.where(far, 1.0, below))
 
 
-def trig_quadratic(e: list[Entry], scale: float, near: float = TOUCHING) -> tuple[Pair, Bool]:
+def trig_quadratic(e: list[Entry], scale: Entry, near: float = TOUCHING) -> tuple[Pair, Bool]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
     e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
