@@ -117,10 +117,8 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
                     missing = not_found(report, part, 60 if report.arm.n < 4 else 250, 3)
                     weak += [oracle.weakness(report.screw, report.goals.take([k]), q[None])[0] for k, q in missing]
             count, branches = (sum(each) for each in zip(*((len(r.q), r.counts.sum()) for r in reports), strict=True))
-            print(
-                f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {' '.join(f'{w:.0e}' for w in weak[:5])} |",
-                flush=True,
-            )
+            where = " ".join(f"{w:.0e}" for w in weak[:5])
+            print(f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {where} |", flush=True)
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ import pytest
 from checks import Report, examine, random_joints
 from geometries import random_case
 from oracle import Screws, rotation, shift
+from test_every_branch import shipped
 
 from armkin.arm import Arm
 
@@ -121,3 +122,12 @@ def test_rounded_tables() -> None:
     assert not report.lost.any()
     assert report.counts.mean() > 7.9
     assert report.mm < 1e-9
+
+
+@pytest.mark.parametrize("off", [1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize("name", ["three_dof", "labvolt_5150", "ur5e", "irb120"])
+def test_singular_neighbourhoods(name: str, off: float) -> None:
+    """Some poses of thousands lie as close to a singularity as the arm to its class; none is lost."""
+    arm, screw = moved(shipped(name)[0], off, 1)
+    report = examine(arm, screw, None, random_joints(screw, 3000, 1))
+    assert not report.lost.any(), f"{report.weak[report.lost]}"

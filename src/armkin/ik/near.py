@@ -11,20 +11,21 @@ six joints, the quartic for three. There is no proof that nothing is lost in bet
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin import soa
 from armkin.ik import elbow, general, numeric, planar, position, spherical, three_parallel
 from armkin.ik.chain import Chain
 from armkin.ik.geometry import NEAR, Geometry
 from armkin.ik.position import Position
-from armkin.ik.subproblems import Candidates, Pair
+from armkin.ik.recorded import recorded
+from armkin.ik.subproblems import Candidates
 from armkin.ik.tasks import PARALLEL, Task, targets_of
 from armkin.kinematics import fk
+from armkin.rotation import rotation_about
 from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad
+AROUND = 5.0  # how far around a target its neighbours must have the same branches, in distances from the class
 HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
 
 
@@ -81,31 +83,28 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     """How far the arm is from its class: residual of the seeds for postures of its own, lengths in reaches."""
     q = np.random.default_rng(2).uniform(-2.5, 2.5, (64, arm.n)) * np.where(arm.prismatic, arm.reach / 5, 1.0)
     target = targets_of(task, fk(arm, q), q)
-    seed, _ = _seeds(arm, task, alike, target)
+    seed, _, _ = recorded(arm, task, alike).rows(target)
     B = seed.shape[1]
     rough = numeric.missing(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
     return float(np.quantile(rough.min(axis=1), 0.8)) + 1e-14
 
 
-def _seeds(arm: Arm, task: Task, alike: Geometry, target: Array, off: float = 0.0) -> tuple[Array, Bool]:
-    """Candidates (N, B, n) of the similar arm, real or not, and its doubts (N,).
-
-    A pair without a real root leaves the unit circle by as much as it misses one: where that is
-    no more than the arm's distance `off` from its class explains, the arm itself may have a root.
-    """
-    assert alike.pairs is not None
-    entries = soa.read(target) if task.orientation == "full" else list(np.ascontiguousarray(target.T))
-    prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
-    found = alike.pairs(entries, prefer)
-    values, doubt = found.values(), found.doubt
-    shape = np.broadcast_shapes((1, 1, 1, len(target)), *(np.shape(v) for v in values))
-    q = np.stack([np.broadcast_to(v, shape).reshape(-1, len(target)).T for v in values], axis=2)
-    if off:
-        outside = [np.abs(pair.c * pair.c + pair.s * pair.s - 1.0) for pair in found.pairs if pair.s is not None]
-        most = np.max(np.stack([np.broadcast_to(v, shape) for v in outside]), axis=0) if outside else np.zeros(shape)
-        # what is not quite on the circle only because the arm is not quite of the class comes later
-        doubt = doubt | ((most > 1e-12 + 10.0 * off) & (most < 100.0 * off))
-    return q, np.asarray(np.broadcast_to(doubt, shape).reshape(-1, len(target)).any(axis=0))
+def _around(arm: Arm, task: Task, target: Array, size: float) -> Iterator[Array]:
+    """The targets (N, m) or (N, 4, 4) moved by size [reaches, rad] both ways along each of their coordinates."""
+    for way in (size, -size):
+        if task.orientation == "full":
+            for axis in range(3):
+                there = target.copy()
+                there[:, axis, 3] += way * arm.reach
+                yield there
+                turned = target.copy()
+                turned[:, :3, :3] = rotation_about(axis, way) @ target[:, :3, :3]
+                yield turned
+        else:
+            for k in range(target.shape[1]):
+                there = target.copy()
+                there[:, k] += way * (arm.reach if k < task.position else 1.0)
+                yield there
 
 
 def _fallback(arm: Arm, task: Task) -> Callable[[Array], Array] | None:
@@ -126,8 +125,8 @@ def _fallback(arm: Arm, task: Task) -> Callable[[Array], Array] | None:
         return elimination
     if task.name == "xyz":
         quartic = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], 0.0)
-        geometry = Geometry("", "", False, lambda goal, prefer: Candidates(*quartic.solve(goal, prefer)))
-        return lambda target: _seeds(arm, task, geometry, target)[0]
+        geometry = Geometry("", "", False, lambda goal, prefer: Candidates(*quartic.solve(goal, prefer)), straight=True)
+        return lambda target: recorded(arm, task, geometry).rows(target)[0]
     return None
 
 
@@ -141,8 +140,11 @@ def _solve(
     few = np.flatnonzero(found.doubt)
     if not len(few):
         return q, found.doubt
-    extra = _beside(arm, task, found.q[few], target[few]) if other is None else other(target[few])
-    more = np.concatenate([found.q[few], extra], axis=1)
+    more = found.q[few]
+    if other is not None:
+        more = np.concatenate([more, other(target[few])], axis=1)
+    if arm.n < 6:
+        more = np.concatenate([more, _beside(arm, task, more, target[few])], axis=1)
     B, flat = more.shape[1], more.reshape(-1, arm.n).copy()
     goals = np.repeat(target[few], B, axis=0)
     some = np.flatnonzero(numeric.missing(arm, task, flat, goals) < HOPELESS)
@@ -176,9 +178,21 @@ def _beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 
 def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
-    """Move the seeds onto the arm, and find the poses for which that may not be all."""
-    seed, doubt = _seeds(arm, task, alike, target, off)
+    """Move the seeds onto the arm, and find the poses for which that may not be all.
+
+    The true arm reaches a target as the similar one reaches another, not much more than `off` away. Hence a
+    pose is sure only if the similar arm has the same branches all around it, and they hardly move.
+    """
+    source = recorded(arm, task, alike)
+    seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
+    weak = min(0.05, 1.5 * np.sqrt(off)) + 1e-6
+    real = miss < (1e-9 + 30.0 * off) ** 2
+    for there in _around(arm, task, target, AROUND * off):
+        q, miss, doubt_there = source.rows(there)
+        with np.errstate(invalid="ignore"):
+            steady = numeric.wrapped_distance(arm, q, seed) < AROUND * off / weak
+        doubt = doubt | doubt_there | np.where(miss < (1e-9 + 30.0 * off) ** 2, ~real | ~steady, real).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
     rough = numeric.missing(arm, task, flat, goals)
@@ -188,8 +202,7 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     good = size <= ACCEPTED
     with np.errstate(invalid="ignore"):
         moved = numeric.wrapped_distance(arm, q, flat) > np.sqrt(off)
-    weak = min(0.05, 1.5 * np.sqrt(off)) + 1e-6
-    unsure = np.where(good, moved | (strength < weak), rough < 1e-9 + 30.0 * off)
+    unsure = np.where(good, moved | (strength < weak), np.minimum(rough, size) < 1e-9 + 30.0 * off)
     doubt = doubt | unsure.reshape(N, B).any(axis=1)
     branch, good = q.reshape(N, B, n), good.reshape(N, B)
     for i in range(B):

@@ -7,7 +7,6 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `e
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,13 +18,13 @@ from armkin.ik import edges
 from armkin.ik.geometry import Geometry, solver
 from armkin.ik.limits import nearest_copy, nearest_row
 from armkin.ik.names import branch_names
+from armkin.ik.recorded import entries, recorded
 from armkin.ik.solutions import Solutions, Status
-from armkin.ik.subproblems import Pair, Prefer, distance2, residual2, spin
+from armkin.ik.subproblems import Pair
 from armkin.ik.tasks import Task, read_targets
 from armkin.ik.tracking import follow
 from armkin.limits import SLACK
 from armkin.soa import Array, Bool, Entry
-from armkin.straight import Straight
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -130,7 +129,7 @@ def _empty(N: int, B: int, n: int) -> _Out:
 def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
     """Closed forms: chunks of poses that stay in the cache, entry by entry."""
     out: _Out | None = None
-    runner = _runner(arm, task, geometry)
+    runner = recorded(arm, task, geometry)
     straight = runner.get(len(target))
     workspace: list[NDArray[np.generic]] = []
     for start in range(0, max(len(target), 1), soa.CHUNK):
@@ -138,14 +137,14 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         goal, close = target[rows], near[rows] if one is None else one
         N = len(goal)
         if straight is None:
-            *values, miss, doubt = runner.candidates(_entries(task, goal), _prefer(arm, close))
+            *values, miss, doubt = runner.candidates(entries(task, goal), _prefer(arm, close))
         elif N == 1:
             one_goal = soa.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()
             *values, miss, doubt = straight.single(one_goal)
         else:
             if not workspace or workspace[-1].shape[-1] != N:
                 workspace = straight.workspace(N)
-            *values, miss, doubt = straight.run(_entries(task, goal), workspace)
+            *values, miss, doubt = straight.run(entries(task, goal), workspace)
         if runner.axes is None:
             runner.axes = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))[:-1]
         shape, B = (*runner.axes, N), math.prod(runner.axes)
@@ -166,7 +165,7 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
         if len(doubtful) and straight is not None:
             # again, with the preferred values for joints that are free
             again = runner.candidates(
-                _entries(task, goal[doubtful]), _prefer(arm, close[doubtful] if one is None else one)
+                entries(task, goal[doubtful]), _prefer(arm, close[doubtful] if one is None else one)
             )
             for i in range(arm.n):
                 few = np.broadcast_to(again[i], (*shape[:-1], len(doubtful)))
@@ -209,11 +208,6 @@ def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.
     return np.flatnonzero(edge)
 
 
-def _entries(task: Task, goal: Array) -> list[Entry]:
-    """Targets (N, m) or (N, 4, 4) as arrays of length N."""
-    return soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
-
-
 def _prefer(arm: Arm, close: Array) -> list[Pair]:
     """What a free joint is given: close (N, n), or (n,) for all."""
     values = list(np.ascontiguousarray(close.T))
@@ -229,40 +223,6 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
     if lower == -np.inf and upper == np.inf:
         return value, True
     return value, (value >= lower - SLACK) & (value <= upper + SLACK)
-
-
-class _Runner:
-    """A geometry's formula, recorded as straight-line code once that pays: it takes some milliseconds."""
-
-    def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
-        self.arm, self.task, self.geometry = arm, task, geometry
-        self.link = [soa.constant(L) for L in arm.link]
-        self.calls = 0
-        self.straight: Straight | None = None
-        self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
-
-    def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
-        """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
-        assert self.geometry.pairs is not None
-        found = self.geometry.pairs(goal, prefer)
-        miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
-        values = found.values()
-        if len(self.task.sums):
-            miss = np.maximum(miss, _sum_miss(self.task, values, goal))
-        return [*values, miss, found.doubt]
-
-    def get(self, batch: int) -> Straight | None:
-        """The recorded code, if there is any or this batch makes it worth while."""
-        self.calls += 1
-        if self.straight is None and self.geometry.straight and (batch >= 64 or self.calls > 4):
-            inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
-            self.straight = Straight(lambda goal: self.candidates(goal, [None] * self.arm.n), inputs)
-        return self.straight
-
-
-@lru_cache(maxsize=64)
-def _runner(arm: Arm, task: Task, geometry: Geometry) -> _Runner:
-    return _Runner(arm, task, geometry)
 
 
 def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
@@ -306,41 +266,3 @@ def _tidy(
             new[row, place] = old[row, column]
             array[some] = new
         part.valid[some] = np.arange(valid.shape[1]) < count[:, None]
-
-
-def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:
-    """Squared residual of every branch, from its pairs, lengths in units of the reach.
-
-    The tool's point, and for orientations its x and z axes (two columns of a rotation
-    determine the third), carried from the tool back to the base.
-    """
-    p, axes = link[-1][9:12], {"none": (), "axis": (6,), "full": (0, 6)}[task.orientation]
-    columns = [link[-1][k : k + 3] for k in axes]
-    for i in range(arm.n - 1, -1, -1):
-        c, s = pairs[i]
-        if s is None:
-            p = [p[0], p[1], soa.add(p[2], c)]
-        else:
-            p = spin(c, s, p)
-            columns = [spin(c, s, v) for v in columns]
-        p = soa.apply(link[i], p)
-        columns = [soa.turn(link[i], v) for v in columns]
-    full = task.orientation == "full"
-    where = goal[9:12] if full else goal[: task.position]
-    total = residual2(p, where, arm.reach, bool(arm.prismatic.any()), link[0][9:12])
-    wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
-    for v, w in zip(columns, wanted, strict=False):
-        total = total + distance2(v, w)
-    return total
-
-
-def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Entry:
-    """Squared residual of the sums of joint values, modulo whole turns."""
-    total: Entry = 0.0
-    for k, weights in enumerate(task.sums):
-        angle = goal[task.position + k] - task.offsets[k]
-        for w, value in zip(weights, values, strict=True):
-            angle = soa.sub(angle, soa.mul(float(w), value))
-        angle = angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
-        total = soa.add(total, angle * angle)
-    return total

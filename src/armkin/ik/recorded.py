@@ -1,0 +1,109 @@
+"""Candidates of a closed form with their residuals, from code recorded once."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin import soa
+from armkin.ik.geometry import Geometry
+from armkin.ik.subproblems import Pair, Prefer, distance2, residual2, spin
+from armkin.ik.tasks import Task
+from armkin.soa import Array, Bool, Entry
+from armkin.straight import Straight
+
+if TYPE_CHECKING:
+    from armkin.arm import Arm
+
+
+class Recorded:
+    """A geometry's formula, recorded as straight-line code once that pays: it takes some milliseconds."""
+
+    def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
+        self.arm, self.task, self.geometry = arm, task, geometry
+        self.link = [soa.constant(L) for L in arm.link]
+        self.calls = 0
+        self.straight: Straight | None = None
+        self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
+
+    def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
+        """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
+        assert self.geometry.pairs is not None
+        found = self.geometry.pairs(goal, prefer)
+        miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
+        values = found.values()
+        if len(self.task.sums):
+            miss = np.maximum(miss, _sum_miss(self.task, values, goal))
+        return [*values, miss, found.doubt]
+
+    def get(self, batch: int) -> Straight | None:
+        """The recorded code, if there is any or this batch makes it worth while."""
+        self.calls += 1
+        if self.straight is None and self.geometry.straight and (batch >= 64 or self.calls > 4):
+            inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
+            self.straight = Straight(lambda goal: self.candidates(goal, [None] * self.arm.n), inputs)
+        return self.straight
+
+
+    def rows(self, target: Array) -> tuple[Array, Array, Bool]:
+        """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
+        N = len(target)
+        straight = self.get(N)
+        if straight is None:
+            found = self.candidates(entries(self.task, target), [None] * self.arm.n)
+        else:
+            found = list(straight.run(entries(self.task, target), straight.workspace(N)))
+        shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in found))
+        *values, miss, doubt = (np.broadcast_to(v, shape).reshape(-1, N).T for v in found)
+        return np.stack(values, axis=2), miss, np.asarray(doubt.any(axis=1))
+
+
+@lru_cache(maxsize=64)
+def recorded(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
+    """The same for all calls of one solver."""
+    return Recorded(arm, task, geometry)
+
+
+def entries(task: Task, goal: Array) -> list[Entry]:
+    """Targets (N, m) or (N, 4, 4) as arrays of length N."""
+    return soa.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+
+
+def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:
+    """Squared residual of every branch, from its pairs, lengths in units of the reach.
+
+    The tool's point, and for orientations its x and z axes (two columns of a rotation
+    determine the third), carried from the tool back to the base.
+    """
+    p, axes = link[-1][9:12], {"none": (), "axis": (6,), "full": (0, 6)}[task.orientation]
+    columns = [link[-1][k : k + 3] for k in axes]
+    for i in range(arm.n - 1, -1, -1):
+        c, s = pairs[i]
+        if s is None:
+            p = [p[0], p[1], soa.add(p[2], c)]
+        else:
+            p = spin(c, s, p)
+            columns = [spin(c, s, v) for v in columns]
+        p = soa.apply(link[i], p)
+        columns = [soa.turn(link[i], v) for v in columns]
+    full = task.orientation == "full"
+    where = goal[9:12] if full else goal[: task.position]
+    total = residual2(p, where, arm.reach, bool(arm.prismatic.any()), link[0][9:12])
+    wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
+    for v, w in zip(columns, wanted, strict=False):
+        total = total + distance2(v, w)
+    return total
+
+
+def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Entry:
+    """Squared residual of the sums of joint values, modulo whole turns."""
+    total: Entry = 0.0
+    for k, weights in enumerate(task.sums):
+        angle = goal[task.position + k] - task.offsets[k]
+        for w, value in zip(weights, values, strict=True):
+            angle = soa.sub(angle, soa.mul(float(w), value))
+        angle = angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
+        total = soa.add(total, angle * angle)
+    return total
