@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 CHUNK = 1024  # poses corrected at once
 ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad
 AROUND = 5.0  # how far around a target its neighbours must have the same branches, in distances from the class
+WEAK = 0.05  # smallest singular value below which a branch may have a close neighbour
+# [rad] how far from a branch its neighbour across a weak Jacobian is looked for, in two rounds
+PUSHES = ((0.6, 0.1, 0.01), (2.0, 1.4, 1.0, 0.7, 0.4, 0.2, 0.1, 0.03))
 HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
 
 
@@ -140,41 +143,54 @@ def _solve(
     few = np.flatnonzero(found.doubt)
     if not len(few):
         return q, found.doubt
-    more = found.q[few]
+    more, goals = found.q[few], target[few]
+    own = more.shape[1]
     if other is not None:
-        more = np.concatenate([more, other(target[few])], axis=1)
-    if arm.n < 6:
-        more = np.concatenate([more, _beside(arm, task, more, target[few])], axis=1)
-    B, flat = more.shape[1], more.reshape(-1, arm.n).copy()
-    goals = np.repeat(target[few], B, axis=0)
-    some = np.flatnonzero(numeric.missing(arm, task, flat, goals) < HOPELESS)
-    size = np.full(len(flat), np.inf)
-    flat[some], size[some] = numeric.correct(arm, task, flat[some], goals[some], steps=20)
-    flat[size > 1e-6] = np.nan
-    more = flat.reshape(-1, B, arm.n)
-    own = found.q.shape[1]
-    # what the other method has found again keeps the seed's place and name
-    with np.errstate(invalid="ignore"):
-        for i in range(own, B):
-            again = numeric.wrapped_distance(arm, more[:, :i], more[:, i : i + 1]) < 1e-6
-            more[again.any(axis=1), i] = np.nan
-    new = ~np.isnan(more[:, own:, 0])
-    order = own + np.argsort(~new, axis=1, kind="stable")[:, : int(new.sum(axis=1).max())]
-    more = np.concatenate([more[:, :own], np.take_along_axis(more, order[:, :, None], axis=1)], axis=1)
+        more = np.concatenate([more, other(goals)], axis=1)
+    if arm.n == 6:
+        more = _settled(arm, task, more, goals, own)
+    else:  # once more from what the first pushes have found
+        for pushes in PUSHES:
+            beside = _beside(arm, task, more, goals, pushes)
+            more = _settled(arm, task, np.concatenate([more, beside], axis=1), goals, own)
     out = np.full((len(target), more.shape[1], arm.n), np.nan)
     out[:, :own] = q
     out[few] = more
     return out, found.doubt
 
 
-def _beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
+    """Seeds (N, B, n) moved onto the arm: the first `own` in their places, then what else they lead to, once."""
+    N, B, n = q.shape
+    flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
+    some = np.flatnonzero(numeric.missing(arm, task, flat, goals) < HOPELESS)
+    size = np.full(len(flat), np.inf)
+    flat[some], size[some] = numeric.correct(arm, task, flat[some], goals[some], steps=20)
+    flat[size > 1e-6] = np.nan
+    q = _packed(flat.reshape(N, B, n), own)
+    with np.errstate(invalid="ignore"):
+        for i in range(1, q.shape[1]):
+            again = numeric.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < 1e-6
+            q[again.any(axis=1), i] = np.nan
+    return _packed(q, own)
+
+
+def _packed(q: Array, own: int) -> Array:
+    """Rows (N, B, n) without the columns that are nan, but for the first `own`."""
+    there = ~np.isnan(q[:, own:, 0])
+    order = own + np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
+    return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
+
+
+def _beside(arm: Arm, task: Task, q: Array, target: Array, pushes: tuple[float, ...]) -> Array:
     """Seeds for the other of two branches that all but touch: q (N, B, n) moved both ways where it is weakest."""
     N, B, n = q.shape
     flat = np.nan_to_num(q.reshape(-1, n))
-    _, V, _ = numeric.null_space(arm, task, flat, np.repeat(target, B, axis=0))
+    strength, V, _ = numeric.null_space(arm, task, flat, np.repeat(target, B, axis=0))
     push = V[:, -1] * np.where(arm.prismatic, arm.reach, 1.0)
-    moved = [flat + size * push for size in (0.6, -0.6, 0.1, -0.1, 0.01, -0.01)]
-    return np.stack(moved, axis=1).reshape(N, 6 * B, n)
+    push[(strength > WEAK) | np.isnan(q.reshape(-1, n)).any(axis=1)] = np.nan
+    moved = [flat + way * size * push for size in pushes for way in (1, -1)]
+    return np.stack(moved, axis=1).reshape(N, 2 * len(pushes) * B, n)
 
 
 def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
@@ -186,7 +202,7 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     source = recorded(arm, task, alike)
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(0.05, 1.5 * np.sqrt(off)) + 1e-6
+    weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
     real = miss < (1e-9 + 30.0 * off) ** 2
     for there in _around(arm, task, target, AROUND * off):
         q, miss, doubt_there = source.rows(there)
