@@ -3,7 +3,7 @@
     python tests/bench/check_ik.py [--robots] [--classes] [--near] [--oracle] [--poses 10000] [--arms 50] [--only TEXT]
 
 Without a choice all four tables are made. The oracle is a multi-start Newton iteration on screws that shares
-no code with armkin; EAIK is compared as well where it is installed and fits the arm.
+no code with armkin; EAIK and ssik are compared as well where they are installed and fit the arm.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "ik"))
 
 import oracle
-from checks import Report, examine, not_found, random_joints
+from checks import Array, Report, examine, not_found, random_joints
 from geometries import CLASSES, random_case
 from test_every_branch import NAMES, shipped
 from test_near import OFF, moved
@@ -40,26 +41,60 @@ def row(name: str, reports: list[Report], seconds: float, extra: str = "") -> No
     )
 
 
-def eaik_counts(report: Report) -> str:
-    """Share of poses on which EAIK finds as many branches, where it can solve the arm."""
+def agreement(reports: list[Report], poses: int = 1000) -> str:
+    """On how many poses the peers find as many branches, where they are installed and can solve the arm."""
+    texts = []
+    for name, peer in (("EAIK", eaik), ("ssik", ssik)):
+        same = total = 0
+        for report in reports:
+            solve = peer(report)
+            if solve is not None:
+                part = range(min(len(report.q), max(poses // len(reports), 1)))
+                same += sum(solve(report.goals.T[k]) == report.counts[k] for k in part)
+                total += len(part)
+        if total:
+            texts.append(f"{name} agrees on {same} of {total}")
+    return " " + ", ".join(texts) if texts else ""
+
+
+def eaik(report: Report) -> Callable[[Array], int] | None:
+    """Its number of branches for poses of six revolute joints, if it knows a decomposition of the arm."""
     try:
-        from eaik.IK_DH import DhRobot
+        from eaik.IK_HP import HPRobot
     except ImportError:
-        return ""
-    rows = [joint.dh for joint in report.arm.file.joints] if report.arm.file else []
-    if report.solutions.task.name != "pose" or len(rows) != 6 or report.arm.file.convention != "standard":
-        return ""
-    alpha, a, d, theta = (np.array([getattr(r, key) for r in rows]) for key in ("alpha", "a", "d", "theta"))
-    if theta.any() or not np.allclose(report.arm.base, np.eye(4)) or report.arm.prismatic.any():
-        return ""
-    robot = DhRobot(np.radians(alpha), a / 1000, d / 1000)
-    same = 0
-    for T, count in zip(report.goals.T[:1000], report.counts[:1000], strict=True):
+        return None
+    screw = report.screw
+    if report.solutions.task.name != "pose" or len(screw.w) != 6 or screw.prismatic.any():
+        return None
+    points = np.concatenate([np.zeros((1, 3)), screw.p, screw.M[None, :3, 3]]) / 1000
+    robot = HPRobot(screw.w, np.diff(points, axis=0))
+    if not robot.hasKnownDecomposition() or "NO_PARALLEL_NO_INTERSECTING" in robot.getKinematicFamily():
+        return None  # in that family it calls all its answers approximate
+
+    def solve(T: Array) -> int:
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = T[:3, :3] @ screw.M[:3, :3].T, T[:3, 3] / 1000
+        answer = robot.IK(pose)
+        return int((~np.array(answer.is_LS, dtype=bool)).sum())
+
+    return solve
+
+
+def ssik(report: Report) -> Callable[[Array], int] | None:
+    """Its number of branches for the arms that it is shipped with and that are general: Kinova's JACO."""
+    try:
+        from ssik.prebuilt.kinova import jaco2_ik
+    except ImportError:
+        return None
+    if report.arm.name != "jaco_j2n6s300":
+        return None
+
+    def solve(T: Array) -> int:
         pose = T.copy()
         pose[:3, 3] /= 1000
-        answer = robot.IK(pose)
-        same += int((~np.array(answer.is_LS, dtype=bool)).sum()) == count
-    return f" EAIK agrees on {same} of {min(len(report.q), 1000)}"
+        return len(jaco2_ik.solve(pose, respect_limits=False))
+
+    return solve
 
 
 def robots(poses: int, only: str) -> None:
@@ -69,7 +104,7 @@ def robots(poses: int, only: str) -> None:
             arm, screw = shipped(name)
             begin = time.perf_counter()
             report = examine(arm, screw, None, random_joints(screw, poses, 1))
-            row(name, [report], time.perf_counter() - begin, eaik_counts(report))
+            row(name, [report], time.perf_counter() - begin, agreement([report]))
 
 
 def classes(poses: int, arms: int, only: str) -> None:
@@ -81,7 +116,7 @@ def classes(poses: int, arms: int, only: str) -> None:
                 case = random_case(name, seed)
                 q = random_joints(case.screw, max(poses // arms, 1), seed)
                 reports.append(examine(case.arm, case.screw, case.task, q))
-            row(name, reports, time.perf_counter() - begin)
+            row(name, reports, time.perf_counter() - begin, agreement(reports))
 
 
 def near(poses: int, only: str) -> None:
