@@ -166,7 +166,7 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     some = np.flatnonzero(numeric.missing(arm, task, flat, goals) < HOPELESS)
     size = np.full(len(flat), np.inf)
     flat[some], size[some] = numeric.correct(arm, task, flat[some], goals[some], steps=20)
-    flat[size > 1e-6] = np.nan
+    flat[size > 1e-9] = np.nan
     q = _packed(flat.reshape(N, B, n), own)
     with np.errstate(invalid="ignore"):
         for i in range(1, q.shape[1]):
