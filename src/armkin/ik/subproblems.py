@@ -219,7 +219,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, near: float = TOUCHING) -> tupl
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
     w = (e0 + 0.5 * (ecc + ess)) * inverse
-    x = _line_pair(a, b, u, v, w)
+    x, triple = _line_pair(a, b, u, v, w)
     M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
     # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
     columns = [
@@ -250,12 +250,14 @@ def trig_quadratic(e: list[Entry], scale: Entry, near: float = TOUCHING) -> tupl
         c, s = c + s * step, s - c * step
         shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
-    doubt = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < near * near * h2)) | (size < 1e-12 * scale)
-    return Pair(c, s), doubt
+    merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < near * near * h2))
+    return Pair(c, s), merging | triple | (size < 1e-12 * scale)
 
 
-def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> Entry:
+def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:
     """The x in [-sqrt(h), sqrt(h)] farthest from being double for which the conic plus x times the circle degenerates.
+
+    And whether it is about to be triple: the circle and the conic touch in three or four points at once.
 
     ``x^3 - w x^2 + (r - h) x + rest = 0`` with h = a^2 + b^2 and r = u^2 + v^2 is not positive at
     -sqrt(h) and not negative at sqrt(h).
@@ -286,7 +288,7 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> Entry:
         value = ((x - w) * x + linear_) * x + rest
         slope = (3.0 * x - 2.0 * w) * x + linear_
         x = x - value * slope / (slope * slope + 1e-30)
-    return x
+    return x, np.abs(slope) < 1e-6
 
 
 def _longest(sizes: list[Entry], vectors: list[list[Entry]]) -> list[Entry]:
