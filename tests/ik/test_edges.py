@@ -214,6 +214,18 @@ def test_slides_far_longer_than_the_links(name: str) -> None:
         assert not examine(c.arm, c.screw, c.task, q).solutions.complete
 
 
+@pytest.mark.parametrize(
+    ("name", "seed", "sample"),
+    [("RRR 2 meets 3", 112, 12), ("RRR 2 meets 3", 114, 14), ("RRR orthogonal, no offsets", 118, 18)],
+)
+def test_neighbours_of_weak_jacobians_are_no_self_motion(name: str, seed: int, sample: int) -> None:
+    """Among 50,000 random poses a few have isolated branches at singular values below 1e-6."""
+    case = random_case(name, seed)
+    report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 50_000, sample))
+    assert report.weak.min() < 1e-6
+    assert not report.lost.any()
+
+
 def test_no_target_is_too_odd() -> None:
     """Zeros, huge numbers and axis-aligned targets: no nan in an answer, no warning (they are errors here)."""
     targets = [

@@ -131,3 +131,11 @@ def test_singular_neighbourhoods(name: str, off: float) -> None:
     arm, screw = moved(shipped(name)[0], off, 1)
     report = examine(arm, screw, None, random_joints(screw, 3000, 1))
     assert not report.lost.any(), f"{report.weak[report.lost]}"
+
+
+def test_folds_far_apart() -> None:
+    """A sliding pitch arm 1e-3 off: the two branches of a fold lie half a radian apart."""
+    case = random_case("pitch arm, 5 joints, slide first", 12)
+    arm, screw = moved(case.arm, 1e-3, 12)
+    report = examine(arm, screw, case.task, random_joints(screw, 1000, 12))
+    assert not report.lost.any()

@@ -213,14 +213,11 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     flat = seed.reshape(-1, n)
     rough = numeric.missing(arm, task, flat, goals)
     some = np.flatnonzero(rough < HOPELESS)
-    q, size, strength = flat.copy(), np.full(N * B, np.inf), np.ones(N * B)
-    q[some], size[some], strength[some] = numeric.newton(arm, task, flat[some], goals[some], steps=6)
+    q, size = flat.copy(), np.full(N * B, np.inf)
+    q[some], size[some] = numeric.newton(arm, task, flat[some], goals[some], steps=6)
     good = size <= ACCEPTED
-    with np.errstate(invalid="ignore"):
-        moved = numeric.wrapped_distance(arm, q, flat) > np.sqrt(off)
-    unsure = np.where(good, moved | (strength < weak), np.minimum(rough, size) < 1e-9 + 30.0 * off)
-    doubt = doubt | unsure.reshape(N, B).any(axis=1)
     branch, good = q.reshape(N, B, n), good.reshape(N, B)
+    doubt = doubt | (real & ~good).any(axis=1)
     for i in range(B):
         for j in range(i):
             with np.errstate(invalid="ignore"):

@@ -68,14 +68,13 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tu
     return best, best_size
 
 
-def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[Array, Array, Array]:
+def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[Array, Array]:
     """Newton's method for tasks with as many constraints as joints, from starts (M, n) close to a solution.
 
-    Returns the best q met, its `missing`, and the strength of the Jacobian there: a lower
-    bound of its smallest singular value within a factor of sqrt(n).
+    Returns the best q met and its `missing`.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
-    q, best, best_size, strength = q.copy(), q.copy(), np.full(len(q), np.inf), np.ones(len(q))
+    q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
     active = np.arange(len(q))
     for _ in range(steps + 1):
         if not len(active):
@@ -86,14 +85,12 @@ def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[A
         gained = size < 0.5 * best_size[active]
         rows = active[better]
         best[rows], best_size[rows] = q[rows], size[better]
-        inverse = nudged(np.linalg.inv, J)
-        strength[active] = 1.0 / np.linalg.norm(inverse, axis=(1, 2))
-        step = np.einsum("mij,mj->mi", inverse, r)
+        step = nudged(np.linalg.solve, J, r[:, :, None])[:, :, 0]
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         q[active] += step * unit
         # a residual of rounding's size falls no further; a step that gains nothing is the last one
         active = active[(size > 1e-15) & (gained | (size > 1e-3))]
-    return best, best_size, strength
+    return best, best_size
 
 
 def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:

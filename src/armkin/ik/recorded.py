@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin import soa
 from armkin.ik.geometry import Geometry
-from armkin.ik.subproblems import Pair, Prefer, distance2, residual2, spin
+from armkin.ik.subproblems import Pair, Prefer, distance2, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Bool, Entry
 from armkin.straight import Straight
@@ -90,7 +90,7 @@ def _miss(arm: Arm, task: Task, link: list[soa.Pose], pairs: list[Pair], goal: l
         columns = [soa.turn(link[i], v) for v in columns]
     full = task.orientation == "full"
     where = goal[9:12] if full else goal[: task.position]
-    total = residual2(p, where, arm.reach, bool(arm.prismatic.any()), link[0][9:12])
+    total = soa.mul(1.0 / arm.reach**2, distance2(p, where))
     wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
     for v, w in zip(columns, wanted, strict=False):
         total = total + distance2(v, w)

@@ -25,7 +25,6 @@ from armkin.ik.subproblems import (
     Prefer,
     distance2,
     linear,
-    residual2,
     rotation_between,
     signs,
     spin,
@@ -112,7 +111,6 @@ class SphericalWrist:
             self.why = f"of the other three, {position.why}"
         self.links = [soa.constant(L) for L in chain.link[:4]]
         self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
-        self.slides = bool(chain.prismatic.any())
         L3 = chain.link[3]
         self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
         end = inverse(chain.link[6])
@@ -137,7 +135,7 @@ class SphericalWrist:
             P = soa.slide(P, pair.c) if pair.s is None else soa.rotate(P, *pair)
             P = soa.times(P, self.links[i + 1])
         there = soa.combine(1.0, P[9:12], self.height4, P[6:9])
-        miss = residual2(there, centre, self.reach, self.slides, self.links[0][9:12])
+        miss = soa.mul(1.0 / self.reach**2, distance2(there, centre))
         # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
         x = soa.turn_back(P, soa.turn(goal, self.end[0:3]))
         z = soa.turn_back(P, soa.turn(goal, self.end[6:9]))

@@ -81,17 +81,6 @@ def distance2(u: list[Entry], v: list[Entry]) -> Entry:
     return total
 
 
-def residual2(p: list[Entry], where: list[Entry], reach: float, slides: bool, base: list[Entry]) -> Entry:
-    """Squared distance of a point p of the arm from where it should be, in units of the reach.
-
-    slides: the arm has sliding joints, which may be far longer than its links: rounding then grows
-    with the target's distance from base (3,), its first joint, and that is added to the reach.
-    """
-    if not slides:
-        return soa.mul(1.0 / reach**2, distance2(p, where))
-    return distance2(p, where) / (reach**2 + distance2(where, base))
-
-
 def signs(axis: int) -> Array:
     """[+1, -1] along branch axis 0, 1 or 2 of (b0, b1, b2, N)."""
     shape = [1, 1, 1, 1]
