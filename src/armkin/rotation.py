@@ -57,14 +57,14 @@ def quaternion(R: ArrayLike) -> Array:
     return np.asarray(row / np.linalg.norm(row, axis=-1, keepdims=True) + 0.0)
 
 
-def rotation_about(axis: int, angle: float) -> Array:
-    """The rotation (3, 3) by an angle [rad] about the x, y or z axis (0, 1, 2).
+def rotation_about(axis: int, angle: ArrayLike) -> Array:
+    """Rotations (..., 3, 3) by angles (...) [rad] about the x, y or z axis (0, 1, 2).
 
     >>> rotation_about(2, np.pi / 2).round(6).tolist()
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     """
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
-    R[i, i] = R[j, j] = np.cos(angle)
-    R[i, j], R[j, i] = -np.sin(angle), np.sin(angle)
+    R = np.zeros((*np.shape(angle), 3, 3)) + np.eye(3)
+    R[..., i, i] = R[..., j, j] = np.cos(angle)
+    R[..., i, j], R[..., j, i] = -np.sin(angle), np.sin(angle)
     return R

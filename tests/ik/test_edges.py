@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import examine
+from checks import examine, random_joints
 from geometries import CLASSES, random_case
 from oracle import forward, goal, missing, screws
 

@@ -23,7 +23,7 @@ from armkin.ik.geometry import NEAR, Geometry
 from armkin.ik.position import Position
 from armkin.ik.recorded import recorded
 from armkin.ik.subproblems import Candidates
-from armkin.ik.tasks import PARALLEL, Task, targets_of
+from armkin.ik.tasks import PARALLEL, Task, distance, targets_of
 from armkin.kinematics import fk
 from armkin.rotation import rotation_about
 from armkin.soa import Array, Bool
@@ -92,8 +92,8 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     return float(np.quantile(rough.min(axis=1), 0.8)) + 1e-14
 
 
-def _around(arm: Arm, task: Task, target: Array, size: float) -> Iterator[Array]:
-    """The targets (N, m) or (N, 4, 4) moved by size [reaches, rad] both ways along each of their coordinates."""
+def _around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
+    """The targets (N, m) or (N, 4, 4) moved by size (N,) [reaches, rad] both ways along each of their coordinates."""
     for way in (size, -size):
         if task.orientation == "full":
             for axis in range(3):
@@ -203,12 +203,14 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
     weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
-    real = miss < (1e-9 + 30.0 * off) ** 2
-    for there in _around(arm, task, target, AROUND * off):
+    off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
+    limit = (1e-9 + 30.0 * off_here[:, None]) ** 2
+    real = miss < limit
+    for there in _around(arm, task, target, AROUND * off_here):
         q, miss, doubt_there = source.rows(there)
         with np.errstate(invalid="ignore"):
-            steady = numeric.wrapped_distance(arm, q, seed) < AROUND * off / weak
-        doubt = doubt | doubt_there | np.where(miss < (1e-9 + 30.0 * off) ** 2, ~real | ~steady, real).any(axis=1)
+            steady = numeric.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
+        doubt = doubt | doubt_there | np.where(miss < limit, ~real | ~steady, real).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
     rough = numeric.missing(arm, task, flat, goals)

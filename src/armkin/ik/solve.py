@@ -21,7 +21,7 @@ from armkin.ik.names import branch_names
 from armkin.ik.recorded import entries, recorded
 from armkin.ik.solutions import Solutions, Status
 from armkin.ik.subproblems import Pair
-from armkin.ik.tasks import Task, read_targets
+from armkin.ik.tasks import Task, distance, read_targets
 from armkin.ik.tracking import follow
 from armkin.limits import SLACK
 from armkin.soa import Array, Bool, Entry
@@ -102,17 +102,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         names=names,
         method=geometry.name,
         why=geometry.why,
-        complete=geometry.complete and not _far(arm, definition, target),
+        complete=geometry.complete and not (arm.prismatic.any() and (distance(arm, definition, target) > FAR).any()),
     )
-
-
-def _far(arm: Arm, task: Task, target: Array) -> bool:
-    """Whether any target is so far from the arm's links, on a slide, that rounding may hide a branch."""
-    if not arm.prismatic.any():
-        return False
-    p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    distance = np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1)
-    return bool((distance > FAR * arm.reach).any())
 
 
 def _empty(N: int, B: int, n: int) -> _Out:

@@ -156,6 +156,13 @@ def targets_of(task: Task, T: Array, q: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
+def distance(arm: Arm, task: Task, target: Array) -> Array:
+    """How far targets (M, m) or (M, 4, 4) are from the arm's first joint, in reaches: (M,)."""
+    p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+    away: Array = np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1) / arm.reach
+    return away
+
+
 def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
     """What is missing to the targets: (M, position + sums + orientation), mm first, then rad.
 
