@@ -2,11 +2,11 @@
 
 The closed form of the class that such an arm almost belongs to gives seeds, which Newton's
 method moves onto the true arm. Branches continue each other as long as no singularity lies
-between the two arms, so this finds all of them away from singular postures. Where a seed
-does not lead to a branch, two lead to the same, or a Jacobian is weak compared with how far
-the arm is off, the pose goes to the method that needs no special class: the elimination for
-six joints, the quartic for three. There is no proof that nothing is lost in between, hence
-`complete` is False.
+between the two arms: where those of the similar arm move too much, appear or vanish as the
+target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
+then go to the elimination, which needs no special class; for fewer, the similar arm's branches
+at the targets around give more seeds. There is no proof that nothing is lost in between,
+hence `complete` is False.
 """
 
 from __future__ import annotations
@@ -18,11 +18,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.ik import elbow, general, numeric, planar, position, spherical, three_parallel
-from armkin.ik.chain import Chain
 from armkin.ik.geometry import NEAR, Geometry
-from armkin.ik.position import Position
 from armkin.ik.recorded import recorded
-from armkin.ik.subproblems import Candidates
 from armkin.ik.tasks import PARALLEL, Task, distance, targets_of
 from armkin.kinematics import fk
 from armkin.rotation import rotation_about
@@ -34,10 +31,9 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad
-AROUND = 5.0  # how far around a target its neighbours must have the same branches, in distances from the class
-WEAK = 0.05  # smallest singular value below which a branch may have a close neighbour
-# [rad] how far from a branch its neighbour across a weak Jacobian is looked for, in two rounds
-PUSHES = ((0.6, 0.1, 0.01), (2.0, 1.4, 1.0, 0.7, 0.4, 0.2, 0.1, 0.03))
+AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
+WEAK = 0.05  # singular value below which no branch counts as steady, however close the arm is to its class
 HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
 
 
@@ -58,11 +54,11 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if not found:
         return None
     off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
-    other = _fallback(arm, task)
+    elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
 
     def rows(target: Array) -> tuple[Array, Bool]:
         starts = range(0, max(len(target), 1), CHUNK)
-        parts = [_solve(arm, task, alike, off, other, target[k : k + CHUNK]) for k in starts]
+        parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
         width = max(q.shape[1] for q, _ in parts)
         q = np.full((len(target), width, arm.n), np.nan)
         for k, (part, _) in zip(starts, parts, strict=True):
@@ -110,31 +106,8 @@ def _around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]
                 yield there
 
 
-def _fallback(arm: Arm, task: Task) -> Callable[[Array], Array] | None:
-    """What solves doubtful poses without a special class: rows (N, B, n) of joint values, or None."""
-    if task.name == "pose" and arm.n == 6:
-
-        @cache
-        def prepared() -> Geometry:
-            geometry = general.recognise(arm, task)
-            assert geometry is not None
-            return geometry
-
-        def elimination(target: Array) -> Array:
-            rows = prepared().rows
-            assert rows is not None
-            return rows(target)[0]
-
-        return elimination
-    if task.name == "xyz":
-        quartic = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], 0.0)
-        geometry = Geometry("", "", False, lambda goal, prefer: Candidates(*quartic.solve(goal, prefer)), straight=True)
-        return lambda target: recorded(arm, task, geometry).rows(target)[0]
-    return None
-
-
 def _solve(
-    arm: Arm, task: Task, alike: Geometry, off: float, other: Callable[[Array], Array] | None, target: Array
+    arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
 ) -> tuple[Array, Bool]:
     """Branches (N, B, n) and doubts (N,) of some targets; the similar arm's branches keep their places."""
     found = _correct(arm, task, alike, off, target)
@@ -143,18 +116,18 @@ def _solve(
     few = np.flatnonzero(found.doubt)
     if not len(few):
         return q, found.doubt
-    more, goals = found.q[few], target[few]
-    own = more.shape[1]
-    if other is not None:
-        more = np.concatenate([more, other(goals)], axis=1)
-    if arm.n == 6:
-        more = _settled(arm, task, more, goals, own)
-    else:  # once more from what the first pushes have found
-        for pushes in PUSHES:
-            beside = _beside(arm, task, more, goals, pushes)
-            more = _settled(arm, task, np.concatenate([more, beside], axis=1), goals, own)
+    goals = target[few]
+    if elimination is not None:
+        solver = elimination()
+        assert solver is not None
+        assert solver.rows is not None
+        others = [solver.rows(goals)[0]]
+    else:
+        source, off_here = recorded(arm, task, alike), off * np.maximum(1.0, distance(arm, task, goals))
+        others = [source.rows(there)[0] for size in RINGS for there in _around(arm, task, goals, size * off_here)]
+    more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
     out = np.full((len(target), more.shape[1], arm.n), np.nan)
-    out[:, :own] = q
+    out[:, : q.shape[1]] = q
     out[few] = more
     return out, found.doubt
 
@@ -182,22 +155,12 @@ def _packed(q: Array, own: int) -> Array:
     return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _beside(arm: Arm, task: Task, q: Array, target: Array, pushes: tuple[float, ...]) -> Array:
-    """Seeds for the other of two branches that all but touch: q (N, B, n) moved both ways where it is weakest."""
-    N, B, n = q.shape
-    flat = np.nan_to_num(q.reshape(-1, n))
-    strength, V, _ = numeric.null_space(arm, task, flat, np.repeat(target, B, axis=0))
-    push = V[:, -1] * np.where(arm.prismatic, arm.reach, 1.0)
-    push[(strength > WEAK) | np.isnan(q.reshape(-1, n)).any(axis=1)] = np.nan
-    moved = [flat + way * size * push for size in pushes for way in (1, -1)]
-    return np.stack(moved, axis=1).reshape(N, 2 * len(pushes) * B, n)
-
-
 def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
     """Move the seeds onto the arm, and find the poses for which that may not be all.
 
     The true arm reaches a target as the similar one reaches another, not much more than `off` away. Hence a
-    pose is sure only if the similar arm has the same branches all around it, and they hardly move.
+    pose is sure only if the similar arm's branches hardly move all around it: where one comes or goes, it
+    moves with the square root of the distance.
     """
     source = recorded(arm, task, alike)
     seed, miss, doubt = source.rows(target)
@@ -210,7 +173,7 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
         q, miss, doubt_there = source.rows(there)
         with np.errstate(invalid="ignore"):
             steady = numeric.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
-        doubt = doubt | doubt_there | np.where(miss < limit, ~real | ~steady, real).any(axis=1)
+        doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
     rough = numeric.missing(arm, task, flat, goals)
@@ -219,7 +182,8 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     q[some], size[some] = numeric.newton(arm, task, flat[some], goals[some], steps=6)
     good = size <= ACCEPTED
     branch, good = q.reshape(N, B, n), good.reshape(N, B)
-    doubt = doubt | (real & ~good).any(axis=1)
+    # what is unreachable for the similar arm may yet be reached
+    doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
         for j in range(i):
             with np.errstate(invalid="ignore"):

@@ -24,7 +24,6 @@ from armkin.errors import UsageError
 from armkin.ik.chain import Chain, inverse
 from armkin.ik.geometry import EXACT, NEAR, Geometry
 from armkin.ik.subproblems import (
-    TOUCHING,
     Candidates,
     Pair,
     Prefer,
@@ -72,8 +71,6 @@ class Position:
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
         self.tolerance = tolerance
         self.close = False
-        # the true arm's roots may be real where these of a similar one only just miss
-        self.touching = 0.3 if tolerance >= NEAR else TOUCHING
         self.why = self._split()
 
     def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
@@ -102,10 +99,6 @@ class Position:
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
         self.main = U[:, 0] * weight  # the one that gives q2
         return "a quartic gives joint 3" if self.regular else "special axes give joint 3 by itself"
-
-    def _unit(self, pair: Pair) -> Pair:
-        """On the unit circle, so that the residual shows a missing root; `near` looks at the length itself."""
-        return pair if self.tolerance >= NEAR else normalised(pair)
 
     def _is_regular(self, off: float) -> bool:
         """Whether the general equations serve, off being how far the arm is from a special case."""
@@ -177,7 +170,7 @@ class Position:
                 k0, k1, k2, k3, k4 = (soa.mul(v, size**i) for i, v in enumerate(k))
                 ecc = 0.25 * (k4 + k0 - k2)
                 form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
-                turn, doubt = trig_quadratic(form, size * size, self.touching)
+                turn, doubt = trig_quadratic(form, size * size)
                 third = Pair(size * half_tangent(turn), None)
         gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
         y = self._tip(third)
@@ -186,8 +179,8 @@ class Position:
 
     def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Bool]:
         """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
-        pair, doubt = trig_quadratic(six, size * size, self.touching)
-        return self._unit(pair), doubt
+        pair, doubt = trig_quadratic(six, size * size)
+        return normalised(pair), doubt
 
     def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         alone = self._affine(self.alone, known)
@@ -197,14 +190,14 @@ class Position:
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             third, doubt = linear(alone[1], alone[2], soa.mul(-1.0, alone[0]), 0, size, prefer[2])
-            third = self._unit(third)
+            third = normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
         right = _at([main[0], main[1], main[2] if third.s is not None else main[3]], third, 2)
         ax, ay = (self.main @ self.A).tolist()
         a, b = soa.add(soa.mul(ax, y[0]), soa.mul(ay, y[1])), soa.sub(soa.mul(ay, y[0]), soa.mul(ax, y[1]))
         second, doubt2 = linear(a, b, right, 1, size, prefer[1])
-        return third, self._unit(second), doubt | doubt2
+        return third, normalised(second), doubt | doubt2
 
     def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -254,7 +247,7 @@ class Position:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(soa.mul(-1.0 / slope, known), None), np.zeros(1, bool)
         third, doubt = linear(slope, other, soa.mul(-1.0, known), 0, size, prefer[2])
-        return self._unit(third), doubt
+        return normalised(third), doubt
 
 
 def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:

@@ -187,12 +187,12 @@ def half_tangent(pair: Pair) -> Entry:
     return np.where(far, 1e9, above / np.where(far, 1.0, below))
 
 
-def trig_quadratic(e: list[Entry], scale: Entry, near: float = TOUCHING) -> tuple[Pair, Bool]:
+def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Bool]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
     e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
     roots on branch axes (2, 2, 1, N), and doubt: roots that touch, complex ones that miss the real
-    line by less than `near` [rad], or a vanishing equation. Without a real root the pair is
+    line by less than `TOUCHING`, or a vanishing equation. Without a real root the pair is
     that of the closest angle, not normalised, as in `linear`.
 
     The unit circle and a conic meet where the circle meets a pair of lines, a degenerate conic of
@@ -239,7 +239,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, near: float = TOUCHING) -> tupl
         c, s = c + s * step, s - c * step
         shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
-    merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < near * near * h2))
+    merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
     return Pair(c, s), merging | triple | (size < 1e-12 * scale)
 
 
