@@ -167,7 +167,7 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     N, B, n = seed.shape
     weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
     off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
-    limit = (1e-9 + 30.0 * off_here[:, None]) ** 2
+    limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
     for there in _around(arm, task, target, AROUND * off_here):
         q, miss, doubt_there = source.rows(there)
