@@ -170,6 +170,18 @@ def test_out_replaces_a_file_only_when_all_is_well(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["in.csv", "poses.csv"]
 
 
+@pytest.mark.parametrize("command", [["fk", 1, 2, 3], ["ik", 390, 80, 300], ["pulses", 1, 2, 3, "--json"]])
+def test_out_spares_the_robot_file(tmp_path: Path, command: list[Any]) -> None:
+    robot, link = tmp_path / "arm.yaml", tmp_path / "link.yaml"
+    robot.write_bytes((ROOT / THREE_DOF).read_bytes())
+    link.symlink_to(robot)
+    for out in (robot, link):
+        result = run(command[0], robot, *command[1:], "--out", out)
+        assert (result.code, result.out) == (2, "")
+        assert "is the robot file" in result.err
+    assert robot.read_bytes() == (ROOT / THREE_DOF).read_bytes()
+
+
 def test_out_follows_a_link(tmp_path: Path) -> None:
     (tmp_path / "real").write_text("")
     (tmp_path / "link").symlink_to(tmp_path / "real")

@@ -27,6 +27,7 @@ def fk(
     out: Out = None,
 ) -> None:
     """Where the tool is for given joint values."""
+    output.spare(robot, out)
     arm = inputs.load(robot)
     if batch is not None:
         inputs.no_numbers(q)

@@ -54,6 +54,7 @@ def ik(
     """
     from armkin.ik.tasks import task_for
 
+    output.spare(robot, out)
     arm = inputs.load(robot)
     what = task_for(arm, task)
     held = solving.locks(arm, lock)

@@ -27,6 +27,12 @@ def destination(path: str | None) -> Iterator[Write]:
         yield sys.stdout.write
 
 
+def spare(robot: str, out: str | None) -> None:
+    """Refuse to write over the robot file."""
+    if out and os.path.isfile(out) and os.path.isfile(robot) and os.path.samefile(out, robot):
+        raise UsageError(f"--out {out} is the robot file; give another name")
+
+
 def warn(message: str) -> None:
     """Say something on stderr that does not change the exit code."""
     _say("warning", "33", message)

@@ -40,6 +40,7 @@ def pulses(
     """
     from armkin.pulses import motor_names
 
+    output.spare(robot, out)
     arm = inputs.load(robot)
     origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
     if batch is not None:
