@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 MODULES = [
-    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.limits", "ik.closest", "ik.names", "ik.subproblems",
+    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.turns", "ik.closest", "ik.names", "ik.subproblems",
     "soa",
 ]  # fmt: skip
 

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from armkin.ik.closest import Closest as Closest
     from armkin.ik.closest import closest as closest
     from armkin.ik.geometry import method as method
-    from armkin.ik.limits import turns as turns
     from armkin.ik.solutions import Solutions as Solutions
     from armkin.ik.solutions import Status as Status
     from armkin.ik.solve import ik as ik
+    from armkin.ik.turns import turns as turns
     from armkin.kinematics import condition as condition
     from armkin.kinematics import fk as fk
     from armkin.kinematics import frames as frames
@@ -60,7 +60,7 @@ _HOME = {
     "Closest": "ik.closest",
     "closest": "ik.closest",
     "method": "ik.geometry",
-    "turns": "ik.limits",
+    "turns": "ik.turns",
     "Solutions": "ik.solutions",
     "Status": "ik.solutions",
     "ik": "ik.solve",

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin.rotation import FLIP, inverse
 from armkin.soa import Array
 
 if TYPE_CHECKING:
     from armkin.robot_file import Joint, RobotFile
-
-# Turns z and y over: conjugating a joint's motion with it reverses the joint.
-_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,7 +78,7 @@ def build(file: RobotFile) -> Arm:
             pre, post, at = _screw(joint)
         else:
             pre, post, at = _dh(joint, modified=file.convention == "modified")
-        flip = _FLIP if joint.sign < 0 else np.eye(4)
+        flip = FLIP if joint.sign < 0 else np.eye(4)
         before.append(pre @ flip)
         after.append(flip @ post)
         frame.append(flip @ at)
@@ -226,12 +224,9 @@ def _screw(joint: Joint) -> tuple[Array, Array, Array]:
     B[:3, 0] = _perpendicular(direction)
     B[:3, 1] = np.cross(direction, B[:3, 0])
     B[:3, 3] = point
-    B_inverse = np.eye(4)
-    B_inverse[:3, :3] = B[:3, :3].T
-    B_inverse[:3, 3] = -B[:3, :3].T @ point
     at = np.eye(4)
     at[:3, 3] = point
-    return B, B_inverse, B_inverse @ at
+    return B, inverse(B), inverse(B) @ at
 
 
 def _perpendicular(z: Array) -> Array:

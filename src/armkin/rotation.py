@@ -1,4 +1,4 @@
-"""Rotation matrices as roll, pitch, yaw and as quaternions."""
+"""Rotations as matrices, roll, pitch, yaw and quaternions; rigid transforms."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.soa import Array
+
+# Turns z and y over: conjugating a joint's motion with it reverses the joint.
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def rpy(R: ArrayLike) -> Array:
@@ -68,3 +71,13 @@ def rotation_about(axis: int, angle: ArrayLike) -> Array:
     R[..., i, i] = R[..., j, j] = np.cos(angle)
     R[..., i, j], R[..., j, i] = -np.sin(angle), np.sin(angle)
     return R
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of rigid transforms (..., 4, 4)."""
+    out = np.zeros_like(T)
+    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = Rt
+    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out

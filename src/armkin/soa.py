@@ -122,6 +122,15 @@ def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
     return (1.0 - t2) * scale, (t + t) * scale
 
 
+def wrapped(angle: Entry) -> Entry:
+    """An angle [rad] less its whole turns, in [-pi, pi].
+
+    >>> round(float(wrapped(7.0)), 6)
+    0.716815
+    """
+    return angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
+
+
 def constant(T: Array) -> Pose:
     """A constant 4 x 4 transform as a pose of floats."""
     return [float(T[row, column]) for column in range(4) for row in range(3)]

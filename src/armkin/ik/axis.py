@@ -12,9 +12,9 @@ import numpy as np
 
 from armkin import soa
 from armkin.arm import from_links
-from armkin.ik.geometry import Geometry
+from armkin.ik.geometry import Geometry, solver
 from armkin.ik.subproblems import Candidates, Pair, Prefer
-from armkin.ik.tasks import Task, task_for
+from armkin.ik.tasks import Task
 from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:
@@ -23,14 +23,10 @@ if TYPE_CHECKING:
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
     """Five joints of any geometry."""
-    from armkin.ik import general, near, spherical, three_parallel
-
     if task.name != "xyz_axis" or arm.n != 5:
         return None
     six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
-    pose = task_for(six, "pose")
-    classes = (spherical.recognise, three_parallel.recognise, near.recognise, general.recognise)
-    inner = next(found for recognise in classes if (found := recognise(six, pose)) is not None)
+    _, inner = solver(six, "pose")
     why = f"with a virtual joint about the tool's axis: {inner.why}"
     if inner.pairs is not None:
         solve = inner.pairs

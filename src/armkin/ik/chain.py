@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.rotation import FLIP, inverse
 from armkin.soa import Array
-
-# Conjugating a joint's motion with it reverses the joint's sense.
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 class Chain(NamedTuple):
@@ -23,16 +21,6 @@ class Chain(NamedTuple):
     def n(self) -> int:
         """Number of joints."""
         return len(self.prismatic)
-
-
-def inverse(T: Array) -> Array:
-    """Inverse of rigid transforms (..., 4, 4)."""
-    out = np.zeros_like(T)
-    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
-    out[..., :3, :3] = Rt
-    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
 
 
 def reverse(chain: Chain) -> Chain:

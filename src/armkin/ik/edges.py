@@ -161,8 +161,7 @@ def _one_of_a_curve(
         for b in mine:
             if not valid[k, b]:
                 continue
-            d = q[k, kept] - q[k, b]
-            d = np.where(arm.prismatic, d / arm.reach, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+            d = numeric.difference(arm, q[k, kept], q[k, b])
             if len(kept) and (np.abs(d[:, held]).max(axis=1, initial=0.0) < 1e-5).any():
                 valid[k, b] = False
             else:

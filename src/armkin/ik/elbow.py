@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import FLIP, Chain, inverse, is_parallel
+from armkin.ik.chain import Chain, is_parallel
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
 from armkin.ik.tasks import Task
+from armkin.rotation import FLIP, inverse
 from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:

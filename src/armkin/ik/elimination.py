@@ -37,12 +37,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.ik import loop, roots, slides
-from armkin.ik.chain import inverse
 from armkin.ik.loop import Loop
 from armkin.ik.merge import Answers, concatenate, merge, pack, projection
 from armkin.ik.pencil import Pencil, build
 from armkin.ik.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.ik.roles import Role, roles
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 Int = NDArray[np.int64]

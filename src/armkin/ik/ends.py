@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.ik import line_features
-from armkin.ik.chain import inverse
 from armkin.ik.nudge import nudged
 from armkin.ik.roles import Role
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 # The columns of Q as (b, a).  The five that give the joints back come last: with Q = (orthonormal)(triangle)

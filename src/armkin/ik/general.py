@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.ik import elimination, numeric
-from armkin.ik.chain import inverse
 from armkin.ik.geometry import Geometry
 from armkin.ik.tasks import Task
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 if TYPE_CHECKING:

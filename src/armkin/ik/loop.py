@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.ik.chain import inverse
 from armkin.ik.polish import shrink
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own

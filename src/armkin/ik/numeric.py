@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armkin.ik.nudge import nudged
 from armkin.ik.tasks import Task, axis_projected, residual, task_jacobian
 from armkin.kinematics import fk, jacobian
-from armkin.soa import Array
+from armkin.soa import Array, wrapped
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -93,11 +93,15 @@ def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[A
     return best, best_size
 
 
-def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
-    """Largest joint difference modulo whole turns, prismatic ones in units of the reach: (..., n) -> (...)."""
+def difference(arm: Arm, a: Array, b: Array) -> Array:
+    """Joint values a less b modulo whole turns, prismatic ones in units of the reach: (..., n)."""
     d = a - b
-    turn = np.where(arm.prismatic, d / arm.reach, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
-    largest: Array = np.abs(turn).max(axis=-1)
+    return np.where(arm.prismatic, d / arm.reach, wrapped(d))
+
+
+def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
+    """The largest `difference`: (..., n) -> (...)."""
+    largest: Array = np.abs(difference(arm, a, b)).max(axis=-1)
     return largest
 
 

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import FLIP, Chain, axes, inverse, reverse
+from armkin.ik.chain import Chain, axes, reverse
 from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
 from armkin.ik.subproblems import Candidates, Pair, Prefer
 from armkin.ik.tasks import Task
+from armkin.rotation import FLIP, inverse
 from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ import numpy as np
 
 from armkin import soa
 from armkin.errors import UsageError
-from armkin.ik.chain import Chain, inverse
+from armkin.ik.chain import Chain
 from armkin.ik.geometry import EXACT, NEAR, Geometry
 from armkin.ik.subproblems import (
     Candidates,
@@ -36,6 +36,7 @@ from armkin.ik.subproblems import (
     trig_quadratic,
 )
 from armkin.ik.tasks import Task, rank
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool, Entry
 
 if TYPE_CHECKING:

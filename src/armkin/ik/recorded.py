@@ -104,6 +104,6 @@ def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Entry:
         angle = goal[task.position + k] - task.offsets[k]
         for w, value in zip(weights, values, strict=True):
             angle = soa.sub(angle, soa.mul(float(w), value))
-        angle = angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
+        angle = soa.wrapped(angle)
         total = soa.add(total, angle * angle)
     return total

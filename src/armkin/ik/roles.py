@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armkin.ik.chain import inverse
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 _X = 5  # index of the link of the loop that carries the pose

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.ik import line_features
-from armkin.ik.chain import inverse
 from armkin.ik.ends import eliminate
 from armkin.ik.nudge import nudged
 from armkin.ik.pencil import Pencil
 from armkin.ik.polish import advance, turn
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool
 
 Int = NDArray[np.int64]

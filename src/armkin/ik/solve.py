@@ -16,13 +16,13 @@ from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik import edges
 from armkin.ik.geometry import Geometry, solver
-from armkin.ik.limits import nearest_copy, nearest_row
 from armkin.ik.names import branch_names
 from armkin.ik.recorded import entries, recorded
 from armkin.ik.solutions import Solutions, Status
 from armkin.ik.subproblems import Pair
 from armkin.ik.tasks import Task, distance, read_targets
 from armkin.ik.tracking import follow
+from armkin.ik.turns import nearest_copy, nearest_row
 from armkin.limits import SLACK
 from armkin.soa import Array, Bool, Entry
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import Chain, inverse, is_parallel, reverse
+from armkin.ik.chain import Chain, is_parallel, reverse
 from armkin.ik.elbow import Elbow
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.position import Position
@@ -30,6 +30,7 @@ from armkin.ik.subproblems import (
     spin,
 )
 from armkin.ik.tasks import Task
+from armkin.rotation import inverse
 from armkin.soa import Array, Bool, Entry, Pose
 
 if TYPE_CHECKING:

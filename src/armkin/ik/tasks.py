@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.ik.chain import Chain, axes
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Entry, wrapped
 from armkin.straight import Straight
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         if len(task.sums):
             wanted = target[:, task.position : task.position + len(task.sums)]
             angle = wanted - q @ task.sums.T - task.offsets
-            parts.append(angle - 2 * np.pi * np.rint(angle / (2 * np.pi)))
+            parts.append(wrapped(angle))
         if task.orientation == "axis":
             z = T[:, :3, 2]
             w = np.cross(z, target[:, 3:])

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import soa
-from armkin.ik.chain import Chain, inverse, is_parallel, reverse
+from armkin.ik.chain import Chain, is_parallel, reverse
 from armkin.ik.elbow import TwoLink
 from armkin.ik.geometry import EXACT, Geometry
 from armkin.ik.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.ik.tasks import Task
+from armkin.rotation import inverse
 from armkin.soa import Array, Pose
 
 if TYPE_CHECKING:

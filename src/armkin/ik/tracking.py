@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.ik.tasks import Task
-from armkin.soa import Array, Bool
+from armkin.soa import Array, Bool, wrapped
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -62,7 +62,7 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
     moved[:, p] /= arm.reach
     if len(task.sums):
         turned = moved[:, task.position :]
-        turned -= 2 * np.pi * np.rint(turned / (2 * np.pi))
+        turned[...] = wrapped(turned)
     return np.asarray(np.abs(moved).max(axis=1) < CLOSE)
 
 
@@ -72,7 +72,7 @@ def _links(arm: Arm, now: Array, then: Array) -> Int:
     apart = np.zeros((M, B, B))
     for joint, prismatic in enumerate(arm.prismatic):
         d = now[:, :, None, joint] - then[:, None, :, joint]
-        d = d / arm.reach if prismatic else d - 2 * np.pi * np.rint(d / (2 * np.pi))
+        d = d / arm.reach if prismatic else wrapped(d)
         np.maximum(apart, np.abs(d), out=apart)
     apart[np.isnan(apart)] = np.inf
     partner, back = apart.argmin(axis=2), apart.argmin(axis=1)

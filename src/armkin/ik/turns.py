@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.kinematics import one_pose
 from armkin.limits import SLACK
-from armkin.soa import Array, Entry
+from armkin.soa import Array, Entry, wrapped
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -66,8 +66,8 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
         if arm.prismatic[i]:
             ok: Entry = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
         else:
-            wrapped = q[..., i] - TURN * np.rint(q[..., i] / TURN)
-            out[..., i], ok = nearest_copy(wrapped, near[..., i], lower, upper)
+            principal = wrapped(q[..., i])
+            out[..., i], ok = nearest_copy(principal, near[..., i], lower, upper)
         inside &= ok
     return out, inside
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import armkin
 from armkin.arm import from_links
-from armkin.ik.limits import nearest_copy, turns
+from armkin.ik.turns import nearest_copy, turns
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 LIMITS = [
