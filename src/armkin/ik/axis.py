@@ -36,9 +36,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             found = solve(_pose(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
-        return Geometry(
-            inner.name, why, inner.complete, pairs, straight=inner.straight, labels=inner.labels, ordered=inner.ordered
-        )
+        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered)
     solve_rows = inner.rows
     assert solve_rows is not None
 

@@ -125,7 +125,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         def xyz(goal: list[Entry], prefer: Prefer) -> Candidates:
             return Candidates(*elbow.solve(goal, [0.0, 0.0, 0.0], prefer))
 
-        return Geometry("elbow", why, True, xyz, labels=labels, straight=True)
+        return Geometry("elbow", why, True, xyz, labels=labels)
 
     elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
@@ -155,4 +155,4 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         fourth = Pair(c4, sense[2] * s4)
         return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
 
-    return Geometry("elbow with pitch", why, True, pitch, labels=labels, straight=True)
+    return Geometry("elbow with pitch", why, True, pitch, labels=labels)

@@ -35,7 +35,8 @@ class Geometry:
     """A solver for one arm and task.
 
     Closed forms set `pairs`: called with the target's entries (the columns of the targets,
-    or a `soa.Pose`) and the preferred motions of free joints, it returns `Candidates`. Others set `rows`: called with
+    or a `soa.Pose`) and the preferred motions of free joints, it returns `Candidates`. It is made of numpy's
+    elementwise functions alone, so that `armkin.straight` can record it. Others set `rows`: called with
     targets (N, m) or (N, 4, 4) it returns q (N, B, n), nan past the last branch, and doubt.
     """
 
@@ -44,7 +45,6 @@ class Geometry:
     complete: bool
     pairs: Callable[[list[Entry], Prefer], Candidates] | None = None
     rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
-    straight: bool = False  # `pairs` is made of numpy's elementwise functions alone: `armkin.straight` can record it
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; otherwise `armkin.ik.tracking` sees to it
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

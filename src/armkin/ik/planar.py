@@ -76,7 +76,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name = "SCARA" if lift is not None else "planar"
     why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
-    return Geometry(name, why, True, solve, straight=True, labels=() if prismatic.any() else ("", "elbow", ""))
+    return Geometry(name, why, True, solve, labels=() if prismatic.any() else ("", "elbow", ""))
 
 
 def _two(chain: Chain) -> Solve:

@@ -303,4 +303,4 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return Candidates(*position.solve(goal, prefer))
 
     # a quartic's roots come in no order
-    return Geometry("three joints", why, True, solve, straight=True, ordered=not position.regular)
+    return Geometry("three joints", why, True, solve, ordered=not position.regular)

@@ -51,15 +51,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         if wrist.close:
             return None
         why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
-        return Geometry(
-            "spherical wrist",
-            why,
-            True,
-            wrist.solve,
-            straight=True,
-            labels=wrist.labels,
-            ordered=wrist.ordered,
-        )
+        return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels, ordered=wrist.ordered)
     chain = reverse(chain)
     centre = wrist_centre(chain, tolerance * arm.reach)
     if centre is None:
@@ -72,7 +64,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return shoulder.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
     why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {shoulder.why}"
-    return Geometry("spherical shoulder", why, True, solve, straight=True, ordered=shoulder.ordered)
+    return Geometry("spherical shoulder", why, True, solve, ordered=shoulder.ordered)
 
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:

@@ -33,14 +33,8 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     chain = Chain(arm.link, arm.prismatic)
     if fits(chain, tolerance, arm.reach):
         why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
-        return Geometry(
-            "three parallel axes",
-            why,
-            True,
-            ThreeParallel(chain).solve,
-            straight=True,
-            labels=("shoulder", "elbow", "wrist"),
-        )
+        labels = ("shoulder", "elbow", "wrist")
+        return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=labels)
     chain = reverse(chain)
     if not fits(chain, tolerance, arm.reach):
         return None
@@ -49,9 +43,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     def solve(goal: Pose, prefer: Prefer) -> Candidates:
         return solver.solve(soa.inverse(goal), prefer[::-1]).reversed()
 
-    return Geometry(
-        "three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve, straight=True
-    )
+    return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
 
 
 def fits(chain: Chain, tolerance: float, reach: float) -> bool:
