@@ -6,8 +6,10 @@ A port is held exclusively, so that no two programs talk to one arm; who holds i
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import re
 import tempfile
 import time
 from collections.abc import Callable
@@ -173,14 +175,19 @@ def _keep_dtr(port: Any) -> None:
 
 def _cannot_open(name: str, error: Exception) -> str:
     reason = _reason(error)
-    number = getattr(error, "errno", None)
-    if number == 2 or "FileNotFound" in reason:
+    stated = re.search(r"(?:Errno |\()(\d+)", reason)  # pyserial keeps some numbers in its text alone
+    number = getattr(error, "errno", None) or (int(stated[1]) if stated else None)
+    if number == errno.ENOENT or "FileNotFound" in reason:
         found = ", ".join(port.device for port in list_ports())
         return f"there is no port {name}; armkin ports lists them ({found or 'none is plugged in'}), or use sim"
-    if number == 13 or "PermissionError" in reason:
+    if number == errno.EACCES or "PermissionError" in reason:
         return f"port {name}: permission denied; on Linux add yourself to the group dialout, then log in again"
-    if "exclusively lock" in reason or number in (11, 16):
+    if "exclusively lock" in reason or number in (errno.EAGAIN, errno.EBUSY):
         return f"port {name} is in use by another program (a serial monitor, another armkin?): close it first"
+    if number in (errno.ENOTTY, errno.EISDIR):
+        return f"{name} is no serial port; armkin ports lists them"
+    if number == errno.ECONNREFUSED:
+        return f"port {name}: connection refused, nobody listens there"
     return f"port {name} cannot be opened: {reason}"
 
 
