@@ -128,3 +128,8 @@ def test_joint_values_that_are_not_there_have_measures_that_are_not() -> None:
 def test_a_joint_is_held_at_a_number(value: Any) -> None:
     with pytest.raises(armkin.UsageError):
         armkin.lock(armkin.load(ROOT / THREE_DOF), {"q1": value})
+
+
+def test_solutions_show_themselves_in_a_line() -> None:
+    s = armkin.ik(armkin.load(ROOT / "robots/three_dof.yaml"), [[390, 80, 300], [0, 0, 9000]])
+    assert repr(s) == "<Solutions (2,) of three_dof, xyz: 4 branches, complete>"

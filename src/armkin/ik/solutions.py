@@ -26,7 +26,7 @@ class Status(IntEnum):
     UNREACHABLE = 3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solutions:
     """All branches of a batch of targets; leading axes (...) are the batch's.
 
@@ -52,6 +52,10 @@ class Solutions:
     method: str
     why: str
     complete: bool
+
+    def __repr__(self) -> str:
+        batch, sure = self.status.shape, "complete" if self.complete else "not proved complete"
+        return f"<Solutions {batch} of {self.arm.name}, {self.task.name}: {self.valid.sum()} branches, {sure}>"
 
     @cached_property
     def motion(self) -> Array:
