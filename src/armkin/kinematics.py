@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from armkin import soa
 from armkin.errors import UsageError
 from armkin.soa import Array, Entry, Pose
-from armkin.straight import Straight
+from armkin.straight import OncePaid
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
@@ -209,16 +209,20 @@ Formula = Callable[["Arm", list[Entry]], list[Entry]]
 
 
 @lru_cache(maxsize=128)
-def _recorded(arm: Arm, formula: Formula) -> Straight:
+def _recorded(arm: Arm, formula: Formula) -> OncePaid:
     """A formula of an arm's joint values as straight-line code."""
-    return Straight(lambda q: formula(arm, q), arm.n)
+    return OncePaid(lambda q: formula(arm, q), arm.n)
 
 
 def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
     """Run a formula over the batch axes of q in chunks that stay in the cache."""
     out = np.empty(values.shape[:-1] + shape)
     flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
-    straight = _recorded(arm, formula)
+    straight = _recorded(arm, formula).get(len(flat_q))
+    if straight is None:
+        for k, entry in enumerate(formula(arm, list(flat_q.T))):
+            flat_out[:, k] = entry
+        return out
     workspace = straight.workspace(min(len(flat_q), soa.CHUNK))
     for start in range(0, len(flat_q), soa.CHUNK):
         columns = np.ascontiguousarray(flat_q[start : start + soa.CHUNK].T)

@@ -12,20 +12,20 @@ from armkin.ik.geometry import Geometry
 from armkin.ik.subproblems import Pair, Prefer, distance2, spin
 from armkin.ik.tasks import Task
 from armkin.soa import Array, Bool, Entry
-from armkin.straight import Straight
+from armkin.straight import OncePaid
 
 if TYPE_CHECKING:
     from armkin.arm import Arm
 
 
 class Recorded:
-    """A geometry's formula, recorded as straight-line code once that pays: it takes some milliseconds."""
+    """A geometry's formula and the residual of what it finds."""
 
     def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
         self.arm, self.task, self.geometry = arm, task, geometry
         self.link = [soa.constant(L) for L in arm.link]
-        self.calls = 0
-        self.straight: Straight | None = None
+        inputs = 12 if task.orientation == "full" else len(task.labels)
+        self.code = OncePaid(lambda goal: self.candidates(goal, [None] * arm.n), inputs)
         self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
@@ -38,19 +38,10 @@ class Recorded:
             miss = np.maximum(miss, _sum_miss(self.task, values, goal))
         return [*values, miss, found.doubt]
 
-    def get(self, batch: int) -> Straight | None:
-        """The recorded code, once a batch or a fifth call makes it worth while."""
-        self.calls += 1
-        if self.straight is None and (batch >= 64 or self.calls > 4):
-            inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
-            self.straight = Straight(lambda goal: self.candidates(goal, [None] * self.arm.n), inputs)
-        return self.straight
-
-
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
-        straight = self.get(N)
+        straight = self.code.get(N)
         if straight is None:
             found = self.candidates(entries(self.task, target), [None] * self.arm.n)
         else:

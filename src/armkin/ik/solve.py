@@ -121,7 +121,7 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
     """Closed forms: chunks of poses that stay in the cache, entry by entry."""
     out: _Out | None = None
     runner = recorded(arm, task, geometry)
-    straight = runner.get(len(target))
+    straight = runner.code.get(len(target))
     workspace: list[NDArray[np.generic]] = []
     for start in range(0, max(len(target), 1), soa.CHUNK):
         rows = slice(start, start + soa.CHUNK)
