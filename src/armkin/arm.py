@@ -226,7 +226,8 @@ def _screw(joint: Joint) -> tuple[Array, Array, Array]:
     B[:3, 3] = point
     at = np.eye(4)
     at[:3, 3] = point
-    return B, inverse(B), inverse(B) @ at
+    back = inverse(B)
+    return B, back, back @ at
 
 
 def _perpendicular(z: Array) -> Array:

@@ -75,7 +75,7 @@ def rotation_about(axis: int, angle: ArrayLike) -> Array:
 
 def inverse(T: Array) -> Array:
     """Inverse of rigid transforms (..., 4, 4)."""
-    out = np.zeros_like(T)
+    out = np.zeros(T.shape)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     out[..., :3, :3] = Rt
     out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]

@@ -209,7 +209,6 @@ _PYTHON = {
     "absolute": "abs({})",
     "maximum": "max({}, {})",
     "minimum": "min({}, {})",
-    "square": "{0} * {0}",
     "power": "{} ** {}",
     "sqrt": "math.sqrt({})",
     "cbrt": "math.cbrt({})",

@@ -127,7 +127,7 @@ def near(poses: int, only: str) -> None:
                 case = random_case(name, 1)
                 arm, screw = moved(case.arm, off, 1)
                 begin = time.perf_counter()
-                report = examine(arm, screw, case.task, random_joints(screw, max(poses // 10, 1), 1))
+                report = examine(arm, screw, case.task, random_joints(screw, max(poses, 1), 1))
                 row(f"{name}, {off:.0e}", [report], time.perf_counter() - begin)
 
 
@@ -144,7 +144,7 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
                     reports.append(examine(case.arm, case.screw, case.task, q))
                 else:
                     arm, screw = shipped(name)
-                    reports.append(examine(arm, screw, None, random_joints(screw, poses, 2)))
+                    reports.append(examine(arm, screw, None, random_joints(screw, max(poses, 1), 2)))
             weak = []
             for report in reports:
                 for begin in range(0, len(report.q), 50):
@@ -172,9 +172,9 @@ def main() -> None:
     if args.classes or everything:
         classes(args.poses, args.arms, args.only)
     if args.near or everything:
-        near(args.poses, args.only)
+        near(args.poses // 10, args.only)
     if args.oracle or everything:
-        against_oracle(max(args.poses // 10, 1), args.arms, args.only)
+        against_oracle(args.poses // 10, args.arms, args.only)
 
 
 if __name__ == "__main__":

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from checks import examine, random_joints
-from geometries import CLASSES, random_case
-from oracle import forward, goal, missing, screws
+from geometries import CLASSES, Case, case, random_case
+from oracle import distance, forward, goal, missing, screws
 
 import armkin
 from armkin import Status
@@ -199,7 +201,7 @@ def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
     assert not armkin.ik(six, far, "pose").valid.any()
 
 
-@pytest.mark.parametrize("name", [name for name in CLASSES if "P" in name and "UR" not in name])
+@pytest.mark.parametrize("name", [name for name in CLASSES if "P" in name])
 def test_slides_far_longer_than_the_links(name: str) -> None:
     """Right-angled and random postures, slides of up to 20 reaches; what is farther does not claim to be complete."""
     for seed in range(3):
@@ -224,6 +226,53 @@ def test_neighbours_of_weak_jacobians_are_no_self_motion(name: str, seed: int, s
     report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 50_000, sample))
     assert report.weak.min() < 1e-6
     assert not report.lost.any()
+
+
+def special_arms(count: int, seed: int) -> Iterator[Case]:
+    """Three-joint arms of round angles and lengths, many of which are singular in whole families of postures."""
+    rng = np.random.default_rng(seed)
+    while count:
+        rows = [
+            {
+                "dh": {
+                    "alpha": float(rng.choice([0, 30, 45, 60, 90, -90, 180])),
+                    "a": float(rng.choice([0, 0, 100, -100, 200])),
+                    "d": float(rng.choice([0, 0, 50, 100])),
+                    "theta": float(rng.choice([0, 90, 180])),
+                },
+                "type": str(kind),
+            }
+            for kind in rng.choice(["revolute", "prismatic"], 3, p=[0.6, 0.4])
+        ]
+        special = case({"convention": "standard", "joints": rows}, "xyz")
+        with suppress(UsageError):  # its joints cannot place a point
+            solver(special.arm, "xyz")
+            count -= 1
+            yield special
+
+
+def test_round_angles_and_lengths() -> None:
+    """The generating joints are found, or the target is said to be singular; a root of fourth order is vague."""
+    rng = np.random.default_rng(5)
+    for c in special_arms(200, 2):
+        q = rng.integers(-1, 3, (40, 3)) * QUARTER
+        q = np.where(rng.random((40, 3)) < 0.3, rng.uniform(-3, 3, (40, 3)), q)
+        report = examine(c.arm, c.screw, "xyz", np.where(c.screw.prismatic, rng.integers(-2, 3, (40, 3)) * 50.0, q))
+        s = report.solutions
+        off = distance(c.screw, s.q, report.q[:, None]).min(axis=1)
+        assert not ((s.status != Status.SINGULAR) & (off > np.where(report.weak < 1e-6, 2e-2, 1e-6))).any()
+
+
+def test_two_slides_that_become_parallel() -> None:
+    """Turned so that both slides point one way, nothing is left of the equation: a self-motion, not noise."""
+    rows = [
+        {"dh": {"alpha": 30, "a": 100, "d": 0, "theta": 0}, "type": "prismatic"},
+        {"dh": {"alpha": 30, "a": 100, "d": 100, "theta": 180}},
+        {"dh": {"alpha": 45, "a": 200, "d": 0, "theta": 90}, "type": "prismatic"},
+    ]
+    arm = case({"convention": "standard", "joints": rows}, "xyz").arm
+    s = armkin.ik(arm, armkin.fk(arm, [100, 0, 100])[:3, 3])
+    assert (s.status, s.free.tolist(), s.valid.sum()) == (Status.SINGULAR, [True, False, True], 1)
 
 
 def test_no_target_is_too_odd() -> None:

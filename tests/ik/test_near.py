@@ -11,6 +11,7 @@ from geometries import random_case
 from oracle import Screws, rotation, shift
 from test_every_branch import shipped
 
+import armkin
 from armkin.arm import Arm
 
 OFF = (1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3)
@@ -139,3 +140,12 @@ def test_folds_far_apart() -> None:
     arm, screw = moved(case.arm, 1e-3, 12)
     report = examine(arm, screw, case.task, random_joints(screw, 1000, 12))
     assert not report.lost.any()
+
+
+@pytest.mark.parametrize("name", ["planar RR", "SCARA, P at 1", "pitch arm, 5 joints", "UR table"])
+def test_no_target_at_all(name: str) -> None:
+    case = random_case(name, 1)
+    arm, screw = moved(case.arm, 1e-5, 1)
+    one = examine(arm, screw, case.task, random_joints(screw, 1, 1))
+    s = armkin.ik(arm, one.goals.array()[:0], case.task)
+    assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), one.solutions.method)

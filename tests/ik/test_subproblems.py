@@ -73,6 +73,6 @@ def test_quadratic() -> None:
     d = rng.normal(size=(2, 2000)) * size
     a = np.where(rng.random(2000) < 0.2, 0.0, 1.0)
     b, c = np.where(a == 0.0, 1.0, -d[0] - d[1]), np.where(a == 0.0, -d[0], d[0] * d[1])
-    roots = quadratic(a, b, c, 0, 1.0)[0].reshape(2, -1)
+    roots = quadratic(a, b, c, 0, 1.0, 1e-300, None)[0].reshape(2, -1)
     for wanted in (d[0], np.where(a == 0.0, d[0], d[1])):
         assert (np.abs(roots - wanted).min(axis=0) / (1 + np.abs(wanted) + np.abs(d).max(axis=0))).max() < 1e-9

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 SOLUTION = 1e-9  # of the reach: what counts as a solution
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
 DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
+CLUSTER = 0.02  # [rad] candidates this close may be one root of third or fourth order
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 
 
@@ -42,6 +43,9 @@ def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
     K, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
     rough = numeric.missing(arm, task, np.nan_to_num(flat), goals)
+    mean = _means(arm, q).reshape(-1, n)
+    closer = numeric.missing(arm, task, np.nan_to_num(mean), goals) < rough
+    flat[closer] = mean[closer]
     some = np.flatnonzero(~np.isnan(flat).any(axis=1) & (rough < 1e-3))
     size = np.full(len(flat), np.inf)
     if len(some):
@@ -71,6 +75,21 @@ def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
             free[row] |= who
         valid = _one_of_a_curve(arm, task, q, valid, k[moving], b[moving], free, target)
     return Examined(q, valid, status, free)
+
+
+def _means(arm: Arm, q: Array) -> Array:
+    """Candidates (K, B, n), the mean of its cluster for each that has two others around it.
+
+    Of a root of third or fourth order rounding leaves three or four, off by its third or fourth root; their
+    mean is right to rounding.
+    """
+    away = numeric.difference(arm, q[:, None], q[:, :, None])  # of the third axis' candidates from the second's
+    with np.errstate(invalid="ignore"):
+        around = np.abs(away).max(axis=3) < CLUSTER
+    count = around.sum(axis=2)
+    shift = np.where(around[..., None], away, 0.0).sum(axis=2) / np.maximum(count, 1)[..., None]
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    return np.asarray(q + np.where((count > 2)[..., None], shift, 0.0) * unit)
 
 
 def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> tuple[Bool, Bool]:

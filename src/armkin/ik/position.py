@@ -66,8 +66,8 @@ class Position:
         else:
             x, y, z = tip
             self.Y = np.column_stack([R2[:, 2] * z + t2, R2[:, :2] @ [x, y], R2[:, :2] @ [-y, x]])
-        self.across = self._form(self.Y[:2])  # |y across joint 2|^2 as a quadratic form in b
-        self.square = self._form(self.Y)  # |y|^2
+        self.across = _form(self.Y[:2])  # |y across joint 2|^2 as a quadratic form in b
+        self.square = _form(self.Y)  # |y|^2
         self.rows, self.rest, self.forms = self._equations(L1)
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
         self.tolerance = tolerance
@@ -105,10 +105,6 @@ class Position:
         """Whether the general equations serve, off being how far the arm is from a special case."""
         self.close = self.tolerance < off <= NEAR
         return off > self.tolerance
-
-    def _form(self, rows: Array) -> Array:
-        """Quadratic form G with ``b^T G b = |rows b|^2`` (3 x 3); prismatic powers above two stay inside."""
-        return np.asarray(rows.T @ rows)
 
     def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
@@ -165,10 +161,14 @@ class Position:
                     for j in range(3):
                         k[i + j] = soa.add(k[i + j], soa.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
-                d, doubt = quadratic(k[2], k[1], k[0], 0, size)
+                d, doubt = quadratic(k[2], k[1], k[0], 0, size, 1e-12 * size * size, prefer[2])
                 third = Pair(d, None)
             else:
-                k0, k1, k2, k3, k4 = (soa.mul(v, size**i) for i, v in enumerate(k))
+                power: Entry = 1.0
+                for i in range(1, 5):
+                    power = soa.mul(power, size)
+                    k[i] = soa.mul(k[i], power)
+                k0, k1, k2, k3, k4 = k
                 ecc = 0.25 * (k4 + k0 - k2)
                 form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
                 turn, doubt = trig_quadratic(form, size * size)
@@ -186,7 +186,7 @@ class Position:
     def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
-            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size)
+            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, 1e-12 * size, prefer[2])
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
@@ -226,7 +226,7 @@ class Position:
             if third.s is None:
                 rest = soa.sub(rest, soa.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, soa.add(self._tip(third)[2], z1), -rest, 1, size)
+            d, doubt2 = quadratic(0.5, soa.add(self._tip(third)[2], z1), -rest, 1, size, 1e-300, None)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [soa.mul(1.0 / z0, v) for v in across[0]]
@@ -234,7 +234,7 @@ class Position:
         factor = [soa.add(soa.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
         six = _sum([*constant, curved, 0.0, 0.0], _product(d2, factor))
         if self.prismatic[2]:
-            d, doubt = quadratic(six[3], six[1], six[0], 0, size)
+            d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
             third = Pair(d, None)
         else:
             third, doubt = self._roots(six, size)
@@ -257,6 +257,11 @@ def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
     if third.s is not None:
         return soa.add(total, soa.mul(coefficients[2], third.s))
     return total if power == 1 else soa.add(total, soa.mul(coefficients[2], third.c * third.c))
+
+
+def _form(rows: Array) -> Array:
+    """The quadratic form G (3, 3) with ``b^T G b = |rows b|^2``."""
+    return np.asarray(rows.T @ rows)
 
 
 def _six(form: Array) -> Array:

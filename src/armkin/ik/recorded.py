@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ class Recorded:
         else:
             found = list(straight.run(entries(self.task, target), straight.workspace(N)))
         shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in found))
-        *values, miss, doubt = (np.broadcast_to(v, shape).reshape(-1, N).T for v in found)
+        *values, miss, doubt = (np.broadcast_to(v, shape).reshape(math.prod(shape[:-1]), N).T for v in found)
         return np.stack(values, axis=2), miss, np.asarray(doubt.any(axis=1))
 
 

@@ -163,18 +163,25 @@ def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
 
 
-def quadratic(a: Entry, b: Entry, c: Entry, axis: int, scale: Entry) -> tuple[Array, Bool]:
-    """Solve ``a d^2 + b d + c = 0`` for both roots d; scale: a length of the size of d.
+def quadratic(
+    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, least: Entry, prefer: Pair | None
+) -> tuple[Array, Bool]:
+    """Solve ``a d^2 + b d + c = 0`` for both roots d.
 
-    With d = scale tan(q/2) this is a `linear` problem, in which a vanishing a is no special
-    case: its root goes to infinity.
+    scale: a length of the size of d; least: the size of c below which, if all three are, the equation says
+    nothing; prefer: the d to give then. With d = scale tan(q/2) this is a `linear` problem, in which a
+    vanishing a is no special case: its root goes to infinity.
     """
     a, b = soa.mul(a, scale * scale), soa.mul(b, scale)
     size = soa.add(soa.add(abs(a), abs(b)), abs(c))
-    inverse = 1.0 / np.maximum(size, 1e-300)
+    free = size < least
+    inverse = 1.0 / np.maximum(size, least)
     a, b, c = a * inverse, b * inverse, c * inverse
     pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, None)
-    return scale * half_tangent(pair), doubt
+    d = scale * half_tangent(pair)
+    if prefer is not None and np.any(free):
+        d = np.where(free, prefer.c, d)
+    return d, doubt | free
 
 
 def half_tangent(pair: Pair) -> Entry:
