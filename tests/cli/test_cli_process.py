@@ -105,7 +105,7 @@ def test_colours_and_progress_on_a_terminal_only() -> None:
     batch = ["fk", THREE_DOF, "--batch", "-"]
     plain = process(*batch, input=MANY, env={**os.environ, "NO_COLOR": ""})
     assert plain.err == ""
-    seen = on_a_terminal(batch, MANY, NO_COLOR="")
+    seen = on_a_terminal(batch, 10 * MANY, NO_COLOR="")
     assert " rows" in seen
     assert "] 100 %  8 of 8 samples" in on_a_terminal(["workspace", "robots/pan_tilt.yaml", "--grid", "2,4"], b"")
     moving = on_a_terminal(["send", THREE_DOF, "-30", "5", "-5", "--port", "sim"], b"")
