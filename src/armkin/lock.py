@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from armkin import soa
 from armkin.errors import UsageError
+from armkin.rotation import rotation_about
 from armkin.soa import Array
 
 if TYPE_CHECKING:
@@ -87,6 +88,5 @@ def _motion(prismatic: bool, value: float) -> Array:
     if prismatic:
         Z[2, 3] = value
     else:
-        c, s = np.cos(value), np.sin(value)
-        Z[:2, :2] = [[c, -s], [s, c]]
+        Z[:3, :3] = rotation_about(2, value)
     return Z

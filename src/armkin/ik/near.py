@@ -19,7 +19,7 @@ import numpy as np
 
 from armkin.ik import elbow, general, numeric, planar, position, spherical, three_parallel
 from armkin.ik.geometry import NEAR, Geometry
-from armkin.ik.recorded import recorded
+from armkin.ik.recorded import Recorded, recorded
 from armkin.ik.tasks import PARALLEL, Task, distance, targets_of
 from armkin.kinematics import fk
 from armkin.rotation import rotation_about
@@ -38,10 +38,10 @@ HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
 
 
 class _Corrected(NamedTuple):
-    """Seeds moved onto the arm: q (N, B, n), size (N, B) of the residual, doubt (N,)."""
+    """Seeds moved onto the arm: q (N, B, n), good (N, B) if they are branches, doubt (N,)."""
 
     q: Array
-    size: Array
+    good: Bool
     doubt: Bool
 
 
@@ -110,9 +110,10 @@ def _solve(
     arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
 ) -> tuple[Array, Bool]:
     """Branches (N, B, n) and doubts (N,) of some targets; the similar arm's branches keep their places."""
-    found = _correct(arm, task, alike, off, target)
-    good = found.size <= ACCEPTED
-    q = np.where(good[:, :, None], found.q, np.nan)
+    source = recorded(arm, task, alike)
+    off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
+    found = _correct(arm, task, source, off, off_here, target)
+    q = np.where(found.good[:, :, None], found.q, np.nan)
     few = np.flatnonzero(found.doubt)
     if not len(few):
         return q, found.doubt
@@ -123,8 +124,8 @@ def _solve(
         assert solver.rows is not None
         others = [solver.rows(goals)[0]]
     else:
-        source, off_here = recorded(arm, task, alike), off * np.maximum(1.0, distance(arm, task, goals))
-        others = [source.rows(there)[0] for size in RINGS for there in _around(arm, task, goals, size * off_here)]
+        rings = (_around(arm, task, goals, size * off_here[few]) for size in RINGS)
+        others = [source.rows(there)[0] for ring in rings for there in ring]
     more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
     out = np.full((len(target), more.shape[1], arm.n), np.nan)
     out[:, : q.shape[1]] = q
@@ -155,18 +156,16 @@ def _packed(q: Array, own: int) -> Array:
     return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -> _Corrected:
+def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array, target: Array) -> _Corrected:
     """Move the seeds onto the arm, and find the poses for which that may not be all.
 
-    The true arm reaches a target as the similar one reaches another, not much more than `off` away. Hence a
-    pose is sure only if the similar arm's branches hardly move all around it: where one comes or goes, it
-    moves with the square root of the distance.
+    off_here: `off` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
+    another, not much more than that away. Hence a pose is sure only if the similar arm's branches hardly move
+    all around it: where one comes or goes, it moves with the square root of the distance.
     """
-    source = recorded(arm, task, alike)
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
     weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
-    off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
     limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
     for there in _around(arm, task, target, AROUND * off_here):
@@ -180,8 +179,7 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
     some = np.flatnonzero(rough < HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
     q[some], size[some] = numeric.newton(arm, task, flat[some], goals[some], steps=6)
-    good = size <= ACCEPTED
-    branch, good = q.reshape(N, B, n), good.reshape(N, B)
+    branch, good = q.reshape(N, B, n), (size <= ACCEPTED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
@@ -189,4 +187,4 @@ def _correct(arm: Arm, task: Task, alike: Geometry, off: float, target: Array) -
             with np.errstate(invalid="ignore"):
                 same = numeric.wrapped_distance(arm, branch[:, i], branch[:, j]) < 1e-6
             doubt |= same & good[:, i] & good[:, j]
-    return _Corrected(branch, size.reshape(N, B), doubt)
+    return _Corrected(branch, good, doubt)

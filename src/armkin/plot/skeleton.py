@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.kinematics import as_joints
+from armkin.rotation import rotation_about
 from armkin.soa import Array
 
 if TYPE_CHECKING:
@@ -49,8 +50,7 @@ def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
             path.append(start + value * z)
             slides.append(np.array([start, path[-1]]))
         else:
-            c, s = np.cos(value), np.sin(value)
-            move[:2, :2] = [[c, -s], [s, c]]
+            move[:3, :3] = rotation_about(2, value)
         T = T @ move
         path.append(T[:3, 3] + arm.link[i + 1][2, 3] * z)
         T = T @ arm.link[i + 1]
