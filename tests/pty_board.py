@@ -9,9 +9,9 @@ import threading
 import time
 import tty
 
-from armkin.board_sim import SimBoard
-from armkin.boards import BOARDS
-from armkin.protocol import State
+from armkin.board.firmware.protocol import State
+from armkin.board.sim.board import SimBoard
+from armkin.hardware import BOARDS
 
 
 class PtyBoard:

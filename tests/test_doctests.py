@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 MODULES = [
-    "kinematics", "limits", "rotation", "lock", "ik.solve", "ik.turns", "ik.closest", "ik.names", "ik.subproblems",
-    "soa",
+    "forward", "model.limits", "model.rotation", "model.lock", "formula.arrays", "inverse.solve",
+    "inverse.branches.turns", "inverse.branches.names", "inverse.closest", "inverse.closed.subproblems",
 ]  # fmt: skip
 
 

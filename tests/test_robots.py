@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from armkin import robot_file
-from armkin.arm import load
-from armkin.kinematics import fk
+from armkin.forward import fk
+from armkin.model.build import load
 
 ROBOTS = Path(__file__).parents[1] / "robots"
 UP = [0, 0, 0, 0, 0, 0]
@@ -43,9 +43,7 @@ POSES = [
 
 
 @pytest.mark.parametrize(("name", "joints", "tip", "tolerance", "source"), POSES)
-def test_printed_pose(
-    name: str, joints: list[float], tip: tuple[float, ...], tolerance: float, source: str
-) -> None:
+def test_printed_pose(name: str, joints: list[float], tip: tuple[float, ...], tolerance: float, source: str) -> None:
     arm = load(ROBOTS / f"{name}.yaml")
     assert fk(arm, np.radians(joints))[:3, 3] == pytest.approx(tip, abs=tolerance), source
 
@@ -84,9 +82,7 @@ def test_step_chains_give_the_steps_that_the_sources_print() -> None:
     }
     for name, steps_per_degree in printed.items():
         motors = robot_file.read(ROBOTS / f"{name}.yaml").motor_list()
-        assert [motor.pulses_per_unit() for motor in motors] == pytest.approx(steps_per_degree, abs=1e-3), (
-            name
-        )
+        assert [motor.pulses_per_unit() for motor in motors] == pytest.approx(steps_per_degree, abs=1e-3), name
 
 
 def test_screws_shed_the_rounding_of_a_printed_table(tmp_path: Path) -> None:

@@ -17,8 +17,6 @@ TYPE_CHECKING = False  # type checkers know better; importing typing would doubl
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm as Arm
-    from armkin.arm import load as load
     from armkin.errors import ArmkinError as ArmkinError
     from armkin.errors import FileError as FileError
     from armkin.errors import LinkError as LinkError
@@ -26,30 +24,30 @@ if TYPE_CHECKING:
     from armkin.errors import NoSolutionError as NoSolutionError
     from armkin.errors import RobotFileError as RobotFileError
     from armkin.errors import UsageError as UsageError
-    from armkin.ik.closest import Closest as Closest
-    from armkin.ik.closest import closest as closest
-    from armkin.ik.geometry import method as method
-    from armkin.ik.solutions import Solutions as Solutions
-    from armkin.ik.solutions import Status as Status
-    from armkin.ik.solve import ik as ik
-    from armkin.ik.turns import turns as turns
-    from armkin.kinematics import condition as condition
-    from armkin.kinematics import fk as fk
-    from armkin.kinematics import frames as frames
-    from armkin.kinematics import jacobian as jacobian
-    from armkin.kinematics import manipulability as manipulability
-    from armkin.lock import lock as lock
-    from armkin.lock import unlock as unlock
-    from armkin.pulses import best_pulses as best_pulses
-    from armkin.pulses import joints as joints
-    from armkin.pulses import pulses as pulses
-    from armkin.pulses import rounding as rounding
-    from armkin.workspace import workspace as workspace
+    from armkin.forward import condition as condition
+    from armkin.forward import fk as fk
+    from armkin.forward import frames as frames
+    from armkin.forward import jacobian as jacobian
+    from armkin.forward import manipulability as manipulability
+    from armkin.inverse.branches.turns import turns as turns
+    from armkin.inverse.closest import Closest as Closest
+    from armkin.inverse.closest import closest as closest
+    from armkin.inverse.recognise import method as method
+    from armkin.inverse.solutions import Solutions as Solutions
+    from armkin.inverse.solutions import Status as Status
+    from armkin.inverse.solve import ik as ik
+    from armkin.model.arm import Arm as Arm
+    from armkin.model.build import load as load
+    from armkin.model.lock import lock as lock
+    from armkin.model.lock import unlock as unlock
+    from armkin.motors import best_pulses as best_pulses
+    from armkin.motors import joints as joints
+    from armkin.motors import pulses as pulses
+    from armkin.motors import rounding as rounding
+    from armkin.reach.survey import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
-    "Arm": "arm",
-    "load": "arm",
     "ArmkinError": "errors",
     "FileError": "errors",
     "LinkError": "errors",
@@ -57,25 +55,27 @@ _HOME = {
     "NoSolutionError": "errors",
     "RobotFileError": "errors",
     "UsageError": "errors",
-    "Closest": "ik.closest",
-    "closest": "ik.closest",
-    "method": "ik.geometry",
-    "turns": "ik.turns",
-    "Solutions": "ik.solutions",
-    "Status": "ik.solutions",
-    "ik": "ik.solve",
-    "condition": "kinematics",
-    "fk": "kinematics",
-    "frames": "kinematics",
-    "jacobian": "kinematics",
-    "manipulability": "kinematics",
-    "lock": "lock",
-    "unlock": "lock",
-    "best_pulses": "pulses",
-    "joints": "pulses",
-    "pulses": "pulses",
-    "rounding": "pulses",
-    "workspace": "workspace",
+    "condition": "forward",
+    "fk": "forward",
+    "frames": "forward",
+    "jacobian": "forward",
+    "manipulability": "forward",
+    "turns": "inverse.branches.turns",
+    "Closest": "inverse.closest",
+    "closest": "inverse.closest",
+    "method": "inverse.recognise",
+    "Solutions": "inverse.solutions",
+    "Status": "inverse.solutions",
+    "ik": "inverse.solve",
+    "Arm": "model.arm",
+    "load": "model.build",
+    "lock": "model.lock",
+    "unlock": "model.lock",
+    "best_pulses": "motors",
+    "joints": "motors",
+    "pulses": "motors",
+    "rounding": "motors",
+    "workspace": "reach.survey",
 }
 
 __all__ = [*_HOME, "__version__"]
@@ -95,7 +95,7 @@ def __dir__() -> list[str]:
 
 
 class _Package(_ModuleType):
-    """The package keeps ``armkin.ik`` the function when the module of the same name is imported."""
+    """The package keeps a public function when a module of the same name is imported."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOME and isinstance(value, _ModuleType)):

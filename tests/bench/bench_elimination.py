@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "ik"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 
 from general_arms import (
     ARMS,
@@ -26,7 +26,7 @@ from general_arms import (
     random_joints,
 )
 
-from armkin.ik import elimination
+from armkin.inverse.elimination import method
 
 
 def seconds(work: Callable[[], object], repeats: int) -> float:
@@ -43,12 +43,12 @@ def measure(name: str, arm: Arm, count: int) -> None:
     """One line of the table."""
     q = random_joints(arm, count, 1)
     T = forward(arm, q)
-    plan = elimination.prepare(*arm)
-    prepare = seconds(lambda: elimination.prepare(*arm), 3)
+    plan = method.prepare(*arm)
+    prepare = seconds(lambda: method.prepare(*arm), 3)
     begin = time.perf_counter()
-    found, doubtful = elimination.solve(plan, T)
+    found, doubtful = method.solve(plan, T)
     batch = (time.perf_counter() - begin) / count
-    alone = np.median([seconds(lambda i=i: elimination.solve(plan, T[i : i + 1]), 1) for i in range(15)])
+    alone = np.median([seconds(lambda i=i: method.solve(plan, T[i : i + 1]), 1) for i in range(15)])
     branches = (~np.isnan(found[..., 0])).sum(axis=1)
     size = plan.plans[0].size if plan.plans else 0
     print(

@@ -1,7 +1,7 @@
 """Forward kinematics in batches against Robotics Toolbox's ETS, in one run, one thread.
 
-    pip install -e '.[bench]'
-    OMP_NUM_THREADS=1 python tests/bench/bench_fk.py
+pip install -e '.[bench]'
+OMP_NUM_THREADS=1 python tests/bench/bench_fk.py
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import armkin
-from armkin.ik.geometry import solver
+from armkin.inverse.recognise import solver
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 # arm, task, peer's tool

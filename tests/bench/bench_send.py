@@ -19,12 +19,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 from emulator import EmulatedBoard
 
-from armkin import arm as arms
-from armkin import motion
-from armkin.configuration import configure
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
-from armkin.link import SerialPort
-from armkin.machine import Machine
+from armkin.model import build as arms
+from armkin.motion.plan import plan as plan_moves
 
 ROBOT = Path(__file__).parents[2] / "robots" / "three_dof.yaml"
 SEGMENTS = 1000
@@ -44,7 +44,7 @@ def noisy(seed: int) -> str:
         plans, at, lowest = [], list(machine.counts()), [10**6]
         while sum(plan.segments for plan in plans) < SEGMENTS:
             goal = rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10]))
-            plans.append(motion.plan(arm, at, goal))
+            plans.append(plan_moves(arm, at, goal))
             at = plans[-1].end.tolist()
         segments = sum(plan.segments for plan in plans)
         total = sum(plan.duration for plan in plans)

@@ -37,9 +37,7 @@ def main() -> int:
     for name, options in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-c", CODE.format(options=options), str(ROBOT), str(samples), folder]
-            seconds, peak = map(
-                float, subprocess.run(command, capture_output=True, check=True).stdout.split()
-            )
+            seconds, peak = map(float, subprocess.run(command, capture_output=True, check=True).stdout.split())
         print(f"{name:24}{seconds:9.2f}{samples / seconds / 1e6:11.2f}{peak:9.0f}", flush=True)
         worst = max(worst, peak)
     print(f"\npeak memory {worst:.0f} MB, allowed {BAR_MB}")

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "ik"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 
 import oracle
 from checks import Array, Report, examine, not_found, random_joints

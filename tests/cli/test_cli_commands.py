@@ -17,7 +17,7 @@ ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
-    function = getattr(import_module(f"armkin.cli.{name}"), name)
+    function = getattr(import_module(f"armkin.cli.commands.{name}"), name)
     assert inspect.getdoc(function).splitlines()[0] == COMMANDS[name]
     assert name in run("--help").out
     result = run(name, "--help")

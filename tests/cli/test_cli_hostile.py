@@ -155,9 +155,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     (tmp_path / "binary.yaml").write_bytes(bytes(range(256)))
     (tmp_path / "unknown.yaml").write_text(valid.replace("convention:", "convension:"))
     head = "name: r\nconvention: standard\njoints:\n"
-    (tmp_path / "reversed.yaml").write_text(
-        f"{head}  - {{name: q1, dh: {{alpha: 0, a: 1, d: 0}}, limits: [9, -9]}}\n"
-    )
+    (tmp_path / "reversed.yaml").write_text(f"{head}  - {{name: q1, dh: {{alpha: 0, a: 1, d: 0}}, limits: [9, -9]}}\n")
     (tmp_path / "nan.yaml").write_text(f"{head}  - {{name: q1, dh: {{alpha: 0, a: .nan, d: 0}}}}\n")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with socket.socket(socket.AF_UNIX) as server:

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board_sim import SimBoard
-from armkin.boards import BOARDS
-from armkin.protocol import State
+from armkin.board.firmware.protocol import State
+from armkin.board.sim.board import SimBoard
+from armkin.hardware import BOARDS
 from command_line import ROOT, THREE_DOF, process, run
 from pty_board import PtyBoard
 
@@ -292,7 +292,7 @@ def test_ports_and_stop() -> None:
 
 def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     """One read gives back what it has; the clock and Ctrl-C are looked at between reads."""
-    from armkin.link import SerialPort
+    from armkin.board.ports import SerialPort
 
     class Flood:
         in_waiting, given = 1000, 0
@@ -305,7 +305,7 @@ def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pyte
         def close(self) -> None:
             pass
 
-    monkeypatch.setattr("armkin.link._open_serial", lambda name, baud: Flood())
+    monkeypatch.setattr("armkin.board.ports._open_serial", lambda name, baud: Flood())
     port = SerialPort("flood")
     assert len(port.read(0.1)) >= 1000
     port.close()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.workspace import workspace
+from armkin.reach import workspace
 from command_line import ROOT, THREE_DOF, run
 
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from emulator import EmulatedBoard
 
-from armkin import protocol
-from armkin.protocol import Ack, Info, Segment, State, Status
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import Ack, Info, Segment, State, Status
 
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)

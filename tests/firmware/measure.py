@@ -12,8 +12,8 @@ import numpy as np
 from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for
 from emulator import BUILD, FIRMWARE, EmulatedBoard, make
 
-from armkin import protocol
-from armkin.protocol import Segment
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import Segment
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order
 

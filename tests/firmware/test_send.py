@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from emulator import EmulatedBoard
 
-from armkin import arm as arms
-from armkin import motion
-from armkin.configuration import configure
-from armkin.link import SerialPort
-from armkin.machine import Machine
-from armkin.protocol import Flag
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.protocol import Flag
+from armkin.board.ports import SerialPort
+from armkin.model import build as arms
+from armkin.motion.plan import plan as plan_moves
 from command_line import ROOT, THREE_DOF, process, run
 
 POSE = (-30, 5, -5)
@@ -199,7 +199,7 @@ def _killed_often(seed: int, times: int) -> list[str]:
                     if one.position() == "lost" or list(one.counts()) != start:
                         return [*wrong, f"kill {i}: the board says {one.position()} {one.counts()}, pins {start}"]
                     one.prepare()
-                    plan = motion.plan(one.arm, start, goals[rng.randrange(2)])
+                    plan = plan_moves(one.arm, start, goals[rng.randrange(2)])
                     end = plan.end.tolist()
                     one.run([plan])
             except _KilledError:
@@ -366,7 +366,7 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
         try:
             one = Machine(port, arm, configure(arm))
             one.prepare()
-            plan = motion.plan(loose, one.counts(), np.deg2rad([10, 45, -30]))
+            plan = plan_moves(loose, one.counts(), np.deg2rad([10, 45, -30]))
             with pytest.raises(Exception, match="LIMIT_JOINT"):
                 one.run([plan])
         finally:
@@ -396,8 +396,8 @@ def test_servos_ramp_from_the_pose_that_they_are_said_to_have(tmp_path: Path) ->
 
 
 def test_what_the_host_knows_of_the_boards_is_what_they_say() -> None:
-    from armkin.boards import BOARDS
-    from armkin.session import Session
+    from armkin.board.firmware.session import Session
+    from armkin.hardware import BOARDS
 
     for kind, known in BOARDS.items():
         with EmulatedBoard(kind) as board:

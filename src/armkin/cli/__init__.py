@@ -1,10 +1,10 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
     __init__ (the table of commands, main) -> app (group, errors -> exit codes)
-    fk, ik, ... : the commands             -> options, numbers, units, batch, output, render
+    commands/fk, commands/ik, ...          -> options, numbers, batch, output, render
 
 A command is a function of the same name in a module of the same name, written for Typer:
-`armkin.cli.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its
+`armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its
 neighbours at its top, so that ``armkin --help`` stays cheap.
 """
 

@@ -83,7 +83,7 @@ class Commands(TyperGroup):
 
 def load(name: str) -> Any:
     """Import a command's module and let Typer read its function."""
-    function = getattr(import_module(f"armkin.cli.{name}"), name)
+    function = getattr(import_module(f"armkin.cli.commands.{name}"), name)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
     single.command(name, cls=Command, context_settings=_SETTINGS)(function)
     return typer.main.get_command(single)

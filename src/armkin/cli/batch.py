@@ -14,7 +14,7 @@ from armkin.cli.render import to_json
 from armkin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.soa import Array
+    from armkin.formula.arrays import Array
 
 ROWS = 4096  # rows in memory at a time
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file

@@ -8,15 +8,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armkin.cli import inputs, piped, render, units
+from armkin.cli import inputs, piped, render
 from armkin.cli.batch import streamed_rows
 from armkin.cli.numbers import listed
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
+from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
-    from armkin.motion import Plan
-    from armkin.soa import Array
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.plan import Plan
 
 Planner = Callable[[Sequence[int], "Array"], "Plan"]  # counts to start from, joint values (w, n) [rad | mm]
 
@@ -43,7 +44,7 @@ def goals(
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
     arm = inputs.load(robot)
     if target is not None:
-        from armkin.ik.tasks import task_for
+        from armkin.inverse.tasks.task import task_for
 
         what = task_for(arm, task)
         values = listed(target, what.labels, f"--target (task {what.name})")
@@ -138,7 +139,7 @@ class Stream:
 
 
 def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
-    from armkin.motion import check_limits
+    from armkin.motion.plan import check_limits
 
     joints = units.joints_in(arm, values)
     for i, goal in enumerate(joints):

@@ -9,13 +9,13 @@ from armkin.cli.numbers import listed, numbers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
-    from armkin.ik.tasks import Task
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
 
 
 def load(robot: str) -> Arm:
     """The arm of a robot file."""
-    from armkin.arm import load
+    from armkin.model.build import load
 
     if not robot:
         raise UsageError("the robot file's name is empty; name a file, for example robots/three_dof.yaml")

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import output, render, units
+from armkin.cli import output, render
+from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
-    from armkin.configuration import Configuration
-    from armkin.machine import Machine
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.machine import Machine
+    from armkin.model.arm import Arm
 
 PortName = Annotated[
     str,
@@ -50,7 +51,7 @@ class Stop:
 @contextmanager
 def stoppable() -> Iterator[Stop]:
     """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
-    from armkin.session import StoppedError
+    from armkin.board.firmware.session import StoppedError
 
     stop = Stop()
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -72,9 +73,9 @@ def machine(
 
     simulated: what to say of a board in this process.
     """
-    from armkin.link import open_port
-    from armkin.machine import Machine
-    from armkin.session import StoppedError
+    from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.session import StoppedError
+    from armkin.board.ports import open_port
 
     with stoppable() as stop:
         link = open_port(port, board=configuration.board, baud=baud)
@@ -95,7 +96,7 @@ def machine(
 
 def configured(arm: Arm) -> Configuration:
     """The arm's board and configuration."""
-    from armkin.configuration import configure
+    from armkin.board.firmware.configuration import configure
 
     return configure(arm)
 
@@ -118,7 +119,7 @@ def where(machine: Machine) -> dict[str, Any]:
 
 def where_text(arm: Arm, found: dict[str, Any]) -> str:
     """The same for people."""
-    from armkin.pulses import motor_names, pulse_units
+    from armkin.motors import motor_names, pulse_units
 
     if found["joints"] is None:
         return f"{arm.name}: its position is lost\n"

@@ -9,12 +9,8 @@ Joints = Annotated[
     list[str] | None,
     typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm)."),
 ]
-Json = Annotated[
-    bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")
-]
-JsonLines = Annotated[
-    bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")
-]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
+JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]
 Batch = Annotated[
     str | None,
     typer.Option(
@@ -29,13 +25,9 @@ Out = Annotated[
 ]
 Target = Annotated[
     list[str] | None,
-    typer.Argument(
-        metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."
-    ),
+    typer.Argument(metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."),
 ]
-AllBranches = Annotated[
-    bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")
-]
+AllBranches = Annotated[bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")]
 Near = Annotated[
     str | None,
     typer.Option("--near", metavar="Q,...", help="Joint values to stay close to. [default: the home pose]"),
@@ -48,12 +40,8 @@ TaskName = Annotated[
     str | None,
     typer.Option("--task", metavar="TASK", help="What the target prescribes. [default: the robot file's]"),
 ]
-Lock = Annotated[
-    list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.")
-]
+Lock = Annotated[list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.")]
 Sweep = Annotated[
     list[str] | None,
-    typer.Option(
-        "--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."
-    ),
+    typer.Option("--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."),
 ]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import output, units
+from armkin.cli import output
 from armkin.errors import NoSolutionError
+from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
     from armkin.cli.batch import Tally
-    from armkin.soa import Array
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
 
 
 def head(arm: Arm) -> dict[str, Any]:
@@ -21,7 +22,7 @@ def head(arm: Arm) -> dict[str, Any]:
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[dict[str, Any]]]:
     """For each row, the joints outside their limits: values (N, n) [deg | mm], q the same in [rad | mm]."""
-    from armkin.limits import outside
+    from armkin.model.limits import outside
 
     return [
         [violation(arm, i, row[i]) for i, is_outside in enumerate(flags) if is_outside] if any(flags) else []
@@ -42,7 +43,7 @@ def finite(value: float) -> float | None:
 
 def said(arm: Arm, violation: dict[str, Any]) -> str:
     """One violation in words: ``q2 = 130 deg is outside -20 to 120 deg``."""
-    from armkin import limits
+    from armkin.model import limits
 
     joint = arm.joint_names.index(violation["joint"])
     return limits.said(arm, joint, violation["value"] * (1.0 if arm.prismatic[joint] else units.DEGREE))

@@ -7,15 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from armkin.cli import output, units
+from armkin.cli import output
 from armkin.cli.numbers import number, whole
 from armkin.errors import UsageError
+from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
-    from armkin.ik.closest import Closest
-    from armkin.ik.solutions import Solutions
-    from armkin.soa import Array
+    from armkin.formula.arrays import Array
+    from armkin.inverse.closest import Closest
+    from armkin.inverse.solutions import Solutions
+    from armkin.model.arm import Arm
 
 MOST_SWEEPS = 10_000
 
@@ -67,7 +68,7 @@ class Answer:
 def solve(request: Request, targets: Array) -> list[Answer]:
     """Answer targets (N, ...) [mm, rad]."""
     import armkin
-    from armkin.ik.names import find
+    from armkin.inverse.branches.names import find
 
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
@@ -141,7 +142,7 @@ def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> 
 
 
 def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
-    from armkin.lock import joint_index
+    from armkin.model.lock import joint_index
 
     name, equals, value = text.partition("=")
     if not equals:
@@ -173,7 +174,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     import numpy as np
 
     import armkin
-    from armkin import limits
+    from armkin.model import limits
 
     arm = request.arm
     q = armkin.unlock(arm, held, s.q) if held else s.q

@@ -1,6 +1,5 @@
 """Pictures (extra ``armkin[plot]``): the arm in one or many poses, and the cloud of its workspace.
 
-    skeleton.py  an arm's pose as lines and points; numpy only
     canvas.py    matplotlib: figures, axes in true proportion, files
     poses.py     `plot_poses`: branches, a path, a single pose
     cloud.py     `plot_workspace`: the cloud and its projections

@@ -12,7 +12,7 @@ import numpy as np
 
 from armkin.errors import MissingExtraError, UsageError
 from armkin.files import whole
-from armkin.soa import Array
+from armkin.formula.arrays import Array
 
 INK, SOFT, FAINT = "#1b1f24", "#6a737d", "#d5dae0"
 # Okabe and Ito's colours, told apart also by the colour-blind (Color Universal Design, 2008).

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.errors import UsageError
+from armkin.formula.arrays import Array
 from armkin.plot.canvas import INK, SOFT, flat, picture, space, true_proportions
-from armkin.soa import Array
 
 if TYPE_CHECKING:
-    from armkin.workspace import Workspace
+    from armkin.reach import Workspace
 
 COLOURS = ("manipulability", "step_error", "reach", "z")
 KEEP = 150_000  # samples that a survey should keep for a picture: more cannot be told apart

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.kinematics import as_joints
-from armkin.kinematics import frames as joint_frames
-from armkin.limits import outside
+from armkin.formula.arrays import Array
+from armkin.forward import as_joints
+from armkin.forward import frames as joint_frames
+from armkin.model.limits import outside
 from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, space, true_proportions
-from armkin.plot.skeleton import Skeleton, skeleton
-from armkin.soa import Array
-from armkin.workspace.volume import motion
+from armkin.reach.volume import motion
+from armkin.view.skeleton import Skeleton, skeleton
 
 if TYPE_CHECKING:
-    from armkin.arm import Arm
+    from armkin.model.arm import Arm
 
 MOST = 500  # poses that a picture can still tell apart, generously
 _AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # x, y, z of a frame

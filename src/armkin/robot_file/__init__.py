@@ -13,20 +13,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from armkin import strict_yaml
 from armkin.errors import FileError, RobotFileError
-from armkin.robot_file.model import (
-    DH,
-    Board,
-    Drive,
-    Gripper,
-    Homing,
-    Joint,
-    Motor,
-    Pose,
-    RobotFile,
-    Screw,
-)
+from armkin.robot_file import strict_yaml
+from armkin.robot_file.model import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, RobotFile, Screw
 
 __all__ = [
     "DH",

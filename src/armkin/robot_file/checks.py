@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin.boards import BOARDS
+from armkin.hardware import BOARDS
 
 if TYPE_CHECKING:
     from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotFile
@@ -268,9 +268,7 @@ def _gripper(robot: RobotFile) -> Iterator[Problem]:
 def _axes(robot: RobotFile) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     drives: list[tuple[Path, Drive]] = [
-        (("joints", i, "drive"), joint.drive)
-        for i, joint in enumerate(robot.joints)
-        if joint.drive is not None
+        (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
     ]
     drives += [(("motors", i), motor) for i, motor in enumerate(robot.motors or ())]
     if robot.gripper is not None:

@@ -9,8 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from armkin import strict_yaml
-from armkin.robot_file import model
+from armkin.robot_file import model, strict_yaml
 
 Path = tuple[str | int, ...]
 

@@ -2,7 +2,7 @@
 
 Strict: no unknown keys, no text or booleans for numbers, finite numbers only; immutable. What needs
 several values to judge (limits against home, axes against the board) stands in ``checks``.
-Angles are degrees and lengths millimetres here; ``armkin.arm`` turns them into radians, once.
+Angles are degrees and lengths millimetres here; ``armkin.model.arm`` turns them into radians, once.
 """
 
 import math
@@ -117,9 +117,7 @@ class Drive(_Model):
         None,
         description="The board's output: X, Y, Z, A (CNC shield); X, Y, Z, E0, E1 (RAMPS); S0... (servos).",
     )
-    invert: bool = Field(
-        False, description="Wiring: the motor turns the other way. (A joint's `sign` is geometry.)"
-    )
+    invert: bool = Field(False, description="Wiring: the motor turns the other way. (A joint's `sign` is geometry.)")
     full_steps: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
         None, description="Stepper: full steps per motor turn, mostly 200."
     )
@@ -136,8 +134,8 @@ class Drive(_Model):
     travel: tuple[Angle, Angle] | None = Field(
         None, description="Servo: its own angles in degrees at the two pulse widths, [0, 180] for most."
     )
-    pulse_us: tuple[Annotated[int, Field(ge=100, le=5000)], Annotated[int, Field(ge=100, le=5000)]] | None = (
-        Field(None, description="Servo: pulse widths in microseconds at the two ends of `travel`.")
+    pulse_us: tuple[Annotated[int, Field(ge=100, le=5000)], Annotated[int, Field(ge=100, le=5000)]] | None = Field(
+        None, description="Servo: pulse widths in microseconds at the two ends of `travel`."
     )
     zero: Angle = Field(0.0, description="Servo: its own angle in degrees where the joint value is 0.")
 
@@ -212,9 +210,7 @@ class Joint(_Model):
     dh: DH | None = Field(None, description="The DH row (conventions standard and modified).")
     screw: Screw | None = Field(None, description="The screw axis (convention screws).")
     sign: Sign = Field(1, description="1 or -1: the joint counts against the axis of its row or screw.")
-    limits: tuple[Value, Value] | None = Field(
-        None, description="[lower, upper] in degrees or mm. Absent: unlimited."
-    )
+    limits: tuple[Value, Value] | None = Field(None, description="[lower, upper] in degrees or mm. Absent: unlimited.")
     home: Value = Field(0.0, description="The pose from which pulses are counted, in degrees or mm.")
     max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2; needed to send motion.")

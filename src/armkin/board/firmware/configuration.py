@@ -1,0 +1,249 @@
+"""A robot file as its board must know it: which motor on which axis, limits, rates, home.
+
+The image (firmware/PROTOCOL.md, section 4) travels to the board once and stays there; its CRC is how host
+and board notice that they mean different arms.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.firmware.protocol import AxisImage, Image, RowImage
+from armkin.errors import UsageError
+from armkin.hardware import BOARDS, DRIVERS, Board, Driver
+from armkin.motion.plan import check_rates, motor_accel
+from armkin.motors import pulse_range, pulses, resolution
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.robot_file import Gripper, Motor
+
+_FAR = 2**30  # counts: an axis without a limit
+_SERVO_RANGE = (400, 2600)  # [us] that the boards can make
+
+
+@dataclass(frozen=True)
+class Grip:
+    """The gripper as an axis."""
+
+    axis: int
+    open: int  # counts
+    closed: int
+    top: float | None  # counts/s, None if the file has no max_speed
+    accel: float | None  # counts/s^2
+    per_unit: float  # counts per degree | mm
+    at_zero: float  # counts where the drive's value is 0
+
+    def count(self, value: float) -> int:
+        """Counts of a value in the drive's degrees (or mm)."""
+        exact = self.at_zero + value * self.per_unit
+        return int(math.copysign(math.floor(abs(exact) + 0.5 + 1e-9), exact))
+
+    def value(self, count: int) -> float:
+        """The drive's degrees (or mm) at a count."""
+        return (count - self.at_zero) / self.per_unit
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """An arm on a board."""
+
+    board: Board
+    image: Image
+    axes: tuple[int, ...]  # axis of every motor, in the arm's order
+    grip: Grip | None  # None also if the gripper cannot move: it has no max_speed or max_accel
+
+    @property
+    def steppers(self) -> bool:
+        """Whether a motor of the arm (or the gripper) is a stepper."""
+        used = [i for i, axis in enumerate(self.image.axes) if axis.used]
+        return any(i < len(self.board.steppers) for i in used)
+
+
+def configure(arm: Arm) -> Configuration:
+    """The configuration of an arm.
+
+    Raises UsageError, naming what is missing: `board`, its `driver`, a motor's `axis`, max_speed, ...
+    """
+    file = arm.file
+    where = f" in {arm.path}" if arm.path else ""
+    if file is None or file.board is None:
+        names = ", ".join(BOARDS)
+        raise UsageError(f"{arm.name} has no board; add board: {{kind: ...}}{where} ({names})")
+    board = BOARDS[file.board.kind]
+    motors = file.motor_list()
+    resolution(arm)  # raises if a joint has no motor
+    check_rates(arm)
+    axes = tuple(_axis(board, motor, f"motor {motor.name}", where) for motor in motors)
+    grip = _grip(board, file.gripper, where) if file.gripper is not None else None
+    images = [AxisImage() for _ in board.axes]
+    low, high = _limits(arm)
+    home = pulses(arm, arm.home)
+    rate, accel = np.abs(arm.motor_gain) @ arm.max_speed, motor_accel(arm)
+    for k, (motor, axis) in enumerate(zip(motors, axes, strict=True)):
+        if motor.kind == "servo":
+            _check_servo(f"motor {motor.name}", low[k], high[k])
+        stepper = motor.kind == "stepper"
+        images[axis] = AxisImage(
+            True,
+            motor.invert and stepper,  # a servo's is in its counts
+            low[k],
+            high[k],
+            int(home[k]),
+            _rate(board, rate[k]),
+            _accel(accel[k]),
+        )
+    if grip is not None and file.gripper is not None:
+        images[grip.axis] = _grip_image(board, file.gripper, grip)
+    driver = _driver(arm, board, images, where)
+    image = Image(
+        tuple(images),
+        _rows(arm, board, axes, low, high),
+        abort_closed=file.board.abort == "closed",
+        enable_high=file.board.enable == "high",
+        step_high=driver.step_high,
+        step_low=driver.step_low,
+        dir_setup=driver.dir_setup,
+        wake=driver.wake,
+        meaning=_meaning(arm, grip),
+    )
+    return Configuration(board, image, axes, grip)
+
+
+def _axis(board: Board, motor: Motor | Gripper, what: str, where: str) -> int:
+    names = board.servos if motor.kind == "servo" else board.steppers
+    if motor.axis is None:
+        raise UsageError(f"{what} has no axis; add axis: to its drive{where} ({', '.join(names)})")
+    return board.axes.index(motor.axis)
+
+
+def _limits(arm: Arm) -> tuple[list[int], list[int]]:
+    """Lowest and highest count of every motor that the joint limits allow."""
+    ends: list[list[int]] = [[], []]
+    for k, gain in enumerate(arm.motor_gain):
+        for side, sign in enumerate((-1, 1)):
+            corner = np.where(gain * sign >= 0, arm.upper, arm.lower)
+            corner = np.where(gain == 0, arm.home, corner)
+            if np.all(np.isfinite(corner)):
+                ends[side].append(max(-_FAR, min(_FAR, int(pulses(arm, corner)[k]))))
+            else:
+                ends[side].append(sign * _FAR)
+    servo = pulse_range(arm)
+    low = [max(a, int(s)) if s > -math.inf else a for a, s in zip(ends[0], servo[:, 0], strict=True)]
+    high = [min(a, int(s)) if s < math.inf else a for a, s in zip(ends[1], servo[:, 1], strict=True)]
+    return low, high
+
+
+def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]) -> tuple[RowImage, ...]:
+    """A row for every limited joint that does not have a motor of its own."""
+    per_count = np.linalg.pinv(arm.motor_gain)  # (n, motors)
+    per_count[np.abs(per_count) < 1e-12 * np.abs(per_count).max()] = 0.0
+    far = np.maximum(np.abs(low), np.abs(high)).astype(float)
+    rows = []
+    for j in range(arm.n):
+        turning = np.flatnonzero(per_count[j])
+        if len(turning) == 1 and np.count_nonzero(arm.motor_gain[turning[0]]) == 1:
+            continue  # the axis limits say it
+        if not (math.isfinite(arm.lower[j]) or math.isfinite(arm.upper[j])):
+            continue
+        rows.append(_row(arm, board, axes, per_count[j], j, far))
+    if len(rows) > board.rows:
+        raise UsageError(f"{arm.name} has {len(rows)} coupled joints with limits; {board.kind} takes {board.rows}")
+    return tuple(rows)
+
+
+def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, far: Array) -> RowImage:
+    """Scaled to 16-bit weights, the bounds widened by what rounding weights and counts may do."""
+    most = float(np.abs(per_count) @ far)
+    scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
+    weight = np.rint(per_count * scale)
+    # The exact sum and the rounded one differ by the weights' rounding times the counts, and the counts
+    # themselves are rounded by up to half.
+    slack = float(np.abs(weight - per_count * scale) @ far + np.abs(weight).sum() / 2)
+    offset = float(weight @ arm.motor_bias)
+    bounds = []
+    for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):
+        value = (limit - arm.home[j]) * scale + offset + sign * slack if math.isfinite(limit) else sign * _FAR
+        rounded = math.floor(value) if sign < 0 else math.ceil(value)
+        bounds.append(max(-_FAR, min(_FAR, rounded)))
+    weights = [0] * len(board.axes)
+    for axis, w in zip(axes, weight, strict=True):
+        weights[axis] = int(w)
+    return RowImage(bounds[0], bounds[1], tuple(weights))
+
+
+def _check_servo(what: str, low: int, high: int) -> None:
+    least, most = _SERVO_RANGE
+    if low < least or high > most:
+        raise UsageError(f"{what}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
+
+
+def _rate(board: Board, rate: float) -> int:
+    fastest = board.clock // board.min_interval
+    return max(1, min(math.ceil(rate - 1e-9), fastest, 65535))
+
+
+def _accel(accel: float) -> int:
+    return max(1, min(math.ceil(accel - 1e-9), 2**24 - 1))
+
+
+def _grip(board: Board, gripper: Gripper, where: str) -> Grip:
+    axis = _axis(board, gripper, "the gripper", where)
+    per_unit, zero = gripper.pulses_per_unit(), 0.0
+    if gripper.kind == "servo" and gripper.travel is not None and gripper.pulse_us is not None:
+        zero = gripper.pulse_us[0] + (gripper.zero - gripper.travel[0]) * per_unit
+        per_unit = -per_unit if gripper.invert else per_unit
+    else:
+        zero = -gripper.open * per_unit  # steps are counted from the open gripper
+    top, accel = gripper.max_speed, gripper.max_accel
+    bare = Grip(
+        axis,
+        0,
+        0,
+        None if top is None else top * abs(per_unit),
+        None if accel is None else accel * abs(per_unit),
+        per_unit,
+        zero,
+    )
+    return Grip(axis, bare.count(gripper.open), bare.count(gripper.closed), bare.top, bare.accel, per_unit, zero)
+
+
+def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
+    if grip.top is None or grip.accel is None:
+        return AxisImage()
+    low, high = sorted((grip.open, grip.closed))
+    if gripper.kind == "servo":
+        _check_servo("the gripper", low, high)
+    invert = gripper.invert and gripper.kind == "stepper"
+    return AxisImage(True, invert, low, high, grip.open, _rate(board, grip.top), _accel(grip.accel))
+
+
+def _driver(arm: Arm, board: Board, images: list[AxisImage], where: str) -> Driver:
+    assert arm.file is not None
+    assert arm.file.board is not None
+    name = arm.file.board.driver
+    if name is not None:
+        return DRIVERS[name]
+    if any(images[i].used for i in range(len(board.steppers))):
+        raise UsageError(
+            f"{arm.name}'s board has no driver: it sets the pulse timing; "
+            f"add driver: to board:{where} ({', '.join(DRIVERS)})"
+        )
+    return Driver(1, 1, 1, 1)
+
+
+def _meaning(arm: Arm, grip: Grip | None) -> int:
+    """Checksum of what counts mean and the limits do not say: the step chains and the home pose."""
+    exact: list[object] = [
+        [[f"{value:.12g}" for value in row] for row in arm.motor_gain],
+        [f"{value:.12g}" for value in (*arm.motor_bias, *arm.home)],
+        None if grip is None else [f"{grip.per_unit:.12g}", f"{grip.at_zero:.12g}"],
+    ]
+    return zlib.crc32(json.dumps(exact).encode())

@@ -1,0 +1,157 @@
+"""Homing by limit switches: what the robot file says, in the board's counts.
+
+Each joint moves along its own vector of motors until its switch closes, backs off, and touches the switch
+again slowly; the board latches the counts at that edge. (firmware/PROTOCOL.md, section 8.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.firmware import protocol
+from armkin.errors import UsageError
+from armkin.model.lock import joint_index
+from armkin.motors import pulses
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.machine import Machine
+    from armkin.model.arm import Arm
+
+_SLOW = 26  # /256: the second approach runs at a tenth
+_MARGIN = 1.25  # of the joint's range: how far a switch may be
+
+
+@dataclass(frozen=True)
+class Search:
+    """One joint's way to its switch, in the protocol's terms."""
+
+    joint: int
+    switch: int
+    closed: bool
+    backoff: int  # leader's counts
+    travel: int
+    time: int  # [0.1 s]
+    rate: tuple[int, ...]  # per axis of the board
+
+    def frame(self, tag: int) -> bytes:
+        """Its HOME frame."""
+        return protocol.home(
+            tag,
+            switch=self.switch,
+            closed=self.closed,
+            slow=_SLOW,
+            backoff=self.backoff,
+            travel=self.travel,
+            time=self.time,
+            rate=self.rate,
+        )
+
+
+def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) -> list[Search]:
+    """The searches of the named joints (all, by default) in their order.
+
+    Raises UsageError that names the joint which has no homing.
+    """
+    assert arm.file is not None
+    joints = arm.file.joints
+    for name in names:
+        joint_index(arm, name)
+    wanted = [j for j, joint in enumerate(joints) if not names or joint.name in names]
+    wanted = [j for group in _groups(arm, wanted) for j in group]
+    bare = [joints[j].name for j in wanted if joints[j].homing is None]
+    if bare:
+        raise UsageError(
+            f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home "
+            "pose, and give --assume-home to the next send"
+        )
+    orders = {j: joint.homing.order for j, joint in enumerate(joints) if joint.homing is not None}
+    wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))
+    return [_search(arm, configuration, j) for j in wanted]
+
+
+def home(machine: Machine, names: Sequence[str] = (), announce: Callable[[str], None] = lambda name: None) -> None:
+    """Home joints and tell the board where they stand; all positions of theirs are lost until then."""
+    arm = machine.arm
+    todo = searches(arm, machine.configuration, names)
+    if not machine.configured:
+        machine.configure()
+    machine.enable(machine.configuration.axes)
+    q = arm.home.copy()
+    axes = list(machine.configuration.axes)
+    per_count = np.linalg.pinv(arm.motor_gain)
+    for group in _groups(arm, [search.joint for search in todo]):
+        for search in (s for s in todo if s.joint in group):
+            announce(arm.joint_names[search.joint])
+            status, edge = machine.home(search.frame)
+            beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
+            q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
+        motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
+        machine.vouch(dict(zip([axes[k] for k in motors], pulses(arm, q)[motors].tolist(), strict=True)))
+
+
+def _groups(arm: Arm, wanted: Sequence[int]) -> list[list[int]]:
+    """Joints that share motors home together: sets of joints, in file order."""
+    left, groups = set(wanted), []
+    while left:
+        group = {min(left)}
+        while True:
+            motors = np.abs(arm.motor_gain[:, sorted(group)]).sum(axis=1) > 0
+            grown = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
+            if grown == group:
+                break
+            group = grown
+        groups.append(sorted(group))
+        left -= group
+    return groups
+
+
+def _at(arm: Arm, joint: int) -> float:
+    """Joint value at the switch's edge [rad | mm]."""
+    assert arm.file is not None
+    homing = arm.file.joints[joint].homing
+    assert homing is not None
+    return homing.at * (1.0 if arm.prismatic[joint] else math.pi / 180)
+
+
+def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
+    assert arm.file is not None
+    joint, unit = arm.file.joints[j], 1.0 if arm.prismatic[j] else math.pi / 180
+    homing = joint.homing
+    assert homing is not None
+    board = configuration.board
+    gain = arm.motor_gain[:, j]
+    speed = homing.speed * unit
+    rate = [0] * len(board.axes)
+    for axis, value in zip(configuration.axes, gain * homing.direction * speed, strict=True):
+        rate[axis] = int(np.rint(value))
+    leader = float(np.abs(gain).max())
+    fastest, slowest = max(map(abs, rate)), min((abs(r) for r in rate if r), default=0)
+    if fastest > 32767 or slowest < 1:
+        raise UsageError(
+            f"joint {joint.name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to 32767 can be"
+        )
+    backoff = math.ceil(leader * homing.backoff * unit)
+    if backoff > 65535:
+        raise UsageError(f"joint {joint.name}: homing.backoff {homing.backoff:g} is {backoff} counts; 65535 can be")
+    span = float(arm.upper[j] - arm.lower[j])
+    if not math.isfinite(span):
+        if arm.prismatic[j]:
+            raise UsageError(f"joint {joint.name} has no limits: homing would not know how far to look")
+        span = 2 * math.pi
+    travel = math.ceil(leader * (_MARGIN * span + homing.backoff * unit))
+    seconds = 2 * _MARGIN * span / speed + 4 * backoff / (leader * speed * _SLOW / 256) + 5
+    return Search(
+        joint=j,
+        switch=board.switches.index(homing.switch),
+        closed=homing.normally == "closed",
+        backoff=max(1, backoff),
+        travel=travel,
+        time=min(65535, math.ceil(10 * seconds)),
+        rate=tuple(rate),
+    )

@@ -1,0 +1,335 @@
+"""Frames of the wire protocol: firmware/PROTOCOL.md is the text, firmware/golden/ the vectors.
+
+    fields  --hello(), motion(), ...-->  payload  --framing-->  bytes on the line  --framing, parse()-->  fields
+
+Host and simulated board share this module; it knows no port and no motion.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from armkin.board.firmware.framing import MAX_FRAME as MAX_FRAME
+from armkin.board.firmware.framing import Splitter as Splitter
+from armkin.board.firmware.framing import cobs_decode as cobs_decode
+from armkin.board.firmware.framing import cobs_encode as cobs_encode
+from armkin.board.firmware.framing import unwire as unwire
+from armkin.board.firmware.framing import wire as wire
+from armkin.board.firmware.image import AxisImage as AxisImage
+from armkin.board.firmware.image import Image as Image
+from armkin.board.firmware.image import RowImage as RowImage
+
+VERSION = 1
+
+
+class Type(IntEnum):
+    """First byte of a payload."""
+
+    HELLO = 0x01
+    STATUS_QUERY = 0x02
+    HOLD = 0x03
+    CONFIG = 0x10
+    COMMIT = 0x11
+    ENABLE = 0x12
+    SET_POSITION = 0x13
+    MOTION = 0x14
+    HOME = 0x15
+    JOG = 0x16
+    ACK = 0x80
+    INFO = 0x81
+    STATUS = 0x82
+    CREDIT = 0x83
+
+
+class State(IntEnum):
+    """What the board is doing."""
+
+    IDLE = 0
+    MOVING = 1
+    HOLDING = 2
+    HOMING = 3
+    JOGGING = 4
+
+
+class Error(IntEnum):
+    """Why a session has ended (PROTOCOL.md, section 10)."""
+
+    OK = 0
+    NO_SESSION = 1
+    VERSION = 2
+    TYPE = 3
+    LENGTH = 4
+    VALUE = 5
+    CONFIG_NONE = 6
+    CONFIG_BAD = 7
+    BUSY = 8
+    LOST = 9
+    KNOWN = 10
+    DISABLED = 11
+    START = 12
+    END = 13
+    INTERVAL = 14
+    STEPS = 15
+    RATE = 16
+    LIMIT = 17
+    LIMIT_JOINT = 18
+    CREDIT = 19
+    ABORT = 20
+    HELD = 21
+    SILENCE = 22
+    DRY = 23
+    OVERRUN = 24
+    SWITCH = 25
+    TRAVEL = 26
+    TIME = 27
+
+
+class Flag(IntFlag):
+    """Flags of INFO and STATUS."""
+
+    DRIVERS = 1
+    SERVOS = 2
+    CONFIGURED = 4
+    RETAINED = 8
+    ABORT = 16
+    LATCH = 32
+
+
+MOTION_END = 1
+MOTION_WIDE = 2
+
+
+@dataclass(frozen=True)
+class Segment:
+    """T ticks, the first after `interval` cycles, each next one add/256 cycles later; steps per axis."""
+
+    ticks: int
+    interval: int
+    add: int
+    steps: tuple[int, ...]
+
+    @property
+    def last_interval(self) -> int:
+        """Cycles before the last tick."""
+        return (256 * self.interval + (self.ticks - 1) * self.add) >> 8
+
+    @property
+    def narrow(self) -> bool:
+        """True if it fits the short form: 8 bits for ticks and steps."""
+        return self.ticks <= 255 and all(-128 <= s <= 127 for s in self.steps)
+
+    def units(self) -> int:
+        """Its length as the queue counts it, in units of 256 cycles."""
+        return (self.ticks * ((self.interval + self.last_interval) // 2)) >> 8
+
+
+@dataclass(frozen=True)
+class Ack:
+    """Answer to everything but HELLO and STATUS?."""
+
+    next: int
+    error: int
+    detail: int
+    state: int
+    free: int
+    queued: int  # [ms]
+
+
+@dataclass(frozen=True)
+class Credit(Ack):
+    """An ACK that comes unasked, when slots have become free; nothing was lost because of it."""
+
+
+@dataclass(frozen=True)
+class Info:
+    """Answer to HELLO: who the board is and what it can do."""
+
+    tag: int
+    version: int
+    firmware: tuple[int, int]
+    nonce: int
+    board: int
+    axes: int
+    servos: int
+    switches: int
+    rows: int
+    queue: int
+    frame: int
+    min_interval: int
+    clock: int
+    config: int
+    known: int
+    flags: int
+    boots: int
+    cause: int
+
+
+@dataclass(frozen=True)
+class Status:
+    """Answer to STATUS?: where the board stands."""
+
+    tag: int
+    next: int
+    error: int
+    detail: int
+    state: int
+    flags: int
+    free: int
+    queued: int  # [ms]
+    known: int
+    switches: int
+    overruns: int
+    bad: int
+    page: int
+    counts: tuple[int, ...]
+
+
+Reply = Ack | Info | Status
+
+_ACK = struct.Struct("<6BH")
+_INFO = struct.Struct("<5BIBBHBBBBHIIHBHB")
+_STATUS = struct.Struct("<8BHH4B")
+
+
+# Frames to the board
+
+
+def hello(tag: int, nonce: int, version: int = VERSION) -> bytes:
+    """Opens a session."""
+    return struct.pack("<BBBI", Type.HELLO, tag, version, nonce)
+
+
+def status_query(tag: int, page: int = 0) -> bytes:
+    """Asks where the board stands."""
+    return struct.pack("<BBB", Type.STATUS_QUERY, tag, page)
+
+
+def hold(tag: int) -> bytes:
+    """Stops the arm along its path."""
+    return struct.pack("<BB", Type.HOLD, tag)
+
+
+def config(tag: int, offset: int, data: bytes) -> bytes:
+    """Writes a piece of the configuration image."""
+    return struct.pack("<BBH", Type.CONFIG, tag, offset) + data
+
+
+def commit(tag: int, length: int, crc: int) -> bytes:
+    """Brings the image into force."""
+    return struct.pack("<BBHI", Type.COMMIT, tag, length, crc)
+
+
+def enable(tag: int, what: int) -> bytes:
+    """Drivers on (bit 0), servo pulses on (bit 1)."""
+    return struct.pack("<BBB", Type.ENABLE, tag, what)
+
+
+def set_position(tag: int, counts: dict[int, int]) -> bytes:
+    """Says what the counts are: {axis: count}."""
+    axes = sorted(counts)
+    return struct.pack(f"<BBH{len(axes)}i", Type.SET_POSITION, tag, _mask(axes), *(counts[i] for i in axes))
+
+
+def motion(
+    tag: int,
+    axes: Sequence[int],
+    start: Sequence[int],
+    end: Sequence[int],
+    segments: Sequence[Segment],
+    *,
+    at_rest: bool,
+    wide: bool = False,
+) -> bytes:
+    """A batch of motion for `axes` (ascending), from absolute counts to absolute counts.
+
+    The short form if all segments fit it, unless `wide`.
+    """
+    k = len(axes)
+    wide = wide or not all(segment.narrow for segment in segments)
+    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0)
+    head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, _mask(axes), flags, len(segments), *start, *end)
+    form = struct.Struct(f"<HHh{k}h" if wide else f"<BHh{k}b")
+    return head + b"".join(form.pack(s.ticks, s.interval, s.add, *s.steps) for s in segments)
+
+
+def motion_size(axes: int, segments: Sequence[Segment]) -> int:
+    """Length of a batch's payload in bytes."""
+    narrow = all(segment.narrow for segment in segments)
+    return 6 + 8 * axes + len(segments) * (5 + axes if narrow else 6 + 2 * axes)
+
+
+def home(
+    tag: int,
+    *,
+    switch: int,
+    closed: bool,
+    slow: int,
+    backoff: int,
+    travel: int,
+    time: int,
+    rate: Sequence[int],
+) -> bytes:
+    """Moves until a switch says so; `time` in 0.1 s, the rest in counts."""
+    form = f"<BBBBBHIH{len(rate)}h"
+    return struct.pack(form, Type.HOME, tag, switch, int(closed), slow, backoff, travel, time, *rate)
+
+
+def jog(tag: int, rate: Sequence[int]) -> bytes:
+    """Moves with `rate` [counts/s] per axis for the next 250 ms."""
+    return struct.pack(f"<BB{len(rate)}h", Type.JOG, tag, *rate)
+
+
+def _mask(axes: Sequence[int]) -> int:
+    return sum(1 << axis for axis in axes)
+
+
+# Frames from the board
+
+
+def parse(payload: bytes) -> Reply | None:
+    """A reply; None for anything that no board of this version sends."""
+    kind, size = payload[0], len(payload)
+    if kind == Type.ACK and size == _ACK.size:
+        return Ack(*_ACK.unpack(payload)[1:])
+    if kind == Type.CREDIT and size == _ACK.size:
+        return Credit(*_ACK.unpack(payload)[1:])
+    if kind == Type.INFO and size == _INFO.size:
+        _, tag, version, major, minor, *rest = _INFO.unpack(payload)
+        return Info(tag, version, (major, minor), *rest)
+    if kind == Type.STATUS and size >= _STATUS.size and (size - _STATUS.size) % 4 == 0:
+        n = (size - _STATUS.size) // 4
+        counts = struct.unpack_from(f"<{n}i", payload, _STATUS.size)
+        return Status(*(*_STATUS.unpack_from(payload)[1:], counts))
+    return None
+
+
+def info_version(payload: bytes) -> int | None:
+    """The protocol version in any version's INFO: offsets 0 to 2 stay."""
+    return payload[2] if payload[0] == Type.INFO and len(payload) > 2 else None
+
+
+def pack_ack(ack: Ack) -> bytes:
+    """An ACK's or CREDIT's payload (for the simulated board)."""
+    kind = Type.CREDIT if isinstance(ack, Credit) else Type.ACK
+    return _ACK.pack(kind, ack.next, ack.error, ack.detail, ack.state, ack.free, ack.queued)
+
+
+def pack_info(info: Info) -> bytes:
+    """An INFO's payload (for the simulated board)."""
+    return _INFO.pack(
+        Type.INFO, info.tag, info.version, *info.firmware, info.nonce, info.board, info.axes, info.servos,
+        info.switches, info.rows, info.queue, info.frame, info.min_interval, info.clock, info.config,
+        info.known, info.flags, info.boots, info.cause,
+    )  # fmt: skip
+
+
+def pack_status(status: Status) -> bytes:
+    """A STATUS's payload (for the simulated board)."""
+    head = _STATUS.pack(
+        Type.STATUS, status.tag, status.next, status.error, status.detail, status.state, status.flags,
+        status.free, status.queued, status.known, status.switches, status.overruns, status.bad, status.page,
+    )  # fmt: skip
+    return head + struct.pack(f"<{len(status.counts)}i", *status.counts)

@@ -1,0 +1,342 @@
+"""A session with a board: go-back-N with credit, over any port (firmware/PROTOCOL.md, section 3).
+
+What is submitted is sent in order, kept until it is acknowledged, and sent again when it is not. A frame is
+executed once or not at all, however often it is sent.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import Ack, Credit, Error, Info, State, Status
+from armkin.board.ports import Port
+from armkin.errors import LinkError
+
+_RESEND = 0.03  # [s] without progress
+_GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
+_POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
+_POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
+_POLL_CREDIT = 0.01  # [s] while waiting for credit, which only answers bring
+_GIVE_UP = 1.5  # [s] without any answer
+_BOOT = 5.0  # [s] that a board may take to answer after its port was opened
+_COPIES = 3  # of every frame, on a bad line
+_EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
+_LATE = 0.03  # [s] an answer may take
+_PROBES = 8
+_UNDER_WAY = 16  # frames
+_BYTES = (240, 700)  # under way, on a bad line and on a good one
+
+
+class DeviceError(LinkError):
+    """The board has ended the session: `error` is its code, `detail` the axis, row or segment."""
+
+    def __init__(self, error: int, detail: int, state: int) -> None:
+        self.error = Error(error) if error in Error._value2member_map_ else Error.OK
+        self.detail, self.state = detail, state
+        super().__init__(f"the board refused: {self.error.name} ({error}), detail {detail}")
+
+
+class StoppedError(Exception):
+    """The operator asked to stop: the arm stands, `status` says where (None: it was not asked yet)."""
+
+    def __init__(self, status: Status | None = None) -> None:
+        super().__init__("stopped")
+        self.status = status
+
+
+@dataclass
+class _Frame:
+    make: Callable[[int], bytes]
+    segments: int
+    seconds: float  # of motion
+
+
+class Session:
+    """Conversation with the board behind a port; `stop` is asked all the time, and leads to a hold."""
+
+    def __init__(self, port: Port, stop: Callable[[], bool] = lambda: False) -> None:
+        self.port = port
+        self.info: Info | None = None
+        self.state = State.IDLE
+        self.queued = 0  # [ms] as last heard
+        self.resent = 0  # frames
+        self._stop = stop
+        self._splitter = protocol.Splitter()
+        self._waiting: deque[_Frame] = deque()  # not sent yet
+        self._sent: deque[tuple[_Frame, bytes]] = deque()  # not acknowledged yet
+        self._next = 0  # sequence number of the first of them
+        self._free = 0
+        self._queue = 0
+        self._tag = 0
+        self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
+        self._status: Status | None = None
+        self._error: Ack | Status | None = None
+        self._heard = port.now()
+        self._asked = 0.0
+        self._clear = 0.0  # when all that was written will have left, and the window last moved
+        self._gap = False
+        self._bytes = _BYTES[1]  # that may be under way
+        self._written = 0  # frames in sequence
+
+    # Opening
+
+    def open(self) -> Info:
+        """Open a session, waiting for a board that its opened port has reset.
+
+        Raises LinkError if nothing answers, or something else than this protocol.
+        """
+        begin, quiet = self.port.now(), True
+        while True:
+            since = self.port.now() - begin
+            # A few tries; then silence, for a boot loader that listens; then on to the end.
+            if since < 0.3 or since > 1.8:
+                info = self._hello(0.06 if since < 0.3 else 0.15)
+                if info is not None:
+                    return info
+            else:
+                quiet = not self.port.read(0.05) and quiet
+            self._check_stop_idle()
+            if since > _BOOT:
+                heard = "nothing" if quiet and not self._splitter.bad else "but not in this protocol"
+                raise LinkError(
+                    f"no board answers on {self.port.name} ({heard}; {self.port.baud} baud): is armkin's "
+                    "firmware flashed?\n(make -C firmware flash PORT=...); armkin ports lists the other ports"
+                )
+
+    def reopen(self) -> Info:
+        """Open a new session on a board that is there: what stopped the last one is over."""
+        for _ in range(40):
+            info = self._hello(0.05)
+            if info is not None:
+                return info
+        raise self._silent()
+
+    def _hello(self, timeout: float) -> Info | None:
+        nonce, self._tag = secrets.randbits(32), (self._tag + 1) & 255
+        self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)))
+        end = self.port.now() + timeout
+        while self.port.now() < end:
+            for payload in self._splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
+                version = protocol.info_version(payload)
+                if version is not None and version != protocol.VERSION:
+                    raise LinkError(
+                        f"the board's firmware speaks protocol {version}, this armkin {protocol.VERSION}: "
+                        "flash the firmware that came with it (make -C firmware flash PORT=...)"
+                    )
+                info = protocol.parse(payload)
+                if isinstance(info, Info) and info.nonce == nonce:
+                    self._begin(info)
+                    return info
+        return None
+
+    def _begin(self, info: Info) -> None:
+        self.info = info
+        self._waiting.clear()
+        self._sent.clear()
+        self._next, self._free, self._queue = 0, info.queue, info.queue
+        self._error, self._gap = None, False
+        self._heard = self.port.now()
+
+    # Frames in sequence
+
+    def submit(self, make: Callable[[int], bytes], segments: int = 0, seconds: float = 0.0) -> None:
+        """Put a frame in line; make: its payload for a sequence number; segments: credit that it takes."""
+        self._waiting.append(_Frame(make, segments, seconds))
+
+    @property
+    def backlog(self) -> int:
+        """Frames that wait to be sent."""
+        return len(self._waiting)
+
+    @property
+    def under_way(self) -> float:
+        """Seconds of motion that the board has not acknowledged."""
+        return sum(f.seconds for f in self._waiting) + sum(f.seconds for f, _ in self._sent)
+
+    def flush(self) -> None:
+        """Send what is in line, and wait until the board has executed or queued all of it."""
+        while self._waiting or self._sent:
+            self.pump()
+
+    def call(self, make: Callable[[int], bytes]) -> None:
+        """Execute one frame. Raises DeviceError if the board refuses it."""
+        self.submit(make)
+        self.flush()
+
+    def pump(self, timeout: float = 0.005) -> None:
+        """One turn: send what may be sent, hear what has come within `timeout`.
+
+        Raises DeviceError when the session has ended, StoppedError after a stop, and LinkError when
+        nothing answers.
+        """
+        if self._stop():
+            raise StoppedError(self.hold())
+        now = self.port.now()
+        self._fill()
+        if self._sent and now - self._clear > (_EAGER if self.noisy else _GAP if self._gap else _RESEND):
+            self._again()
+        idle_credit = bool(self._waiting) and not self._sent
+        if now - self._asked >= (_POLL_CREDIT if idle_credit else _POLL_NOISY if self.damaged else _POLL):
+            self._ask()
+        self._hear(timeout)
+        if self._error is not None:
+            raise DeviceError(self._error.error, self._error.detail, self._error.state)
+        if self.port.now() - self._heard > _GIVE_UP:
+            raise self._silent()
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the line damages so much that short frames, sent several times, get through sooner."""
+        damaged = self._splitter.bad + self.resent
+        return damaged > max(2.0, 0.03 * self._written)
+
+    @property
+    def damaged(self) -> bool:
+        """Whether anything at all was damaged or lost so far."""
+        return self._splitter.bad + self.resent > 0
+
+    def probe(self) -> None:
+        """Ask a few questions, to learn whether the line is good before anything depends on it."""
+        for _ in range(_PROBES):
+            if self.status().bad:
+                self.resent += 1
+
+    def _write(self, data: bytes) -> None:
+        self.port.write(data)
+        self._clear = max(self._clear, self.port.now()) + len(data) * 10 / self.port.baud
+
+    def _write_frame(self, data: bytes) -> None:
+        self._written += 1
+        self._write(data * (_COPIES if self.noisy else 1))  # a copy too many moves nothing
+
+    def _fill(self) -> None:
+        """Send new frames as far as credit and window allow."""
+        credit = self._free - sum(frame.segments for frame, _ in self._sent)
+        size = sum(len(data) for _, data in self._sent)
+        while self._waiting and len(self._sent) < _UNDER_WAY and size < self._bytes:
+            if self._waiting[0].segments > credit:
+                return
+            frame = self._waiting.popleft()
+            data = protocol.wire(frame.make((self._next + len(self._sent)) & 255))
+            self._sent.append((frame, data))
+            credit, size = credit - frame.segments, size + len(data)
+            self._write_frame(data)
+
+    def _again(self) -> None:
+        """Go back to the first frame that was not acknowledged."""
+        self._gap = False
+        self._bytes = _BYTES[0] if self.noisy else max(_BYTES[0], self._bytes // 2)
+        self._write(b"\0")
+        size = 0
+        for _, data in self._sent:
+            if size >= self._bytes:
+                break  # what follows it would wait for it
+            size += len(data)
+            self.resent += 1
+            self._write_frame(data)
+
+    def _ask(self, page: int = 0) -> int:
+        self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
+        self._asked_at[self._tag] = self._asked
+        self._write(protocol.wire(protocol.status_query(self._tag, page)))
+        return self._tag
+
+    def _hear(self, timeout: float) -> None:
+        for payload in self._splitter.feed(self.port.read(timeout)):
+            reply = protocol.parse(payload)
+            if reply is None:
+                continue
+            self._heard = self.port.now()
+            if isinstance(reply, Info):
+                continue  # of a HELLO that was repeated
+            self.state, self.queued = State(reply.state), reply.queued
+            if isinstance(reply, Status):
+                self._status = reply
+                self._measure(reply.tag)
+            self._acknowledge(reply)
+
+    def _measure(self, tag: int) -> None:
+        """Wait as long as an answer was late: so long the line is behind what was written already."""
+        asked = self._asked_at.pop(tag, None)
+        if asked is not None:
+            self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
+            late = self.port.now() - asked - _LATE
+            if late > 0:
+                self._clear = max(self._clear, self.port.now() + late)
+
+    def _acknowledge(self, reply: Ack | Status) -> None:
+        done = (reply.next - self._next) & 255
+        if done <= len(self._sent):
+            for _ in range(done):
+                self._sent.popleft()
+            self._next = reply.next
+            self._free = reply.free
+            if done:
+                self._clear, self._gap = max(self._clear, self.port.now()), False
+                self._bytes = _BYTES[0] if self.noisy else min(_BYTES[1], self._bytes + 20)
+            elif self._sent and isinstance(reply, Ack) and not isinstance(reply, Credit):
+                self._gap = True  # something behind the first frame has arrived, the first has not
+        if reply.error and self._error is None:
+            self._error = reply
+
+    # Questions, and stopping
+
+    def status(self, page: int = 0) -> Status:
+        """Where the board stands, now; also after the session has ended."""
+        for attempt in range(60):
+            self.resent += attempt > 0
+            tag, end = self._ask(page), self.port.now() + 0.05
+            while self.port.now() < end:
+                self._status = None
+                self._hear(max(0.001, end - self.port.now()))
+                answer: Status | None = self._status
+                if answer is not None and answer.tag == tag and answer.page == page:
+                    return answer
+        raise self._silent()
+
+    def hold(self) -> Status:
+        """Stop the arm along its path; its status at rest."""
+        self._waiting.clear()
+        begin = self.port.now()
+        while True:
+            self._tag = (self._tag + 1) & 255
+            self.port.write(b"\0" + protocol.wire(protocol.hold(self._tag)))
+            status = self.status()
+            if status.state == State.IDLE and status.error:
+                return status
+            if self.port.now() - begin > 60:
+                raise LinkError("the board does not come to rest: cut the motors' power")
+            self._hear(0.03)
+
+    def rest(self) -> Status:
+        """Wait until the arm stands, whatever the session is; its status then."""
+        while True:
+            status = self.status()
+            if status.state == State.IDLE:
+                return status
+            self._hear(0.02)
+
+    def arrivals(self) -> Iterator[float]:
+        """Wait until all that was submitted is done and the arm stands; yields the seconds left."""
+        while True:
+            if not (self._waiting or self._sent) and self.state == State.IDLE:
+                return
+            # Asking again when the queue must have ended, rather than at the next poll.
+            if not (self._waiting or self._sent) and self.queued < 50:
+                self._asked = min(self._asked, self.port.now() - _POLL + 0.01)
+            self.pump()
+            yield self.under_way + self.queued / 1000
+
+    def _check_stop_idle(self) -> None:
+        if self._stop():
+            raise StoppedError
+
+    def _silent(self) -> LinkError:
+        return LinkError(
+            f"the board on {self.port.name} does not answer any more: is the cable plugged in?\n"
+            "a moving arm has stopped on its path by itself; armkin status tells where it stands"
+        )

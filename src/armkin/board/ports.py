@@ -1,0 +1,293 @@
+"""Ports: a device, a COM port, any pyserial URL, or `sim`. The only module that imports serial.
+
+A port is held exclusively, so that no two programs talk to one arm; who holds it can be found, so that
+`armkin stop` in another terminal stops the arm.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import re
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any, Protocol
+
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.sim.board import SimBoard
+    from armkin.hardware import Board
+
+BAUD = 250_000
+SIM = "sim"
+
+_READ = 0.005  # [s] a read waits at most
+_MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
+
+
+class Port(Protocol):
+    """Bytes to and from a board, and the clock that its answers are timed with."""
+
+    name: str
+    simulated: bool
+    baud: int
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, or comes within `timeout` seconds; empty if nothing does."""
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+
+    def close(self) -> None:
+        """Give the port back. The board keeps its position, its motors stay on."""
+
+
+def open_port(name: str, *, board: Board, baud: int = BAUD) -> Port:
+    """Open a port by name: /dev/ttyACM0, COM3, socket://host:4000, sim.
+
+    board: what `sim` pretends to be. Raises LinkError with what to do.
+    """
+    if name == SIM:
+        from armkin.board.sim.board import SimBoard
+
+        return SimPort(SimBoard(board))
+    return SerialPort(name, baud)
+
+
+class SimPort:
+    """A simulated board in this process, in simulated time."""
+
+    simulated = True
+    baud = BAUD
+
+    def __init__(self, board: SimBoard, name: str = SIM) -> None:
+        self.name, self.board = name, board
+        self._now = 0.0
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self.board.receive(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What the board has said, or says within `timeout` seconds of its time."""
+        end = self._now + timeout
+        while not (data := self.board.take()) and self._now < end:
+            self.board.advance(0.001)
+            self._now += 0.001
+        return data
+
+    def now(self) -> float:
+        """Simulated seconds."""
+        return self._now
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class SerialPort:
+    """A port that pyserial opens."""
+
+    simulated = False
+
+    def __init__(self, name: str, baud: int = BAUD) -> None:
+        self.name, self.baud = name, baud
+        self._lock = _Lock(name)
+        try:
+            self._serial = _open_serial(name, baud)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._guard(lambda: self._serial.write(data))
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, or comes within `timeout` seconds."""
+        end = time.monotonic() + timeout
+        while True:
+            data: bytes = self._guard(self._read_some)
+            if data or time.monotonic() >= end:
+                return data
+
+    def _read_some(self) -> bytes:
+        data: bytes = self._serial.read(1)
+        while 0 < len(data) < _MOST and (waiting := self._serial.in_waiting):
+            more: bytes = self._serial.read(min(waiting, _MOST))
+            if not more:
+                break
+            data += more
+        return data
+
+    def now(self) -> float:
+        """Seconds of the monotonic clock."""
+        return time.monotonic()
+
+    def close(self) -> None:
+        """Give the port back."""
+        with suppress(Exception):
+            self._serial.close()
+        self._lock.release()
+
+    def _guard(self, action: Callable[[], Any]) -> Any:
+        import serial
+
+        try:
+            return action()
+        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed while reading
+            raise LinkError(
+                f"port {self.name} is gone ({_reason(error)}): is the cable plugged in?\n"
+                "a board that takes its power from the cable has lost its position: armkin status tells"
+            ) from None
+
+
+def _open_serial(name: str, baud: int) -> Any:
+    import serial
+
+    settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ, "write_timeout": 2.0}
+    if "://" not in name:
+        settings["exclusive"] = True if os.name == "posix" else None
+    try:
+        port = serial.serial_for_url(name, **settings)
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise LinkError(_cannot_open(name, error)) from None
+    _keep_dtr(port)
+    return port
+
+
+def _keep_dtr(port: Any) -> None:
+    """Do not let closing the port drop DTR: the next opening then does not reset an Uno."""
+    with suppress(Exception):
+        import termios
+
+        mode = termios.tcgetattr(port.fileno())
+        mode[2] &= ~termios.HUPCL
+        termios.tcsetattr(port.fileno(), termios.TCSANOW, mode)
+
+
+def _cannot_open(name: str, error: Exception) -> str:
+    reason = _reason(error)
+    stated = re.search(r"(?:Errno |\()(\d+)", reason)  # pyserial keeps some numbers in its text alone
+    number = getattr(error, "errno", None) or (int(stated[1]) if stated else None)
+    if number == errno.ENOENT or "FileNotFound" in reason:
+        found = ", ".join(port.device for port in list_ports())
+        return f"there is no port {name}; armkin ports lists them ({found or 'none is plugged in'}), or use sim"
+    if number == errno.EACCES or "PermissionError" in reason:
+        return f"port {name}: permission denied; on Linux add yourself to the group dialout, then log in again"
+    if "exclusively lock" in reason or number in (errno.EAGAIN, errno.EBUSY):
+        return f"port {name} is in use by another program (a serial monitor, another armkin?): close it first"
+    if number in (errno.ENOTTY, errno.EISDIR):
+        return f"{name} is no serial port; armkin ports lists them"
+    if number == errno.ECONNREFUSED:
+        return f"port {name}: connection refused, nobody listens there"
+    return f"port {name} cannot be opened: {reason}"
+
+
+def _reason(error: Exception) -> str:
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return str(text).splitlines()[0]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A serial port of this computer."""
+
+    device: str
+    description: str
+    hardware: str
+    board: str  # what it looks like, "" if unknown
+
+
+_LOOKS = {
+    (0x2341, 0x0043): "Arduino Uno",
+    (0x2341, 0x0001): "Arduino Uno",
+    (0x2341, 0x0243): "Arduino Uno",
+    (0x2A03, 0x0043): "Arduino Uno",
+    (0x2341, 0x0010): "Arduino Mega 2560",
+    (0x2341, 0x0042): "Arduino Mega 2560",
+    (0x2341, 0x0242): "Arduino Mega 2560",
+    (0x2A03, 0x0042): "Arduino Mega 2560",
+    (0x1A86, 0x7523): "CH340: a Uno or Mega clone?",
+    (0x1A86, 0x5523): "CH341: a Uno or Mega clone?",
+    (0x0403, 0x6001): "FTDI: an older Arduino?",
+}
+
+
+def list_ports() -> list[Found]:
+    """Serial ports, those that look like an Arduino first."""
+    from serial.tools import list_ports as tools
+
+    found = []
+    for port in tools.comports():
+        looks = _LOOKS.get((port.vid or 0, port.pid or 0), "")
+        if port.vid is None and looks == "" and port.description in ("n/a", None, port.name):
+            continue  # a mainboard's empty ttyS
+        found.append(Found(port.device, port.description or "", port.hwid or "", looks))
+    return sorted(found, key=lambda f: (not f.board, f.device))
+
+
+class _Lock:
+    """A file that says which process holds a port; locked as long as that process lives."""
+
+    def __init__(self, name: str) -> None:
+        self._file: IO[str] | None = None
+        if os.name != "posix" or "://" in name:
+            return
+        file = open(_lock_path(name), "a+", encoding="ascii")  # noqa: SIM115
+        if not _try_lock(file):
+            holder = _read_pid(file)
+            file.close()
+            raise LinkError(
+                f"port {name} is in use by armkin (process {holder}): wait for it, or armkin stop --port {name}"
+            )
+        file.seek(0)
+        file.truncate()
+        file.write(str(os.getpid()))
+        file.flush()
+        self._file = file
+
+    def release(self) -> None:
+        """Let others have the port."""
+        if self._file is not None:
+            self._file.close()  # the lock goes with it
+            self._file = None
+
+
+def holder(name: str) -> int | None:
+    """Process that holds a port for armkin; None if none does."""
+    if os.name != "posix" or "://" in name or name == SIM:
+        return None
+    try:
+        with open(_lock_path(name), "a+", encoding="ascii") as file:
+            return None if _try_lock(file) else _read_pid(file)
+    except OSError:
+        return None
+
+
+def _lock_path(name: str) -> str:
+    key = hashlib.sha256(os.path.realpath(name).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    return os.path.join(tempfile.gettempdir(), f"armkin-{os.getuid()}-{key}.lock")
+
+
+def _try_lock(file: IO[str]) -> bool:
+    import fcntl
+
+    try:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _read_pid(file: IO[str]) -> int | None:
+    file.seek(0)
+    text = file.read(20)
+    return int(text) if text.isdigit() else None

@@ -1,0 +1,1 @@
+"""A board inside the process that speaks the firmware's bytes, in simulated time."""

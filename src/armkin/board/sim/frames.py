@@ -1,0 +1,80 @@
+"""What the simulated board reads: batches and images, every field checked, or an error for the session."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import Error, Image, Segment
+from armkin.hardware import Board
+
+
+class RefusedError(Exception):
+    """A frame that is not executed: ends the session."""
+
+    def __init__(self, error: Error, detail: int = 0) -> None:
+        super().__init__(error.name)
+        self.error, self.detail = error, detail
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A MOTION frame's fields."""
+
+    axes: list[int]
+    start: tuple[int, ...]
+    end: tuple[int, ...]
+    segments: list[Segment]
+    at_rest: bool
+
+
+def batch(payload: bytes) -> Batch:
+    """A MOTION frame's fields; its length must follow from them exactly."""
+    if len(payload) < 6:
+        raise RefusedError(Error.LENGTH)
+    mask, flags, n = struct.unpack_from("<HBB", payload, 2)
+    axes = axes_of(mask)
+    k = len(axes)
+    wide = bool(flags & protocol.MOTION_WIDE)
+    form = struct.Struct(f"<HHh{k}h" if wide else f"<BHh{k}b")
+    known_flags = protocol.MOTION_END | protocol.MOTION_WIDE
+    if n == 0 or flags & ~known_flags or len(payload) != 6 + 8 * k + n * form.size:
+        raise RefusedError(Error.LENGTH)
+    ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
+    segments = []
+    for i in range(n):
+        ticks, interval, add, *steps = form.unpack_from(payload, 6 + 8 * k + i * form.size)
+        segments.append(Segment(ticks, interval, add, tuple(steps)))
+    return Batch(axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END))
+
+
+def axes_of(mask: int) -> list[int]:
+    """Axes of a mask, ascending."""
+    return [i for i in range(16) if mask >> i & 1]
+
+
+def image_valid(image: Image, board: Board) -> bool:
+    """Whether a board may take a configuration: every field in its range."""
+    far = 2**30
+    if len(image.axes) != len(board.axes) or len(image.rows) > board.rows:
+        return False
+    if image.step_high > 80 or image.step_low > 50 or image.dir_setup > 100:
+        return False
+    for i, axis in enumerate(image.axes):
+        servo = board.servo_mask >> i & 1
+        if axis.used and not (
+            -far <= axis.lower <= axis.home <= axis.upper <= far
+            and axis.max_rate > 0
+            and 0 < axis.max_accel < 2**24
+            and (not servo or 400 <= axis.lower <= axis.upper <= 2600)
+        ):
+            return False
+    for row in image.rows:
+        if any(w and not axis.used for w, axis in zip(row.weight, image.axes, strict=True)):
+            return False
+        reach = zip(row.weight, image.axes, strict=True)
+        most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
+        if row.lower > row.upper or most >= far:
+            return False
+    return True

@@ -1,0 +1,99 @@
+"""`armkin fk`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
+from armkin.cli.options import Batch, Joints, JsonLines, Out, Robot
+from armkin.cli.render import fixed
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def fk(
+    robot: Robot,
+    q: Joints = None,
+    frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
+    json: JsonLines = False,
+    batch: Batch = None,
+    out: Out = None,
+) -> None:
+    """Where the tool is for given joint values."""
+    output.spare(robot, out)
+    arm = inputs.load(robot)
+    if batch is not None:
+        inputs.no_numbers(q)
+        tally = run_batch(
+            batch_rows(batch, arm.joint_names, arm.name),
+            out,
+            json,
+            lambda chunk: _answers(arm, chunk, frames),
+            [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
+            lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
+        )
+        render.warn_of_rows(tally)
+        return
+    [answer] = _answers(arm, one_row(inputs.joints(arm, q)), frames)
+    with output.destination(out) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    render.warn_of_limits(arm, answer["violations"])
+
+
+def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[dict[str, Any]]:
+    import armkin
+    from armkin.model import rotation
+
+    q = units.joints_in(arm, chunk.values)
+    F = armkin.frames(arm, q) if with_frames else None
+    T = (armkin.fk(arm, q) if F is None else F[:, -1]) + 0.0  # no -0.0
+    rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
+    quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
+    violations = render.violations(arm, chunk.values, q)
+    joints = chunk.values.tolist()
+    joint_units = units.names(arm)
+    for i, pose in enumerate(T):
+        answer = {
+            **render.head(arm),
+            "joints": joints[i],
+            "joint_units": joint_units,
+            "position_mm": pose[:3, 3].tolist(),
+            "rotation": pose[:3, :3].tolist(),
+            "rpy_deg": rpy[i],
+            "quaternion_wxyz": quaternion[i],
+            "within_limits": not violations[i],
+            "violations": violations[i],
+        }
+        if F is not None:
+            answer["frames"] = [
+                {"name": name, "position_mm": frame[:3, 3].tolist(), "rotation": frame[:3, :3].tolist()}
+                for name, frame in zip(["base", *arm.joint_names, "tool"], F[i] + 0.0, strict=True)
+            ]
+        yield answer
+
+
+def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    xyz, rpy, R = answer["position_mm"], answer["rpy_deg"], answer["rotation"]
+    rows = [
+        ["position", *_labelled("xyz", xyz), "mm"],
+        ["orientation", *_labelled(("roll", "pitch", "yaw"), rpy), "deg"],
+    ]
+    for i, row in enumerate(R):
+        numbers = [word for value in row for word in ("", fixed(value, 6))]
+        rows.append(["" if i else "rotation", *numbers, ""])
+    text = f"{render.pose_line(arm, answer['joints'])}\n\n{render.table(rows, left=(0, 1, 3, 5, 7))}\n"
+    if "frames" in answer:
+        table = [["frame", "x/mm", "y/mm", "z/mm"]]
+        table += [[frame["name"], *map(fixed, frame["position_mm"])] for frame in answer["frames"]]
+        text += f"\n{render.table(table)}\n"
+    return text
+
+
+def _labelled(names: Any, values: list[float]) -> list[str]:
+    return [word for name, value in zip(names, values, strict=True) for word in (name, fixed(value))]

@@ -1,0 +1,41 @@
+"""`armkin home`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from armkin.cli import inputs, linking, output, render
+from armkin.cli.linking import Baud, PortName
+from armkin.cli.options import Json, Robot
+
+
+def home(
+    robot: Robot,
+    port: PortName,
+    joints: Annotated[
+        list[str] | None, typer.Argument(metavar="[JOINT...]", help="These joints only. [default: all]")
+    ] = None,
+    baud: Baud = linking.BAUD,
+    json: Json = False,
+) -> None:
+    """Find the limit switches, and with them the position.
+
+    Each joint approaches its switch, backs off and touches it again slowly, in the order of the robot
+    file's homing. Keep clear of the arm: it moves as far as it must.
+    """
+    from armkin.board.firmware import homing
+
+    arm = inputs.load(robot)
+    configuration = linking.configured(arm)
+    homing.searches(arm, configuration, joints or ())  # refuses before a port is opened
+    with linking.machine(arm, configuration, port, baud) as machine:
+        homing.home(machine, joints or (), lambda name: output.note(f"homing {name}"))
+        found = linking.where(machine)
+    with output.destination(None) as write:
+        write(
+            render.to_json({**render.head(arm), "port": port, **found}) + "\n"
+            if json
+            else linking.where_text(arm, found)
+        )

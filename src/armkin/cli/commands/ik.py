@@ -1,0 +1,228 @@
+"""`armkin ik`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render, solving
+from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
+from armkin.cli.options import (
+    AllBranches,
+    Batch,
+    BranchName,
+    JsonLines,
+    Lock,
+    Near,
+    Out,
+    Robot,
+    Sweep,
+    Target,
+    TaskName,
+)
+from armkin.cli.render import fixed
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+
+def ik(
+    robot: Robot,
+    target: Target = None,
+    all_branches: AllBranches = False,
+    near: Near = None,
+    branch: BranchName = None,
+    turns: Annotated[
+        bool,
+        typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits."),
+    ] = False,
+    task: TaskName = None,
+    lock: Lock = None,
+    sweep: Sweep = None,
+    json: JsonLines = False,
+    batch: Batch = None,
+    out: Out = None,
+) -> None:
+    """All joint values that reach a target.
+
+    Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
+    the nearest pose within limits is shown instead.
+    """
+    from armkin.inverse.tasks.task import task_for
+
+    output.spare(robot, out)
+    arm = inputs.load(robot)
+    what = task_for(arm, task)
+    held = solving.locks(arm, lock)
+    request = solving.Request(
+        arm=arm,
+        task=what.name,
+        near=None if near is None else inputs.joint_list(arm, near, "--near"),
+        branch=branch,
+        held=held,
+        swept=solving.sweeps(arm, sweep, held),
+    )
+    if batch is not None:
+        inputs.no_numbers(target)
+        tally = run_batch(
+            batch_rows(batch, what.labels, f"task {what.name}"),
+            out,
+            json,
+            lambda chunk: _answers(request, what, chunk, all_branches, turns, with_closest=json),
+            [
+                "row",
+                "status",
+                "branch",
+                *arm.joint_names,
+                "within_limits",
+                "residual_mm",
+                "residual_deg",
+                "motion",
+            ],
+            lambda row, answer: _records(arm, row, answer),
+        )
+        if tally.unsolved:
+            raise render.unsolved_rows(tally)
+        return
+    values = one_row(inputs.target(what, target)).values
+    goal = units.targets_in(what.labels, values)
+    [found] = solving.solve(request, goal)
+    answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
+    with output.destination(out) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    if answer["best"] is None:
+        raise render.unsolved(arm, answer, found.refused)
+
+
+def _answers(
+    request: solving.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
+) -> Iterator[dict[str, Any]]:
+    targets = units.targets_in(task.labels, chunk.values)
+    answers = solving.solve(request, targets)
+    for values, goal, found in zip(chunk.values.tolist(), targets, answers, strict=True):
+        yield _answer(request, task, values, goal, found, all_branches, turns, with_closest=with_closest)
+
+
+def _answer(
+    request: solving.Request,
+    task: Task,
+    values: list[float],
+    goal: Array,
+    found: solving.Answer,
+    all_branches: bool,
+    turns: bool,
+    *,
+    with_closest: bool,
+) -> dict[str, Any]:
+    arm = request.arm
+    listed, best = found.branches, found.best
+    if not all_branches:
+        listed, best = ([], None) if best is None else ([listed[best]], 0)
+    return {
+        **render.head(arm),
+        "task": task.name,
+        "target": values,
+        "target_labels": task.labels,
+        "near": request.near_out,
+        "status": found.status,
+        "method": found.method,
+        "why": found.why,
+        "complete": found.complete,
+        "joint_units": units.names(arm),
+        "branch_count": len(found.branches),
+        "branches_within_limits": sum(branch.within_limits for branch in found.branches),
+        "branches": [_branch(request, branch, turns) for branch in listed],
+        "best": best,
+        "closest": _closest(request, goal, found) if best is None and with_closest else None,
+        "free_joints": found.free,
+    }
+
+
+def _closest(request: solving.Request, goal: Array, found: solving.Answer) -> dict[str, Any]:
+    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for."""
+    import armkin
+
+    arm = request.arm
+    if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
+        legal = found.branches[0]
+        return {
+            "joints": legal.joints,
+            "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
+            "distance_mm": legal.residual_mm,
+            "angle_deg": legal.residual_deg,
+            "converged": True,
+            "branch": legal.name,
+        }
+    nearest = solving.closest(request, goal)
+    return {
+        "joints": units.joints_out(arm, nearest.q).tolist(),
+        "position_mm": nearest.position.tolist(),
+        "distance_mm": nearest.distance,
+        "angle_deg": float(units.angles_out(nearest.angle)),
+        "converged": nearest.converged,
+        "branch": None,
+    }
+
+
+def _branch(request: solving.Request, branch: solving.Branch, turns: bool) -> dict[str, Any]:
+    arm = request.arm
+    row = {
+        "joints": branch.joints,
+        "name": branch.name,
+        "within_limits": branch.within_limits,
+        "violations": [render.violation(arm, i, branch.joints[i]) for i in branch.outside],
+        "residual_mm": branch.residual_mm,
+        "residual_deg": branch.residual_deg,
+        "motion": branch.motion,
+    }
+    if turns:
+        row["turns"] = solving.turns(request, branch)
+    return row
+
+
+def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
+    """CSV: one line a branch, or one line without joints."""
+    for branch in answer["branches"]:
+        rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
+        yield [row, answer["status"], branch["name"], *branch["joints"], *rest]
+    if not answer["branches"]:
+        yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]
+
+
+def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    headings = render.joint_headings(arm)
+    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
+    rows = [["", "branch", *headings, "motion", ""]]
+    for i, branch in enumerate(answer["branches"]):
+        bad = ", ".join(violation["joint"] for violation in branch["violations"])
+        mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
+        note = f"outside limits: {bad}" if bad else ""
+        rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
+        for copy in branch.get("turns", ())[1:]:
+            rows.append(["", "  or", *map(fixed, copy), "", ""])
+    nearest = answer["closest"]
+    if nearest and not answer["branches_within_limits"]:
+        miss = f"{fixed(nearest['distance_mm'])} mm away"
+        if nearest["angle_deg"] > 1e-6:
+            miss += f", turned by {fixed(nearest['angle_deg'])} deg"
+        rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
+    last = len(headings) + 3
+    table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
+    return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
+
+
+def _summary(answer: dict[str, Any]) -> str:
+    """What the table does not show: how many branches there are, and by which method."""
+    count, legal = answer["branch_count"], answer["branches_within_limits"]
+    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
+    if answer["free_joints"]:
+        text += f"; free: {', '.join(answer['free_joints'])}"
+    if count > len(answer["branches"]):
+        text += " (--all-branches lists all)"
+    sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
+    return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")

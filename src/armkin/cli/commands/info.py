@@ -1,0 +1,117 @@
+"""`armkin info`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import inputs, output, render
+from armkin.cli.options import Json, Out, Robot, TaskName
+from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.robot_file import Joint, Motor, RobotFile
+
+
+def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = None) -> None:
+    """What a robot file says, checked.
+
+    DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the
+    task of `armkin ik` with its target's numbers, and how it is solved.
+    """
+    arm = inputs.load(robot)
+    answer = _answer(arm, task)
+    with output.destination(out) as write:
+        if json:
+            write(f"{render.to_json(answer)}\n")
+        else:
+            from armkin.cli.info_text import text
+
+            write(text(answer))
+
+
+def _answer(arm: Arm, task: str | None) -> dict[str, Any]:
+    file = arm.file
+    assert file is not None  # it was read from one
+    motors = [_motor(motor, file) for motor in file.motor_list()]
+    return {
+        **render.head(arm),
+        "description": file.description,
+        "source": file.source,
+        "convention": file.convention,
+        "joint_units": units.names(arm),
+        "joints": [_joint(joint) for joint in file.joints],
+        "base": file.base.model_dump(),
+        "tool": file.tool.model_dump(),
+        "zero_pose": None if file.zero_pose is None else file.zero_pose.model_dump(),
+        **_task(arm, task),
+        "pitch_offset": file.pitch_offset,
+        "reach_mm": arm.reach,
+        "motors": motors,
+        "one_to_one": all(list(motor["joints"].values()) == [1.0] for motor in motors),
+        "resolution": _resolution(arm),
+        "gripper": None if file.gripper is None else file.gripper.model_dump(exclude_none=True),
+        "board": None if file.board is None else file.board.model_dump(exclude_none=True),
+    }
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    entry = joint.model_dump(exclude={"drive"})
+    return {key: value for key, value in entry.items() if key not in ("dh", "screw") or value is not None}
+
+
+def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
+    """A motor as the file has it, and what its chain multiplies to."""
+    entry = motor.model_dump(exclude_none=True)
+    if motor.kind == "stepper":
+        for key in ("travel", "pulse_us", "zero"):
+            entry.pop(key, None)
+        entry["pulses_per_turn"] = motor.pulses_per_turn()
+    else:
+        for key in ("full_steps", "microsteps", "gear", "pulley", "lead"):
+            entry.pop(key, None)
+    types = {joint.name: joint.type for joint in file.joints}
+    sliding = all(types[name] == "prismatic" for name in motor.joints)
+    per_unit = motor.pulses_per_unit()
+    entry["unit"] = "mm" if sliding and motor.kind == "stepper" else "deg"
+    entry["pulses_per_unit"] = per_unit
+    entry["unit_per_pulse"] = 1.0 / per_unit
+    return entry
+
+
+def _task(arm: Arm, name: str | None) -> dict[str, Any]:
+    """The task and its solver, or why there is none."""
+    import armkin
+    from armkin.inverse.tasks.task import task_for
+
+    try:
+        task = task_for(arm, name)
+    except UsageError as error:
+        if name is not None:
+            raise
+        nothing: dict[str, Any] = {"task": None, "target_labels": [], "target_units": [], "solver": None}
+        return {**nothing, "ik_refuses": str(error)}
+    found: dict[str, Any] = {
+        "task": task.name,
+        "target_labels": task.labels,
+        "target_units": units.label_units(task.labels),
+        "solver": None,
+        "ik_refuses": None,
+    }
+    try:
+        method, why, complete = armkin.method(arm, task.name)
+        found["solver"] = {"method": method, "why": why, "complete": complete}
+    except UsageError as error:
+        found["ik_refuses"] = str(error)
+    return found
+
+
+def _resolution(arm: Arm) -> list[float] | None:
+    """What one pulse is worth at each joint; None for an arm that is not wholly driven."""
+    from armkin.motors import resolution
+
+    try:
+        return [float(value) for value in units.joints_out(arm, resolution(arm))]
+    except UsageError:
+        return None

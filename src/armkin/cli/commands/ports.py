@@ -1,0 +1,23 @@
+"""`armkin ports`."""
+
+from __future__ import annotations
+
+from armkin.cli import output, render
+from armkin.cli.options import Json
+
+
+def ports(json: Json = False) -> None:
+    """Serial ports of this computer, Arduinos first."""
+    from dataclasses import asdict
+
+    from armkin.board.ports import list_ports
+
+    found = list_ports()
+    with output.destination(None) as write:
+        if json:
+            write(render.to_json({"ports": [asdict(port) for port in found]}) + "\n")
+            return
+        rows = [[port.device, port.board, port.description] for port in found]
+        write(render.table(rows, left=(0, 1, 2), indent="") + "\n" if rows else "")
+    if not rows:
+        output.warn("no serial port found: is the board plugged in, with a cable that carries data?")

@@ -1,0 +1,143 @@
+"""`armkin pulses`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
+from armkin.cli.options import Batch, Joints, JsonLines, Out, Robot
+from armkin.cli.render import fixed
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def pulses(
+    robot: Robot,
+    q: Joints = None,
+    start: Annotated[
+        str | None,
+        typer.Option("--from", metavar="Q,...", help="Pose that the moves start from. [default: the home pose]"),
+    ] = None,
+    best: Annotated[
+        bool,
+        typer.Option("--best", help="Of the pulses around the target, those whose tip is nearest to it."),
+    ] = False,
+    json: JsonLines = False,
+    batch: Batch = None,
+    out: Out = None,
+) -> None:
+    """Motor pulses from home to a pose.
+
+    Whole steps counted from home, halves away from zero; for RC servos the pulse width. Also where these
+    pulses put the joints and the tip.
+    """
+    from armkin.motors import motor_names
+
+    output.spare(robot, out)
+    arm = inputs.load(robot)
+    origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
+    if batch is not None:
+        inputs.no_numbers(q)
+        motors = [f"pulses_{name}" for name in motor_names(arm)]
+        actual = [f"actual_{name}" for name in arm.joint_names]
+        tally = run_batch(
+            batch_rows(batch, arm.joint_names, arm.name),
+            out,
+            json,
+            lambda chunk: _answers(arm, chunk, origin, best),
+            [*arm.joint_names, *motors, *actual, "x", "y", "z", "error_mm", "within_limits"],
+            lambda _, a: [_record(a)],
+        )
+        render.warn_of_rows(tally)
+        return
+    [answer] = _answers(arm, one_row(inputs.joints(arm, q)), origin, best)
+    with output.destination(out) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    render.warn_of_limits(arm, answer["violations"])
+    for name in answer["outside_travel"]:
+        output.warn(f"the servo of {name} cannot turn that far: its pulses are outside pulse_us")
+
+
+def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[dict[str, Any]]:
+    import armkin
+    from armkin.motors import motor_names, outside_travel, pulse_units, resolution
+
+    q = units.joints_in(arm, chunk.values)
+    found = armkin.best_pulses(arm, q) if best else None
+    rounded = armkin.rounding(arm, q) if found is None else found.rounded
+    r = rounded if found is None else found.chosen
+    moves = (r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))).tolist()
+    actual = units.joints_out(arm, r.actual_joints).tolist()
+    violations = render.violations(arm, chunk.values, q)
+    too_far = outside_travel(arm, r.pulses)
+    names = motor_names(arm)
+    constant = {
+        **render.head(arm),
+        "motors": names,
+        "pulse_units": pulse_units(arm),
+        "joint_units": units.names(arm),
+        "resolution": units.joints_out(arm, resolution(arm)).tolist(),
+        "from": origin,
+    }
+    for i, joints in enumerate(chunk.values.tolist()):
+        answer = {
+            **constant,
+            "joints": joints,
+            "pulses": r.pulses[i].tolist(),
+            "moves": moves[i],
+            "actual_joints": actual[i],
+            "position_mm": {
+                "theoretical": (r.theoretical[i] + 0.0).tolist(),
+                "actual": (r.actual[i] + 0.0).tolist(),
+                "difference": r.difference[i].tolist(),
+            },
+            "error_mm": float(r.error[i]),
+            "within_limits": not violations[i],
+            "violations": violations[i],
+            "outside_travel": [name for name, far in zip(names, too_far[i], strict=True) if far],
+        }
+        if found is not None:
+            answer["rounded"] = {"pulses": rounded.pulses[i].tolist(), "error_mm": float(rounded.error[i])}
+            answer["gain_mm"] = float(found.gain[i])
+            answer["tried"] = found.tried
+        yield answer
+
+
+def _record(answer: dict[str, Any]) -> list[Any]:
+    motion = [*answer["joints"], *answer["pulses"], *answer["actual_joints"]]
+    return [*motion, *answer["position_mm"]["actual"], answer["error_mm"], answer["within_limits"]]
+
+
+def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    motors = [["motor", "pulses", "move", ""]]
+    columns = (answer["motors"], answer["pulses"], answer["moves"], answer["pulse_units"])
+    for name, count, move, unit in zip(*columns, strict=True):
+        motors.append([name, str(count), f"{move:+d}", "steps" if unit == "step" else unit])
+    joints = [["joint", "target", "actual", "difference", "one pulse", ""]]
+    for name, target, actual, step, unit in zip(
+        arm.joint_names,
+        answer["joints"],
+        answer["actual_joints"],
+        answer["resolution"],
+        answer["joint_units"],
+        strict=True,
+    ):
+        joints.append([name, *(fixed(v, 6) for v in (target, actual, abs(actual - target), step)), unit])
+    tip = [["tip", "exact", "actual", "difference", ""]]
+    where = answer["position_mm"]
+    for i, axis in enumerate("xyz"):
+        tip.append([axis, *(fixed(where[key][i], 6) for key in ("theoretical", "actual", "difference")), "mm"])
+    error = f"{fixed(answer['error_mm'], 6)} mm"
+    last = f"the tip is {error} off"
+    if "rounded" in answer:
+        gain, before = fixed(answer["gain_mm"], 6), fixed(answer["rounded"]["error_mm"], 6)
+        last += f", {gain} mm nearer than with each motor rounded by itself ({before} mm)\n"
+        last += f"best of {answer['tried']} pulse vectors around the target"
+    tables = (render.table(motors, (0, 3)), render.table(joints, (0, 5)), render.table(tip, (0, 4)))
+    return "\n\n".join([render.pose_line(arm, answer["joints"]), *tables, last]) + "\n"

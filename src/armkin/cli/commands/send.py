@@ -1,0 +1,253 @@
+"""`armkin send`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, linking, output, render
+from armkin.cli.batch import csv_line
+from armkin.cli.goals import Goals, Stream
+from armkin.cli.goals import goals as read_goals
+from armkin.cli.linking import AssumeHome, Baud
+from armkin.cli.numbers import number
+from armkin.cli.options import BranchName, Joints, Json, TaskName
+from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.plan import Plan
+
+
+def send(
+    robot: Annotated[
+        str | None, typer.Argument(metavar="[ROBOT]", help="Robot file; a piped answer names its own.")
+    ] = None,
+    q: Joints = None,
+    port: Annotated[
+        str | None,
+        typer.Option("--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option("--target", metavar="X,Y,Z", help="Solve for a target, and take the branch nearest to the arm."),
+    ] = None,
+    branch: BranchName = None,
+    task: TaskName = None,
+    batch: Annotated[
+        str | None,
+        typer.Option(
+            "--batch",
+            metavar="FILE|-",
+            help="Joint values of many waypoints, one row each; the arm stops in each.",
+        ),
+    ] = None,
+    speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
+    assume_home: AssumeHome = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan from --from, move nothing.")] = False,
+    start: Annotated[
+        str | None,
+        typer.Option("--from", metavar="Q,...", help="Where a dry run starts. [default: the home pose]"),
+    ] = None,
+    trace: Annotated[
+        str | None,
+        typer.Option("--trace", metavar="FILE", help="CSV of the plan: time, joints, every joint's position."),
+    ] = None,
+    baud: Baud = linking.BAUD,
+    json: Json = False,
+) -> None:
+    """Move the arm.
+
+    All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
+    its path; its position stays known.
+    """
+    fraction = number(speed, "--speed") / 100
+    if not 0 < fraction <= 1:
+        raise UsageError(f"--speed: '{speed}' must be above 0 and at most 100 percent")
+    if start is not None and not dry_run:
+        raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
+    if port is None and not dry_run:
+        raise UsageError("--port is missing: armkin ports lists them; sim is a board in this process")
+    if trace is not None and batch == "-" and not dry_run:
+        raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
+    arm, goals = read_goals(robot, q, target, branch, task, batch)
+    configuration = linking.configured(arm)
+    planner = _Planner(arm, configuration, fraction)
+    if dry_run:
+        home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
+        plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
+        _write_trace(arm, plans, trace)
+        with output.destination(None) as write:
+            found = planner.summary(plans)
+            write(render.to_json({**render.head(arm), "dry_run": True, **found}) + "\n" if json else _text(arm, found))
+        return
+    assert port is not None
+    with linking.machine(arm, configuration, port, baud) as machine:
+        if machine.prepare(assume_home=assume_home) and assume_home:
+            output.note("the board takes the arm to stand in its home pose")
+        began = machine.counts()
+        planner.use(machine.info.clock, machine.info.min_interval)
+        if isinstance(goals, Stream):
+            source: Iterable[Plan | None] = goals.plans(planner.plan, began)
+            whole = None  # how many rows will come is not known
+        else:
+            source = plans = _all(planner, goals, began)  # every refusal before anything moves
+            _write_trace(arm, plans, trace)
+            whole = round(1000 * sum(plan.duration for plan in plans))
+        with output.progress("ms of motion", whole) as tick:
+            machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
+        planned = planner.summary(planner.done, began)
+        found = {**planned, "port": port, **linking.where(machine)}
+    with output.destination(None) as write:
+        write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
+    if isinstance(goals, Stream) and goals.problem is not None:
+        raise goals.problem
+
+
+class _Planner:
+    """Plans for one arm at one speed, and what they come to."""
+
+    def __init__(self, arm: Arm, configuration: Configuration, speed: float) -> None:
+        self.arm, self.speed = arm, speed
+        self.done: list[Plan] = []
+        self.use(configuration.board.clock, configuration.board.min_interval)
+
+    def use(self, clock: int, min_interval: int) -> None:
+        """Take the figures of the board that is there."""
+        self.clock, self.min_interval = clock, min_interval
+
+    def counts(self, q: Array) -> list[int]:
+        """Counts at joint values."""
+        import armkin
+
+        return list(armkin.pulses(self.arm, q).tolist())
+
+    def plan(self, start: Sequence[int], q: Array) -> Plan:
+        """A plan through joint values (w, n) [rad | mm]."""
+        from armkin.motion.plan import plan
+
+        return plan(self.arm, start, q, speed=self.speed, clock=self.clock, min_interval=self.min_interval)
+
+    def noted(self, plans: Iterable[Plan | None]) -> Iterator[Plan | None]:
+        """The same plans, remembered for the summary."""
+        for plan in plans:
+            if plan is not None:
+                self.done.append(plan)
+            yield plan
+
+    def summary(self, plans: Sequence[Plan], start: Sequence[int] | None = None) -> dict[str, Any]:
+        """JSON: what the plans come to."""
+        import numpy as np
+
+        import armkin
+        from armkin.motors import motor_names, pulse_units
+
+        arm = self.arm
+        first = list(start) if start is not None else plans[0].start.tolist()
+        last = plans[-1].end.tolist() if plans else first
+        top = np.max([plan.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
+        rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
+        end = armkin.joints(arm, last)
+        return {
+            "waypoints": sum(len(plan.moves) for plan in plans),
+            "start_joints": units.joints_out(arm, armkin.joints(arm, first)).tolist(),
+            "joints": units.joints_out(arm, end).tolist(),
+            "joint_units": units.names(arm),
+            "motors": motor_names(arm),
+            "pulse_units": pulse_units(arm),
+            "start_pulses": first,
+            "pulses": last,
+            "moves": [b - a for a, b in zip(first, last, strict=True)],
+            "position_mm": (armkin.fk(arm, end)[:3, 3] + 0.0).tolist(),
+            "duration_s": sum(plan.duration for plan in plans),
+            "segments": sum(plan.segments for plan in plans),
+            "top_speed": units.joints_out(arm, top).tolist(),
+            "top_rate": rate.tolist(),
+        }
+
+
+def _all(planner: _Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Plan]:
+    """All plans at once, from counts; a stream is read to its end."""
+    import armkin
+
+    if isinstance(goals, Stream):
+        import time
+
+        plans = []
+        for plan in goals.plans(planner.plan, start):
+            if plan is None:
+                time.sleep(0.01)
+            else:
+                plans.append(plan)
+        if goals.problem is not None:
+            raise goals.problem
+        return plans
+    near = armkin.joints(planner.arm, list(start))
+    return [planner.plan(start, goals.resolve(planner.arm, near))]
+
+
+def _write_trace(arm: Arm, plans: Sequence[Plan], path: str | None) -> None:
+    if path is None:
+        return
+    names = [*arm.joint_names, "tool"]
+    heading = ["time_s", *arm.joint_names, *(f"{name}_{axis}_mm" for name in names for axis in "xyz")]
+    began = 0.0
+    with output.destination(path) as write:
+        write(csv_line(heading) + "\n")
+        for i, plan in enumerate(plans):
+            trace = plan.trace()
+            first = 1 if i else 0  # a plan starts where the one before it ends
+            rows = zip(
+                (trace.time + began).tolist()[first:],
+                units.joints_out(arm, trace.joints).tolist()[first:],
+                (trace.position[:, 1:] + 0.0).reshape(len(trace.time), -1).tolist()[first:],
+                strict=True,
+            )
+            write("".join(csv_line([time, *joints, *where]) + "\n" for time, joints, where in rows))
+            began += plan.duration
+
+
+def _arrived(arm: Arm, planned: dict[str, Any], found: dict[str, Any]) -> str:
+    """Where the arm stands, and whether that is where the plan ends."""
+    text = linking.where_text(arm, found)
+    if found["pulses"] is None:
+        return text
+    off = [
+        f"{name} {there - here:+d} {unit}"
+        for name, unit, here, there in zip(
+            found["motors"], found["pulse_units"], planned["pulses"], found["pulses"], strict=True
+        )
+        if there != here
+    ]
+    differs = f"not as planned: {', '.join(off)}" if off else "as planned"
+    return f"{text}read back: {differs}, {found['duration_s']:.3f} s\n"
+
+
+def _text(arm: Arm, found: dict[str, Any]) -> str:
+    """A dry run for people."""
+    headings = render.joint_headings(arm)
+    speeds = [f"{name}/s" for name in headings]
+    motors = [f"{name}/{unit}" for name, unit in zip(found["motors"], found["pulse_units"], strict=True)]
+    joints = [
+        ["", *headings],
+        ["from", *map(render.fixed, found["start_joints"])],
+        ["to", *map(render.fixed, found["joints"])],
+    ]
+    pulses = [
+        ["", *motors],
+        ["from", *map(str, found["start_pulses"])],
+        ["to", *map(str, found["pulses"])],
+        ["moves", *(f"{move:+d}" for move in found["moves"])],
+        ["top rate /s", *(f"{rate:.0f}" for rate in found["top_rate"])],
+    ]
+    top = [["", *speeds], ["top speed", *(render.fixed(value, 2) for value in found["top_speed"])]]
+    head = (
+        f"{arm.name}: {found['waypoints']} waypoint{'s' * (found['waypoints'] != 1)}, "
+        f"{found['duration_s']:.3f} s, {found['segments']} segments (dry run: nothing moves)"
+    )
+    return "\n\n".join([head, *(render.table(part) for part in (joints, pulses, top))]) + "\n"

@@ -1,0 +1,55 @@
+"""`armkin stop`."""
+
+from __future__ import annotations
+
+from armkin.cli import linking, output
+from armkin.cli.linking import Baud, PortName
+from armkin.errors import LinkError, UsageError
+
+_PATIENCE = 15.0  # [s] for an arm to come to rest
+
+
+def stop(port: PortName, baud: Baud = linking.BAUD) -> None:
+    """Stop the arm along its path.
+
+    Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
+    for that, cut the motors' power.
+    """
+    from armkin.board.ports import SIM, SerialPort, holder
+
+    if port == SIM:
+        raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
+    process = holder(port)
+    if process is not None:
+        _end(process, port)
+        output.note(f"process {process} has stopped the arm and given the port back")
+        return
+    from armkin.board.firmware.session import Session
+
+    with linking.stoppable() as asked:
+        link = SerialPort(port, baud)
+        try:
+            session = Session(link, asked)
+            session.open()  # a former session's motion is held by that alone
+            session.hold()
+        finally:
+            link.close()
+    output.note("the arm stands")
+
+
+def _end(process: int, port: str) -> None:
+    import os
+    import signal
+    import time
+
+    from armkin.board.ports import holder
+
+    try:
+        os.kill(process, signal.SIGTERM)
+    except OSError as error:
+        raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
+    end = time.monotonic() + _PATIENCE
+    while holder(port) == process:
+        if time.monotonic() > end:
+            raise LinkError(f"process {process} does not let go of {port}: cut the motors' power if the arm moves")
+        time.sleep(0.05)

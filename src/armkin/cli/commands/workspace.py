@@ -1,0 +1,131 @@
+"""`armkin workspace`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.numbers import whole
+from armkin.cli.options import Json, Robot
+from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.reach import Workspace
+
+_MOST = 10**15
+
+
+def workspace(
+    robot: Robot,
+    samples: Annotated[
+        str | None,
+        typer.Option("--samples", metavar="N", help="Random poses within the limits. [default: 100000]"),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            "--grid",
+            metavar="N[,N...]",
+            help="Evenly spaced poses instead: so many on every joint, or on each.",
+        ),
+    ] = None,
+    seed: Annotated[str, typer.Option("--seed", metavar="N", help="Of the random poses.")] = "0",
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="For each sample: manipulability, step_error. Repeatable."),
+    ] = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", metavar="FILE", help="All samples as .csv, .npz or .ply; whole or not at all."),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="A picture of the cloud as .png or .svg."),
+    ] = None,
+    color: Annotated[
+        str | None,
+        typer.Option(
+            "--color",
+            metavar="NAME",
+            help="What colours the picture: manipulability (default), step_error, reach, z.",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Where the tip can reach: bounds, volume, a cloud of points.
+
+    Memory does not grow with the number of samples. step_error: how far the tip is off with every motor
+    half a pulse off, in the worst combination.
+    """
+    import armkin
+    from armkin.reach import cloud
+
+    arm = inputs.load(robot)
+    measures = list(dict.fromkeys(measure or ()))
+    if out is not None:
+        cloud.check(out)
+    if plot is None and color is not None:
+        raise UsageError("--color is for the picture; add --plot FILE")
+    shade = color or "manipulability"
+    if plot is not None:  # say what is missing before the work, not after it
+        from armkin.plot import canvas
+
+        canvas.check(plot)
+        canvas.require()
+        measures += [shade] if shade in ("manipulability", "step_error") and shade not in measures else []
+    count = None if samples is None else whole(samples, "--samples", 1, _MOST)
+    points = None if grid is None else [whole(word, "--grid", 1, _MOST) for word in grid.split(",")]
+    each = points * arm.n if points and len(points) == 1 else points
+    total = math.prod(each) if each else count or 100_000
+    with output.progress("samples", total) as tick:
+        found = armkin.workspace(
+            arm,
+            count,
+            grid_points=points,
+            seed=whole(seed, "--seed", 0, 2**53),
+            measures=measures,
+            out=out,
+            keep=150_000 if plot is not None else 0,
+            progress=tick,
+        )
+    if plot is not None:
+        from armkin.plot import plot_workspace
+
+        plot_workspace(found, plot, colour=shade)
+    answer = _answer(found)
+    with output.destination(None) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(answer))
+
+
+def _answer(found: Workspace) -> dict[str, Any]:
+    answer: dict[str, Any] = {**render.head(found.arm), "samples": found.samples}
+    for axis, low, high in zip("xyz", (found.low + 0.0).tolist(), (found.high + 0.0).tolist(), strict=True):
+        answer[f"{axis}_mm"] = [low, high]
+    answer["reach_mm"] = list(found.reach)
+    if found.extent is not None:
+        size = found.extent
+        key = "volume_mm3" if size.dimensions == 3 else "area_mm2"
+        answer |= {key: size.value, f"{key.replace('_', '_error_')}": size.error, "method": size.method}
+    answer["measures"] = {name: list(ends) for name, ends in found.measures.items()}
+    answer["seconds"] = found.seconds
+    return answer
+
+
+def _text(answer: dict[str, Any]) -> str:
+    rows = [["", "least", "greatest", ""]]
+    for name in ("x", "y", "z", "reach"):
+        low, high = answer[f"{name}_mm"]
+        note = "mm from the base" if name == "reach" else "mm"
+        rows.append([name, render.fixed(low, 2), render.fixed(high, 2), note])
+    for name, (low, high) in answer["measures"].items():
+        rows.append([name.replace("_", " "), f"{low:.4g}", f"{high:.4g}", "mm" if name == "step_error" else ""])
+    count = answer["samples"]
+    text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left=(0, 3))}\n\n"
+    what, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
+    value, error = answer[f"{what}_{unit}"], answer[f"{what}_error_{unit}"]
+    off = f" +- {100 * error / value:.2g} %" if value else ""
+    how = answer["method"] if answer["method"].startswith("exact") else f"by {answer['method']}"
+    return f"{text}{what} {value:.6g} {unit}{off}\n{render.wrapped(how)}\n"

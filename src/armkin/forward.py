@@ -1,0 +1,234 @@
+"""Forward kinematics and the Jacobian of any arm.
+
+Every arm, whatever its convention, is one chain
+
+    T(q) = link[0] Z1(q1) link[1] Z2(q2) ... Zn(qn) link[n],   Z = Rz (revolute) or Tz (prismatic)
+
+(Craig, Introduction to Robotics, eq. 3.6 with the constant factors of neighbouring rows
+merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Entry
+from armkin.formula.pose import Pose
+from armkin.formula.trace import OncePaid
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def fk(arm: Arm, q: ArrayLike) -> Array:
+    """Pose of the tool for joint values.
+
+    q: (..., n) [rad | mm]. Returns (..., 4, 4) [mm].
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> armkin.fk(arm, np.deg2rad([0, 90, -90]))[:3, 3].round(9).tolist()
+    [258.0, 10.0, 367.0]
+    """
+
+    values = as_joints(arm, q)
+    if values.size == arm.n:
+        return _single(arm, values.reshape(arm.n)).reshape(*values.shape[:-1], 4, 4)
+    return _batched(arm, values, (4, 4), _tip)
+
+
+def position(arm: Arm, q: ArrayLike) -> Array:
+    """Position of the tool alone, at about half the cost of `fk`.
+
+    q: (..., n) [rad | mm]. Returns (..., 3) [mm].
+
+    >>> import armkin, numpy as np
+    >>> position(armkin.load("robots/planar_2dof.yaml"), np.deg2rad([20, 50])).round(6).tolist()
+    [290.544567, 350.311815, 0.0]
+    """
+    return _batched(arm, as_joints(arm, q), (3,), _point)
+
+
+def frames(arm: Arm, q: ArrayLike) -> Array:
+    """Pose of the base, of every joint's frame and of the tool.
+
+    q: (..., n) [rad | mm]. Returns (..., n + 2, 4, 4) [mm]. Joint frames are those of the
+    robot file's convention: DH frame i, or with screws the moving body's frame that stands
+    on the joint's axis with the base's axes when all joints are zero.
+    """
+
+    return _batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames)
+
+
+def jacobian(arm: Arm, q: ArrayLike) -> Array:
+    """Geometric Jacobian of the tool in the base's axes, linear rows first.
+
+    q: (..., n) [rad | mm]. Returns (..., 6, n) [mm/rad, 1; prismatic: 1, 0]
+    (Siciliano et al., Robotics, eq. 3.30).
+    """
+
+    return _batched(arm, as_joints(arm, q), (6, arm.n), _jacobian)
+
+
+def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+    """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
+
+    q: (..., n) [rad | mm]; rows: which rows of the Jacobian count, by default the linear
+    ones for arms of up to three joints and all six otherwise. Returns (...). Lengths are in
+    mm, so the value carries a power of mm (Yoshikawa, Manipulability of Robotic Mechanisms,
+    1985, eq. 13).
+    """
+    values = _singular_values(arm, q, rows)
+    product: Array = np.prod(values, axis=-1)
+    return product
+
+
+def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+    """Condition number of the Jacobian, its linear rows divided by the arm's reach.
+
+    q: (..., n) [rad | mm]; rows as in `manipulability`. Returns (...), inf at a singularity.
+    """
+    values = _singular_values(arm, q, rows, scale=arm.reach)
+    with np.errstate(divide="ignore"):
+        ratio: Array = values[..., 0] / values[..., -1]
+    return ratio
+
+
+def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, scale: float = 1.0) -> Array:
+    if rows is None:
+        rows = slice(0, 3) if arm.n <= 3 else slice(0, 6)
+    J = jacobian(arm, q)
+    J[..., :3, :] /= scale
+    J = J[..., rows, :]
+    known = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # not so for the nan rows of `Solutions.q`
+    values = np.linalg.svd(np.where(known, J, 0.0), compute_uv=False)
+    return np.where(known[..., 0], values, np.nan)
+
+
+def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
+    """The pose after a joint's motion."""
+    return pose.slide(P, value) if arm.prismatic[joint] else pose.rotate(P, *arrays.cos_sin(value))
+
+
+def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
+    """``q`` as the finite joint values (n,) of one pose; what: its name, for the message."""
+    values = as_joints(arm, q)
+    if values.ndim != 1 or not np.isfinite(values).all():
+        raise UsageError(
+            f"{what}: expected the {arm.n} finite joint values of one pose, got shape {values.shape} or nan"
+        )
+    return values
+
+
+def as_joints(arm: Arm, q: ArrayLike) -> Array:
+    """``q`` as a float array with the arm's number of joints on its last axis."""
+    values = arrays.real(q, "joint values")
+    if values.ndim == 0 or values.shape[-1] != arm.n:
+        got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
+        raise UsageError(
+            f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}): "
+            f"expected {arm.n} values on the last axis, got {got}"
+        )
+    return values
+
+
+def _tip(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The tool's pose, row by row: 16 entries."""
+    P = pose.constant(arm.link[0])
+    for i in range(arm.n):
+        P = pose.times(_move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+    return _rows(P)
+
+
+def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """All frames, row by row: 16 (n + 2) entries."""
+    out = _rows(pose.constant(arm.base))
+    P = pose.constant(arm.link[0])
+    for i in range(arm.n):
+        P = _move(arm, P, i, q[i])
+        out += _rows(pose.times(P, pose.constant(arm.frame[i])))
+        P = pose.times(P, pose.constant(arm.link[i + 1]))
+    return out + _rows(P)
+
+
+def _jacobian(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The Jacobian, row by row: 6 n entries."""
+    P = pose.constant(arm.link[0])
+    axes = []
+    for i in range(arm.n):
+        axes.append((P[6:9], P[9:12]))
+        P = pose.times(_move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+    columns = []
+    for i, (z, origin) in enumerate(axes):
+        lever = arrays.combine(1.0, P[9:12], -1.0, origin)
+        columns.append([*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z])
+    return [column[row] for row in range(6) for column in columns]
+
+
+def _rows(P: Pose) -> list[Entry]:
+    """A pose as the 16 entries of its matrix, row by row."""
+    return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
+
+
+def _point(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The tool's position, from the tool back to the base: a point is cheaper to carry than a pose."""
+    p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
+    for i in reversed(range(arm.n)):
+        if arm.prismatic[i]:
+            p = [p[0], p[1], arrays.add(p[2], q[i])]
+        else:
+            c, s = arrays.cos_sin(q[i])
+            x, y, z = p
+            p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
+        p = pose.apply(pose.constant(arm.link[i]), p)
+    return p
+
+
+def _single(arm: Arm, q: Array) -> Array:
+    """The tool's pose for one set of joint values, by matrix products: shorter than any batch of one."""
+    T = arm.link[0]
+    for i in range(arm.n):
+        Z = np.eye(4)
+        if arm.prismatic[i]:
+            Z[2, 3] = q[i]
+        else:
+            c, s = (math.cos(q[i]), math.sin(q[i])) if math.isfinite(q[i]) else (math.nan, math.nan)
+            Z[0, 0], Z[0, 1], Z[1, 0], Z[1, 1] = c, -s, s, c
+        T = T @ Z @ arm.link[i + 1]
+    return np.asarray(T)
+
+
+Formula = Callable[["Arm", list[Entry]], list[Entry]]
+
+
+@lru_cache(maxsize=128)
+def _recorded(arm: Arm, formula: Formula) -> OncePaid:
+    """A formula of an arm's joint values as straight-line code."""
+    return OncePaid(lambda q: formula(arm, q), arm.n)
+
+
+def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
+    """Run a formula over the batch axes of q in chunks that stay in the cache."""
+    out = np.empty(values.shape[:-1] + shape)
+    flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
+    straight = _recorded(arm, formula).get(len(flat_q))
+    if straight is None:
+        for k, entry in enumerate(formula(arm, list(flat_q.T))):
+            flat_out[:, k] = entry
+        return out
+    workspace = straight.workspace(min(len(flat_q), arrays.CHUNK))
+    for start in range(0, len(flat_q), arrays.CHUNK):
+        columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
+        if columns.shape[1] < arrays.CHUNK <= len(flat_q):
+            workspace = straight.workspace(columns.shape[1])
+        for k, entry in enumerate(straight.run(list(columns), workspace)):
+            flat_out[start : start + arrays.CHUNK, k] = entry
+    return out

@@ -1,0 +1,191 @@
+"""Names of branches: left or right, elbow up or down, wrist flipped or not.
+
+A branch of a closed form is one choice of sign on each branch axis; along a path of
+targets it keeps its sign, and so its name, until it merges with its neighbour. What a sign
+means is found once for each arm, by looking at postures:
+
+- left: the shoulder on whose side the arm's home posture lies (it reaches to the front),
+  right: reaching over its back;
+- elbow up: of two postures that reach out level, the one with the elbow higher above the
+  base (for arms that bend in the base's plane: farther to the left of the way to the target);
+- no flip: the wrist's middle joint on the positive side of straight.
+
+General arms have no such words: their branches are numbered.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula import pose
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk
+from armkin.inverse.closed.subproblems import Pair
+from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.task import targets_of
+
+if TYPE_CHECKING:
+    from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}
+# what people also say, for `find`
+_SYNONYMS = {
+    "left angle": "left", "right angle": "right", "front": "left", "back": "right", "lefty": "left", "righty": "right",
+    "upper elbow": "elbow up", "lower elbow": "elbow down", "elbow upper": "elbow up", "elbow lower": "elbow down",
+    "noflip": "no flip", "unflipped": "no flip", "flipped": "flip",
+}  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[str, ...]:
+    """A name for each branch index; indices as flattened from the branch axes."""
+    sizes = [2 if label else 1 for label in geometry.labels]
+    named = int(np.prod(sizes)) if geometry.labels else 0
+    if not named or named != (geometry.branches or count) or named > count:
+        return tuple(f"branch {i + 1}" for i in range(count))
+    postures, q, valid = _look(arm, task, geometry)
+    shape = (len(q), *sizes)
+    own = _own_branch(arm, postures, q, valid)
+    swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
+    signs = np.stack(
+        np.unravel_index(np.maximum(own, 0), shape[1:]), axis=1
+    )  # (postures, 3), of those that are found again
+    found = own >= 0
+    if "shoulder" in swap and found.any():
+        # the first posture found again is the one most like home
+        swap["shoulder"][...] = signs[np.argmax(found), 0] == 1
+    if "wrist" in swap and found.any():
+        positive = found & (_bent_wrist(arm, postures) > 0)
+        if positive.any():
+            swap["wrist"][...] = signs[np.argmax(positive), 2] == 1
+    if "elbow" in swap:
+        heights, level = _elbow_heights(arm, q)
+        heights = np.where(valid, heights, np.nan).reshape(shape)
+        level = np.where(valid, level, np.inf).reshape(shape)
+        for b0, b2 in itertools.product(range(shape[1]), range(shape[3])):
+            up, down = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
+            tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(up - down), np.inf, 0.0)
+            swap["elbow"][b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
+    names = []
+    for index in itertools.product(*(range(s) for s in sizes)):
+        words = [WORDS[k][i ^ int(swap[k][index])] for k, i in zip(geometry.labels, index, strict=True) if k]
+        names.append(", ".join(words))
+    return (*names, *(f"branch {i + 1}" for i in range(named, count)))
+
+
+def find(names: tuple[str, ...], wanted: str) -> list[int]:
+    """Indices of the branches that a name means; its words may come in any order, and not all of them.
+
+    Raises UsageError, which lists the names, if there are none.
+
+    >>> find(("left, elbow up", "left, elbow down", "right, elbow up"), "upper elbow, left angle")
+    [0]
+    """
+    text = " ".join(wanted.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
+    if text in (name.replace(",", "") for name in names):
+        return [i for i, name in enumerate(names) if name.replace(",", "") == text]
+    for said, meant in _SYNONYMS.items():
+        text = f" {text} ".replace(f" {said} ", f" {meant} ").strip()
+    parts = []
+    for word in ("no flip", "flip", "elbow up", "elbow down", "left", "right"):
+        if f" {word} " in f" {text} ":
+            parts.append(word)
+            text = f" {text} ".replace(f" {word} ", " ").strip()
+    rest = [w for w in text.split() if w in ("up", "down")]
+    parts += [f"elbow {w}" for w in rest]
+    unknown = [w for w in text.split() if w not in rest]
+    hits = [i for i, name in enumerate(names) if parts and all(p in name.split(", ") for p in parts)]
+    if unknown or not hits:
+        raise UsageError(f"no branch is called '{wanted}'; this arm's are: {'; '.join(names)}")
+    return hits
+
+
+def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
+    """Some postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
+    rng = np.random.default_rng(3)
+    near_home = arm.home + rng.uniform(-0.35, 0.35, (24, arm.n)) * np.where(arm.prismatic, arm.reach / 20, 1.0)
+    anywhere = rng.uniform(-np.pi, np.pi, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
+    postures = np.concatenate([arm.home[None], near_home, anywhere])
+    goal = targets_of(task, fk(arm, postures), postures)
+    if geometry.rows is not None:
+        q, doubtful = geometry.rows(goal)
+        q = q[:, : geometry.branches]
+        return postures, q, ~np.isnan(q).any(axis=2) & ~doubtful[:, None]
+    assert geometry.pairs is not None
+    entries = pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+    prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
+    found = geometry.pairs(entries, prefer)
+    values = np.broadcast_arrays(*found.values())
+    q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
+    B = q.shape[1]
+    missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
+    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(found.doubt, values[0].shape).reshape(B, -1).T
+    return postures, q, valid
+
+
+def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
+    """Index of the branch that is the posture itself: (M,), -1 where it is not found again."""
+    distance = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
+    index = distance.argmin(axis=1)
+    return np.where(distance.min(axis=1) < 1e-6, index, -1)
+
+
+def _bent_wrist(arm: Arm, postures: Array) -> Array:
+    """Sine of the wrist's middle joint from straight: how joint 6 leans to joint 4's side, about joint 5's axis."""
+    c, s = np.cos(postures[:, 4]), np.sin(postures[:, 4])
+    A, b = arm.link[4][:3, :3], arm.link[5][:3, 2]
+    z4 = A.T @ [0.0, 0.0, 1.0]
+    turned = np.stack([c * b[0] - s * b[1], s * b[0] + c * b[1], np.full_like(c, b[2])], axis=1)
+    sine: Array = np.cross(np.broadcast_to(z4, turned.shape), turned)[:, 2]
+    return sine
+
+
+def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
+    """Height of the elbow in every branch, and a measure, low where the arm reaches far out and level: (M, B)."""
+    shape = q.shape[:2]
+    flat = np.nan_to_num(q.reshape(-1, arm.n))
+    points = _points(arm, flat)
+    if not _bends_upright(arm):
+        # in the base's plane: to the left of the way from the first joint to the tool
+        way = points[:, -1] - points[:, 0]
+        elbow = points[:, 1] - points[:, 0]
+        left = way[:, 0] * elbow[:, 1] - way[:, 1] * elbow[:, 0]
+        return left.reshape(shape), np.zeros(shape)
+    shoulder, elbow, wrist = points[:, 1], points[:, 2], points[:, 3]
+    way = wrist - shoulder
+    length = np.linalg.norm(way, axis=1)
+    tilt = np.abs(way[:, 2]) / np.maximum(length, 1e-9)
+    # far out, no offset of the shoulder can turn the way round
+    return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), 1e-9)).reshape(shape)
+
+
+def _bends_upright(arm: Arm) -> bool:
+    """Whether the elbow's axis is not along the base's z."""
+    P = arm.link[0]
+    for i in range(1, min(arm.n, 3)):
+        P = P @ arm.link[i]
+    return bool(abs(P[2, 2]) < 0.9)
+
+
+def _points(arm: Arm, q: Array) -> Array:
+    """Origins of joints 1, 2, ... and of what follows joint 3: (M, up to 4, 3)."""
+    P = np.broadcast_to(arm.link[0], (len(q), 4, 4))
+    points = [P[:, :3, 3]]
+    for i in range(min(arm.n, 3)):
+        Z = np.broadcast_to(np.eye(4), (len(q), 4, 4)).copy()
+        if arm.prismatic[i]:
+            Z[:, 2, 3] = q[:, i]
+        else:
+            Z[:, 0, 0] = Z[:, 1, 1] = np.cos(q[:, i])
+            Z[:, 1, 0] = np.sin(q[:, i])
+            Z[:, 0, 1] = -Z[:, 1, 0]
+        P = P @ Z @ arm.link[i + 1]
+        points.append(P[:, :3, 3])
+    return np.stack(points, axis=1)

@@ -1,0 +1,104 @@
+"""Whole turns and limits: which copy of a joint value is legal and nearest."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.formula.arrays import Array, Entry, wrapped
+from armkin.forward import one_pose
+from armkin.model.limits import SLACK
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+TURN = 2 * np.pi
+
+
+def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
+    """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
+
+    value: any shape, in (-pi, pi]; near: broadcastable [rad]. Returns the values and
+    whether they are within [lower, upper]; where no copy is, the principal value.
+    """
+    if lower >= -np.pi and upper <= np.pi:
+        # the principal value is the only one that can be legal, but for half a turn where both its copies are
+        wide = upper - lower > TURN - SLACK and not (isinstance(near, float) and near == 0.0)
+        if wide and (half := np.abs(value) > np.pi - SLACK).any():
+            other = value - np.copysign(TURN, value)
+            value = np.where(half & (np.abs(other - near) < np.abs(value - near)), other, value)
+        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
+    principal = value
+    if not (isinstance(near, float) and near == 0.0):
+        value = value + TURN * np.rint((near - value) / TURN)
+        low, high = float(np.min(near)) - np.pi, float(np.max(near)) + np.pi
+    else:
+        low, high = -np.pi, np.pi
+    if lower <= low and upper >= high:
+        return value, True
+    below, above = value < lower - SLACK, value > upper + SLACK
+    # another copy can only help if the limits reach beyond the turn around `near`
+    if upper > high - SLACK and below.any():
+        moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
+        fits = below & (moved <= upper + SLACK)
+        value, below = np.where(fits, moved, value), below & ~fits
+    if lower < low + SLACK and above.any():
+        moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
+        fits = above & (moved >= lower - SLACK)
+        value, above = np.where(fits, moved, value), above & ~fits
+    outside = below | above
+    if value is not principal:
+        value = np.where(outside, principal, value)
+    return value, ~outside
+
+
+def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
+    out = q.copy()
+    inside = np.ones(q.shape[:-1], bool)
+    if not q.size:
+        return out, inside
+    for i in range(arm.n):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        if arm.prismatic[i]:
+            ok: Entry = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
+        else:
+            principal = wrapped(q[..., i])
+            out[..., i], ok = nearest_copy(principal, near[..., i], lower, upper)
+        inside &= ok
+    return out, inside
+
+
+def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+    """All copies of one branch within the limits, the one nearest to `near` first.
+
+    q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n). An unlimited revolute
+    joint has copies without end: it gives the one nearest to `near` alone.
+
+    >>> import armkin
+    >>> arm = armkin.load("robots/ur5e.yaml")  # limits of +-360 degrees, joint 3 of +-180
+    >>> len(turns(arm, [0.3, -1.0, 1.2, -0.4, 0.9, 0.7]))
+    32
+    """
+    row = one_pose(arm, q, "q")
+    close = one_pose(arm, arm.home if near is None else near, "near")
+    choices = []
+    for i in range(arm.n):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        if arm.prismatic[i]:
+            inside = lower - SLACK <= row[i] <= upper + SLACK
+            choices.append([float(row[i])] if inside else [])
+        elif not (np.isfinite(lower) and np.isfinite(upper)):
+            value, ok = nearest_copy(row[i : i + 1] % TURN, close[i], lower, upper)
+            choices.append([float(value[0])] if np.all(ok) else [])
+        else:
+            first = int(np.ceil((lower - SLACK - row[i]) / TURN))
+            last = int(np.floor((upper + SLACK - row[i]) / TURN))
+            choices.append([float(row[i] + TURN * k) for k in range(first, last + 1)])
+    rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
+    unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
+    motion = (np.abs(rows - close) * unit).sum(axis=1)
+    return rows[np.argsort(motion, kind="stable")]

@@ -1,0 +1,12 @@
+"""Closed forms: one geometry a file, each with ``recognise(arm, task) -> Geometry | None``.
+
+geometry.py        what a class provides
+subproblems.py     the equations of the closed forms
+candidates.py      a class's candidates with their residuals, from recorded code
+
+planar.py          all joints in the base's x-y plane, and SCARAs
+elbow.py           joints 2 and 3 (and 4) parallel: positions, with pitch, with pitch and roll
+three_joints.py    any three joints that place a point: the quartic
+spherical.py       three axes that meet in a point, at the wrist or at the shoulder
+three_parallel.py  three parallel axes: the UR arms
+"""

@@ -1,0 +1,158 @@
+"""One joint, then two parallel revolute joints: the arm under most wrists, in closed form.
+
+The tip's distance along the parallel axes is the same for all angles of the two parallel
+joints, which gives the first joint; what remains is a planar two-link arm (Siciliano et
+al., Robotics, 2.12.2 and 2.12.4).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain, is_parallel
+from armkin.model.rotation import FLIP, inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Elbow:
+    """``link[0] Z1 link[1] Z2 link[2] Z3 tip``: joints 2 and 3 revolute and parallel.
+
+    All inside is seen from the frame of joint 2, in whose x-y plane the arm bends.
+    """
+
+    def __init__(self, chain: Chain, tip: Array) -> None:
+        """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
+        L2 = chain.link[2]
+        sense3 = 1.0 if L2[2, 2] > 0 else -1.0
+        if sense3 < 0:
+            L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
+        self.prismatic1 = bool(chain.prismatic[0])
+        self.from_base = pose.constant(inverse(chain.link[0]))
+        self.shoulder = pose.constant(chain.link[1])  # frame of joint 2 seen from joint 1
+        upper, fore = L2[:3, 3], L2[:3, :3] @ tip  # upper arm, forearm at q3 = 0
+        self.along = float(upper[2] + fore[2])
+        self.two_link = TwoLink(upper[:2], fore[:2], sense3)
+        self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
+
+    def solve(self, p: list[Entry], past: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        """Angles of the three joints that bring the tip to p.
+
+        p: position in the base, entries (N,); past: an offset added to the tip in the frame
+        of joint 2 turned to its final direction (what lies past joint 3 and has a known
+        direction), else zeros; prefer: values given to joints that a target leaves free.
+        Returns three pairs on branch axes (shoulder, elbow, 1, N), and doubt.
+        """
+        x, y, z = pose.apply(self.from_base, p)
+        n, o = self.shoulder[6:9], self.shoulder[9:12]
+        along = arrays.add(self.along, past[2])
+        if self.prismatic1:
+            ahead = arrays.sub(arrays.dot(n, [x, y, z]), along + arrays.dot(n, o))
+            first, doubt1 = Pair(ahead / n[2], None), np.zeros(1, bool)
+            z = z - first.c
+        else:
+            a = arrays.combine(n[0], [x], n[1], [y])[0]
+            b = arrays.combine(n[0], [y], -n[1], [x])[0]
+            rest = arrays.sub(along + arrays.dot(n, o), arrays.mul(n[2], z))
+            first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+            c1, s1 = first
+            x, y = c1 * x + s1 * y, c1 * y - s1 * x
+        lever = [arrays.sub(x, o[0]), arrays.sub(y, o[1]), arrays.sub(z, o[2])]
+        rx = arrays.sub(arrays.dot(self.shoulder[0:3], lever), past[0])
+        ry = arrays.sub(arrays.dot(self.shoulder[3:6], lever), past[1])
+        second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2])
+        return [first, second, third], doubt1 | doubt23
+
+
+class TwoLink:
+    """``Rz(q2) (l + Rz(q3) m) = r`` in a plane: the elbow of two parallel joints."""
+
+    def __init__(self, upper: Array, fore: Array, sense: float) -> None:
+        """upper, fore: l and m, (2,) [mm]; sense: -1 if joint 3 turns against joint 2."""
+        (self.lx, self.ly), (self.mx, self.my) = upper.tolist(), fore.tolist()
+        self.sense = sense
+        self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
+
+    def solve(self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None) -> tuple[Pair, Pair, Bool]:
+        """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,)."""
+        lx, ly, mx, my = self.lx, self.ly, self.mx, self.my
+        # |r|^2 = |l + Rz(q3) m|^2
+        third, doubt3 = linear(
+            2.0 * (lx * mx + ly * my),
+            2.0 * (ly * mx - lx * my),
+            rx * rx + ry * ry - (lx * lx + ly * ly + mx * mx + my * my),
+            1,
+            self.scale**2,
+            prefer3,
+        )
+        third = third if self.sense > 0 else Pair(third.c, -third.s)
+        ux, uy, _ = self.reach(third)
+        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
+        doubt = doubt2 | doubt3
+        return second, third, doubt
+
+    def reach(self, third: Pair) -> list[Entry]:
+        """``l + Rz(q3) m``, before joint 2 turns it."""
+        x, y, _ = spin(third.c, arrays.mul(self.sense, third.s), [self.mx, self.my, 0.0])
+        return [arrays.add(self.lx, x), arrays.add(self.ly, y), 0.0]
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_pitch, xyz_pitch_roll."""
+    n = {"xyz": 3, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
+    if n != arm.n or arm.prismatic[1:].any():
+        return None
+    parallels = 2 if n == 3 else 3
+    link = arm.link.copy()
+    for i in range(2, parallels + 1):
+        if not is_parallel(link[i], tolerance):
+            return None
+    if arm.prismatic[0] and abs(link[1][2, 2]) < 1e-6:
+        return None  # the slide lies in the arm's plane
+    why = "joints 2 and 3 are parallel" if n == 3 else "joints 2, 3 and 4 are parallel"
+    labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")
+    if n == 3:
+        elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
+
+        def xyz(goal: list[Entry], prefer: Prefer) -> Candidates:
+            return Candidates(*elbow.solve(goal, [0.0, 0.0, 0.0], prefer))
+
+        return Geometry("elbow", why, True, xyz, labels=labels)
+
+    elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
+    # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
+    past = pose.constant(link[4])
+    # Rz(q2) R2 Rz(q3) R3 Rz(q4) = Rz(q2 +- q3 +- q4) R2 R3, the signs those of antiparallel axes
+    sense = [float(v) for v in task.sums[0][1:4] / task.sums[0][1]]
+    turned = pose.constant(link[2] @ link[3])
+
+    def pitch(goal: list[Entry], prefer: Prefer) -> Candidates:
+        total = (goal[3] - task.offsets[0]) / task.sums[0][1]
+        c, s = arrays.cos_sin(total)
+        if n == 5:
+            q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
+            fifth = Pair(*arrays.cos_sin(q5))
+            P = pose.times(pose.rotate(past, *fifth), pose.constant(link[5]))
+            tip = P[9:12]
+        else:
+            fifth = None
+            tip = past[9:12]
+        x, y, z = pose.turn(turned, tip)
+        offset = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
+        pairs, doubt = elbow.solve(goal[:3], offset, prefer)
+        # joint 4 takes what is left of the sum
+        c4, s4 = c, s
+        for pair, g in zip(pairs[1:], sense[:2], strict=True):
+            c4, s4 = c4 * pair.c + g * s4 * pair.s, s4 * pair.c - g * c4 * pair.s
+        fourth = Pair(c4, sense[2] * s4)
+        return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
+
+    return Geometry("elbow with pitch", why, True, pitch, labels=labels)

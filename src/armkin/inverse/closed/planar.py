@@ -1,0 +1,202 @@
+"""Arms that move in the base's x-y plane: xy, xy_theta, and the SCARA's xyz_yaw.
+
+A joint that slides along z does not move the tool in the plane, so a SCARA is a planar arm
+and a lift, wherever the lift stands. Where the direction of the tool is given, one turning
+joint at an end of the chain is known from the others: the tip moves back to that joint and
+two joints remain, which are a `Position` problem with a virtual slide along z for joint 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse.closed.elbow import TwoLink
+from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.closed.three_joints import Position
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain, axes, reverse
+from armkin.model.rotation import FLIP, inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Bool]]
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Planar and SCARA arms with as many joints as constraints."""
+    if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
+        return None
+    _, w = axes(Chain(arm.link, arm.prismatic))
+    lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
+    if (task.name == "xyz_yaw") != (lift is not None):
+        return None
+    if np.hypot(*w[~arm.prismatic, :2].T).max(initial=0.0) > tolerance:
+        return None
+    slides = arm.prismatic.copy()
+    if lift is not None:
+        slides[lift] = False
+        if np.hypot(*w[lift, :2]) > tolerance:
+            return None
+    if np.abs(w[slides, 2]).max(initial=0.0) > tolerance:
+        return None
+    link, prismatic, kept = arm.link, arm.prismatic, list(range(arm.n))
+    if lift is not None:
+        link = np.array([*link[:lift], link[lift] @ link[lift + 1], *link[lift + 2 :]])
+        prismatic = np.delete(prismatic, lift)
+        kept.remove(lift)
+    chain = Chain(link, prismatic)
+    solve_plane = _two(chain) if task.name == "xy" else _three(chain, task, kept)
+    if solve_plane is None:
+        return None
+    fixed = [pose.constant(L) for L in arm.link]
+
+    def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
+        pairs, doubt = solve_plane(goal, [prefer[i] for i in kept])
+        if lift is None:
+            return Candidates(pairs, doubt)
+        # the lift's value is what is missing in height when it is zero
+        P = fixed[0]
+        rest = iter(pairs)
+        for i in range(arm.n):
+            if i != lift:
+                pair = next(rest)
+                P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
+            P = pose.times(P, fixed[i + 1])
+        value = (goal[2] - P[11]) * float(np.sign(w[lift, 2]))
+        pairs.insert(lift, Pair(value, None))
+        return Candidates(pairs, doubt)
+
+    kinds = "".join("P" if p else "R" for p in arm.prismatic)
+    name = "SCARA" if lift is not None else "planar"
+    why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
+    return Geometry(name, why, True, solve, labels=() if prismatic.any() else ("", "elbow", ""))
+
+
+def _two(chain: Chain) -> Solve:
+    """Two planar joints that place a point.
+
+    Two turning ones are an elbow; otherwise a virtual slide along z, whose value does not
+    matter, makes it a `Position` problem.
+    """
+    if not chain.prismatic.any():
+        return _two_turning(chain)
+    virtual = Chain(np.array([np.eye(4), *chain.link]), np.array([True, *chain.prismatic]))
+    position = Position(virtual, chain.link[2][:3, 3])
+
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        pairs, doubt = position.solve([goal[0], goal[1], 0.0 * goal[0]], [Pair(0.0, None), *prefer])
+        return pairs[1:], doubt
+
+    return solve
+
+
+def _two_turning(chain: Chain) -> Solve:
+    base, L1 = chain.link[0], chain.link[1]
+    sense2 = np.sign(L1[2, 2])
+    if sense2 < 0:
+        L1 = L1 @ FLIP
+    tip = (FLIP if sense2 < 0 else np.eye(4))[:3, :3] @ chain.link[2][:3, 3]
+    two_link = TwoLink(L1[:2, 3], (L1[:3, :3] @ tip)[:2], float(sense2))
+    start = pose.constant(inverse(base))
+
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        # height does not matter: any point above or below the target will do
+        p = pose.apply(start, [goal[0], goal[1], 0.0])
+        first, second, doubt = two_link.solve(p[0], p[1], *prefer)
+        return [first, second], doubt
+
+    return solve
+
+
+def _three(chain: Chain, task: Task, kept: list[int]) -> Solve:
+    """Three planar joints with the tool's direction given."""
+    weights = task.sums[0][kept]
+    if not chain.prismatic[2]:
+        return _known_last(chain, task, weights)
+    if not chain.prismatic[0]:
+        return _known_first(chain, task, weights)
+    return _known_middle(chain, task, weights)
+
+
+def _direction(goal: list[Entry], task: Task, chain: Chain) -> pose.Pose:
+    """The tool's orientation about z: entries of a pose at the origin."""
+    c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
+    R0 = _at_zero(chain)
+    R0[:3, 3] = 0.0
+    spin: pose.Pose = [c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return pose.times(spin, pose.constant(R0))
+
+
+def _at_zero(chain: Chain) -> Array:
+    """The tool's pose when all joints are zero."""
+    T: Array = np.linalg.multi_dot(list(chain.link))
+    return T
+
+
+def _rest(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None], joint: int) -> Pair:
+    """The joint that is left, from the sum of all."""
+    c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
+    for w, pair in zip(weights, pairs, strict=True):
+        if pair is not None and pair.s is not None and w:
+            c, s = c * pair.c + w * s * pair.s, s * pair.c - w * c * pair.s
+    return Pair(c, float(weights[joint]) * s)
+
+
+def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
+    """Joint 3 turns: step back from the tool to its axis, place that point with joints 1 and 2."""
+    back = pose.constant(inverse(chain.link[3]))
+    two = _two(Chain(chain.link[:3], chain.prismatic[:2]))
+
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        R = _direction(goal, task, chain)
+        x, y, _ = pose.turn(R, back[9:12])
+        pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
+        return [*pairs, _rest(goal, task, weights, [*pairs, None], 2)], doubt
+
+    return solve
+
+
+def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
+    """Joint 3 slides, joint 1 turns: the same walked from the tool to the base."""
+    level = np.eye(4)  # the tool's frame when all joints are zero, turned so that z is the plane's normal
+    level[:3, :3] = _at_zero(chain)[:3, :3].T
+    back = reverse(Chain(np.array([*chain.link[:3], chain.link[3] @ level]), chain.prismatic))
+    two = _two(Chain(back.link[:3], back.prismatic[:2]))
+    axis = [float(v) for v in chain.link[0][:2, 3]]
+
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
+        x, y = axis[0] - goal[0], axis[1] - goal[1]
+        (third, second), doubt = two([c * x + s * y, c * y - s * x], [prefer[2], prefer[1]])
+        return [_rest(goal, task, weights, [None, second, third], 0), second, third], doubt
+
+    return solve
+
+
+def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
+    """Joints 1 and 3 slide, joint 2 turns: its angle is given, two equations linear in the slides."""
+    link = [pose.constant(L) for L in chain.link]
+
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        second = _rest(goal, task, weights, [None, None, None], 1)
+        P = pose.times(link[0], link[1])
+        a = link[0][6:8]
+        P = pose.times(pose.rotate(P, *second), link[2])
+        b = P[6:8]
+        end = pose.times(P, link[3])
+        x, y = goal[0] - end[9], goal[1] - end[10]
+        det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
+        doubt = np.abs(det) < 1e-9
+        inverse_det = np.sign(det) / np.maximum(np.abs(det), 1e-9)
+        d1 = (arrays.mul(x, b[1]) - arrays.mul(y, b[0])) * inverse_det
+        d3 = (arrays.mul(a[0], y) - arrays.mul(a[1], x)) * inverse_det
+        return [Pair(d1, None), second, Pair(d3, None)], doubt
+
+    return solve

@@ -1,0 +1,180 @@
+"""Spherical wrists and shoulders: three joint axes that meet in one point at an end of the arm.
+
+The point does not feel the three joints: the other three place it (`Elbow` or `Position`),
+and the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose
+first three axes meet is the same arm walked from the tool to the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.pose import Pose
+from armkin.inverse.closed.elbow import Elbow
+from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.subproblems import (
+    TANGENT,
+    Candidates,
+    Pair,
+    Prefer,
+    distance2,
+    linear,
+    rotation_between,
+    signs,
+    spin,
+)
+from armkin.inverse.closed.three_joints import Position
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+Place = Callable[..., tuple[list[Pair], Bool]]
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Six joints and a full pose, axes 4, 5, 6 or 1, 2, 3 meeting in a point."""
+    if task.name != "pose" or arm.n != 6:
+        return None
+    chain = Chain(arm.link, arm.prismatic)
+    centre = wrist_centre(chain, tolerance * arm.reach)
+    if centre is not None:
+        wrist = SphericalWrist(chain, *centre, tolerance)
+        if wrist.close:
+            return None
+        why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
+        return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels, ordered=wrist.ordered)
+    chain = reverse(chain)
+    centre = wrist_centre(chain, tolerance * arm.reach)
+    if centre is None:
+        return None
+    shoulder = SphericalWrist(chain, *centre, tolerance)
+    if shoulder.close:
+        return None
+
+    def solve(goal: Pose, prefer: Prefer) -> Candidates:
+        return shoulder.solve(pose.inverse(goal), prefer[::-1]).reversed()
+
+    why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {shoulder.why}"
+    return Geometry("spherical shoulder", why, True, solve, ordered=shoulder.ordered)
+
+
+def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
+    """Where axes 4, 5 and 6 meet: seen after joint 3 and after joint 6, (3,) each, or None."""
+    if chain.prismatic[3:].any() or is_parallel(chain.link[4], 1e-6) or is_parallel(chain.link[5], 1e-6):
+        return None
+    # axis 4 is the z axis, axis 5 the line t + s w: the foot of their common perpendicular on axis 4
+    t, w = chain.link[4][:3, 3], chain.link[4][:3, 2]
+    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])
+    at4 = np.array([0.0, 0.0, height])
+    at5 = (inverse(chain.link[4]) @ [*at4, 1.0])[:3]
+    at6 = (inverse(chain.link[5]) @ [*at5, 1.0])[:3]
+    if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:
+        return None
+    L3 = chain.link[3]
+    return L3[:3, :3] @ at4 + L3[:3, 3], at6
+
+
+class SphericalWrist:
+    """Three joints that place the wrist's centre, then three that turn the tool about it."""
+
+    def __init__(self, chain: Chain, after3: Array, after6: Array, tolerance: float) -> None:
+        """after3, after6: (3,) the centre seen after joint 3 and after joint 6 [mm]; tolerance: as in `recognise`."""
+        self.chain = chain
+        self.labels: tuple[str, ...] = ()
+        self.ordered = True
+        self.close = False  # the first three joints are almost special: see `Position`
+        if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], tolerance) and not chain.prismatic[0]:
+            elbow = Elbow(chain, after3)
+            self.place: Place = partial(elbow.solve, past=[0.0, 0.0, 0.0])
+            self.why = "axes 2 and 3 are parallel"
+            self.labels = ("shoulder", "elbow", "wrist")
+        else:
+            position = Position(chain, after3, tolerance)
+            self.close, self.ordered = position.close, not position.regular
+            self.place = position.solve
+            self.why = f"of the other three, {position.why}"
+        self.links = [pose.constant(L) for L in chain.link[:4]]
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
+        L3 = chain.link[3]
+        self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
+        end = inverse(chain.link[6])
+        self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # in the tool's frame
+        self.end = pose.constant(end)
+        self.A = pose.constant(chain.link[4])
+        self.B = pose.constant(chain.link[5])
+        A, b = chain.link[4][:3, :3], chain.link[5][:3, 2]
+        # z . A Rz(q5) b = c5 (A20 b0 + A21 b1) + s5 (A21 b0 - A20 b1) + A22 b2
+        self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
+        self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
+        self.rest5 = float(A[2, 2] * b[2])
+        self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
+        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+
+    def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
+        """All joints for a pose, on branch axes (b0, b1, 2, N)."""
+        centre = pose.apply(goal, self.centre)
+        pairs, doubt = self.place(centre, prefer=prefer[:3])
+        P = self.links[0]
+        for i, pair in enumerate(pairs):
+            P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
+            P = pose.times(P, self.links[i + 1])
+        there = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
+        miss = arrays.mul(1.0 / self.reach**2, distance2(there, centre))
+        # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
+        x = pose.turn_back(P, pose.turn(goal, self.end[0:3]))
+        z = pose.turn_back(P, pose.turn(goal, self.end[6:9]))
+        if self.mirrored:
+            return self._mirrored(pairs, doubt, miss, x, z, prefer)
+        disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
+
+    def _around(
+        self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
+    ) -> tuple[Pair, Pair, Bool, Entry]:
+        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
+
+        across: the square of z's part across joint 4, if the wrist can reach every z.
+        """
+        turn5 = pose.rotate(self.A, *fifth)
+        u = pose.turn(turn5, self.B[6:9])
+        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3], across)
+        c4, s4 = fourth
+        # what is left is Rz(q6): its first column
+        back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
+        c6, s6, _ = pose.turn_back(self.B, back)
+        column = pose.turn(turn5, arrays.combine(c6, self.B[0:3], s6, self.B[3:6]))
+        wrong = distance2(spin(c4, s4, u), z) + distance2(spin(c4, s4, column), x)
+        return fourth, Pair(c6, s6), doubt4, wrong
+
+    def _mirrored(
+        self, pairs: list[Pair], doubt: Bool, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
+    ) -> Candidates:
+        """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
+        disc = z[0] * z[0] + z[1] * z[1]
+        fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, np.sqrt(disc)))
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        sign = signs(2)
+        flipped = 0.5 - 0.5 * sign
+        q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
+        angles = [
+            None,
+            None,
+            None,
+            q4 - flipped * np.copysign(np.pi, q4),
+            sign * np.arctan2(fifth.s, fifth.c),
+            q6 - flipped * np.copysign(np.pi, q6),
+        ]
+        doubt = doubt | (disc < TANGENT) | doubt4
+        return Candidates([*pairs, fourth, fifth, sixth], doubt, miss + wrong, angles)

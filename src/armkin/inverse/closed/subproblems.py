@@ -1,0 +1,295 @@
+"""The subproblems that every closed form is made of.
+
+Angles are carried as cosine and sine pairs and become angles only at the very end: the
+pairs come out of the algebra without any inverse function, and the residual of a branch
+can be checked with them directly.
+
+Branch axes: the solutions of a subproblem stand on axes of their own in front of the
+batch axis, as in shape (2, 2, 1, N), and broadcast against what does not depend on them.
+The caller says which axis by the shape of `signs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from armkin.formula import arrays
+from armkin.formula.arrays import Array, Bool, Entry
+
+TANGENT = 1e-13  # relative discriminant below which two roots may be one: 6e-7 rad apart
+TOUCHING = 1e-4  # [rad] complex roots this close to the real line may be a double root seen through rounding
+FREE = 1e-18  # relative squared amplitude below which an equation says nothing about its angle
+
+
+class Pair(NamedTuple):
+    """Cosine and sine of a joint's angle [rad], or the value [mm] of a prismatic joint and None."""
+
+    c: Entry
+    s: Entry
+
+
+# What to give a joint that a target leaves free, or None.
+Prefer = Sequence[Pair | None]
+
+
+class Candidates(NamedTuple):
+    """What a closed form returns: candidate branches, not yet told from false ones.
+
+    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these, branches on an edge. miss:
+    squared residual of every branch (lengths in units of the reach), recomputed from the
+    pairs, if the geometry has a shorter way than the whole chain; else None. angles: one a
+    joint, its angle where the geometry knows it without an inverse function, else None.
+    """
+
+    pairs: list[Pair]
+    doubt: Bool
+    miss: Entry | None = None
+    angles: Sequence[Entry | None] = ()
+
+    def values(self) -> list[Entry]:
+        """Joint values [rad | mm]."""
+        angles = self.angles or [None] * len(self.pairs)
+        return [
+            c if s is None else np.arctan2(s, c) if angle is None else angle
+            for (c, s), angle in zip(self.pairs, angles, strict=True)
+        ]
+
+    def reversed(self) -> Candidates:
+        """The same for the chain walked the other way."""
+        return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
+
+
+def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:
+    """``Rz(q) v``.
+
+    >>> spin(0.0, 1.0, [2.0, 0.0, 5.0])
+    [0.0, 2.0, 5.0]
+    """
+    x, y = v[0], v[1]
+    return [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), v[2]]
+
+
+def distance2(u: list[Entry], v: list[Entry]) -> Entry:
+    """Squared distance of two vectors."""
+    total: Entry = 0.0
+    for a, b in zip(u, v, strict=False):
+        d = arrays.sub(a, b)
+        total = arrays.add(total, d * d)
+    return total
+
+
+def signs(axis: int) -> Array:
+    """[+1, -1] along branch axis 0, 1 or 2 of (b0, b1, b2, N)."""
+    shape = [1, 1, 1, 1]
+    shape[axis] = 2
+    return np.array([1.0, -1.0]).reshape(shape)
+
+
+def linear(
+    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None
+) -> tuple[Pair, Bool]:
+    """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
+
+    a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
+    length that makes a and b dimensionless; prefer: the angle to give where the equation
+    leaves it free, or None to do without (such targets are in doubt and looked at again); disc:
+    ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a
+    boolean array: True where the roots are about to merge or the angle is free.
+
+    Without a real root the pair is that of the closest angle, not normalised; the caller finds by
+    its residual that it is no solution, or normalises it where the residual would not show.
+    """
+    sign = signs(axis)
+    h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
+    if disc is None:
+        disc = h2 - c * c
+    doubt = np.abs(disc) < TANGENT * h2
+    root = np.sqrt(np.maximum(disc, 0.0)) * sign
+    least = FREE * scale * scale
+    if isinstance(h2, float) and isinstance(least, float):
+        if h2 < least:
+            doubt = (c == c) | doubt  # the equation says nothing about the angle, whatever the target
+        inverse: Entry = 1.0 / max(h2, least)
+    else:
+        doubt = doubt | (h2 < least)
+        inverse = 1.0 / np.maximum(h2, least)
+    ci, ri = c * inverse, root * inverse
+    cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
+    sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
+    return _prefer(Pair(cos, sin), h2 < least, prefer), doubt
+
+
+def normalised(pair: Pair) -> Pair:
+    """The pair on the unit circle: the closest angle where `linear` found no real root."""
+    size = np.sqrt(np.maximum(pair.c * pair.c + pair.s * pair.s, 1e-300))
+    return Pair(pair.c / size, pair.s / size)
+
+
+def rotation_between(
+    ux: Entry,
+    uy: Entry,
+    vx: Entry,
+    vy: Entry,
+    scale: Entry,
+    prefer: Pair | None,
+    length2: Entry | None = None,
+) -> tuple[Pair, Bool]:
+    """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
+
+    length2: the squared length that u and v both have if the target is reached, where the
+    caller knows it; the pair of a target that is not is then not normalised.
+    Returns the pair and doubt: True where u or v vanishes, so that the angle is free.
+    """
+    c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
+    s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
+    least = FREE * scale * scale
+    if length2 is None:
+        h2 = arrays.add(arrays.mul(c, c), arrays.mul(s, s))
+        free = h2 < least * least
+        inverse = 1.0 / np.sqrt(np.maximum(h2, least * least))
+    else:
+        free = length2 < least
+        inverse = 1.0 / np.maximum(length2, least)
+    return _prefer(Pair(c * inverse, s * inverse), free, prefer), free
+
+
+def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
+    """The pair, with the preferred angle where it is free."""
+    if prefer is None or not np.any(free):
+        return pair
+    return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
+
+
+def quadratic(
+    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, least: Entry, prefer: Pair | None
+) -> tuple[Array, Bool]:
+    """Solve ``a d^2 + b d + c = 0`` for both roots d.
+
+    scale: a length of the size of d; least: the size of c below which, if all three are, the equation says
+    nothing; prefer: the d to give then. With d = scale tan(q/2) this is a `linear` problem, in which a
+    vanishing a is no special case: its root goes to infinity.
+    """
+    a, b = arrays.mul(a, scale * scale), arrays.mul(b, scale)
+    size = arrays.add(arrays.add(abs(a), abs(b)), abs(c))
+    free = size < least
+    inverse = 1.0 / np.maximum(size, least)
+    a, b, c = a * inverse, b * inverse, c * inverse
+    pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, None)
+    d = scale * half_tangent(pair)
+    if prefer is not None and np.any(free):
+        d = np.where(free, prefer.c, d)
+    return d, doubt | free
+
+
+def half_tangent(pair: Pair) -> Entry:
+    """``tan(q/2)``, 1e9 where it is infinite: inf would turn into nan on its way."""
+    # s / (1 + c) = (1 - c) / s: the form without cancellation
+    ahead = pair.c > 0.0
+    below = np.where(ahead, 1.0 + pair.c, pair.s)
+    above = np.where(ahead, pair.s, 1.0 - pair.c)
+    far = np.abs(below) < 1e-9
+    return np.where(far, 1e9, above / np.where(far, 1.0, below))
+
+
+def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Bool]:
+    """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
+
+    e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
+    roots on branch axes (2, 2, 1, N), and doubt: roots that touch, complex ones that miss the real
+    line by less than `TOUCHING`, or a vanishing equation. Without a real root the pair is
+    that of the closest angle, not normalised, as in `linear`.
+
+    The unit circle and a conic meet where the circle meets a pair of lines, a degenerate conic of
+    the pencil of the two (Richter-Gebert, Perspectives on Projective Geometry, 11.4). The pencil's cubic
+    always has a root between -sqrt(h) and sqrt(h), whose lines are real.
+    """
+    e0, ec, es, ecc, ecs, ess = e
+    size = arrays.add(abs(ecc), abs(ess))
+    for v in (e0, ec, es, ecs):
+        size = arrays.add(size, abs(v))
+    inverse = 1.0 / np.maximum(size, 1e-12 * scale)
+    # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
+    a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
+    u, v = 0.5 * ec * inverse, 0.5 * es * inverse
+    w = (e0 + 0.5 * (ecc + ess)) * inverse
+    x, triple = _line_pair(a, b, u, v, w)
+    M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
+    # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
+    columns = [
+        [v * v - M[1][1] * M[2][2], b * M[2][2] - u * v, u * M[1][1] - b * v],
+        [b * M[2][2] - u * v, u * u - M[0][0] * M[2][2], M[0][0] * v - b * u],
+        [u * M[1][1] - b * v, M[0][0] * v - b * u, b * b - M[0][0] * M[1][1]],
+    ]
+    squares = [columns[i][i] for i in range(3)]
+    column = _longest(squares, columns)
+    down = 1.0 / np.sqrt(np.maximum(np.maximum(squares[0], np.maximum(squares[1], squares[2])), 1e-15))
+    px, py, pz = (down * value for value in column)
+    rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
+    flipped = [list(row) for row in zip(*rows, strict=True)]
+    lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
+    lx, ly, lz = (np.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
+    # a line at infinity has no direction
+    lx = lx + 1e-100
+    h2 = lx * lx + ly * ly
+    disc = h2 - lz * lz
+    pair, _ = linear(lx, ly, -lz, 1, 1e-140, None, disc)
+    real = disc > -(TOUCHING**2) * h2
+    c, s = pair
+    for _ in range(2):
+        value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
+        slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
+        step = np.where(real, value * slope / (slope * slope + 1e-18), 0.0)
+        step = np.minimum(np.maximum(step, -0.01), 0.01)
+        c, s = c + s * step, s - c * step
+        shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
+        c, s = c * shorter, s * shorter
+    merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
+    return Pair(c, s), merging | triple | (size < 1e-12 * scale)
+
+
+def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:
+    """The x in [-sqrt(h), sqrt(h)] farthest from being double for which the conic plus x times the circle degenerates.
+
+    And whether it is about to be triple: the circle and the conic touch in three or four points at once.
+
+    ``x^3 - w x^2 + (r - h) x + rest = 0`` with h = a^2 + b^2 and r = u^2 + v^2 is not positive at
+    -sqrt(h) and not negative at sqrt(h).
+    """
+    h, r = a * a + b * b, u * u + v * v
+    rest = w * h + a * (v * v - u * u) - 2.0 * b * u * v
+    linear_ = r - h
+    third = w / 3.0
+    p = linear_ - w * third
+    q = 0.5 * (rest + third * linear_ - 2.0 * third * third * third)
+    p3 = p / 3.0
+    disc = q * q + p3 * p3 * p3
+    # one real root (Cardano) or three (Viete): the largest and the smallest of them
+    root = np.sqrt(np.abs(disc))
+    A = np.cbrt(np.abs(q) + root + 1e-300)
+    alone = np.copysign(A - p3 / A, -q)
+    size = 2.0 * np.sqrt(np.maximum(-p3, 0.0))
+    c, s = arrays.cos_sin(np.arctan2(root, -q) / 3.0)
+    most = size * c
+    least = -0.5 * size * (c + np.sqrt(3.0) * s)
+    span = np.sqrt(h)
+    above = np.maximum(most + third - span, 0.0)
+    below = np.maximum(-span - least - third, 0.0)
+    # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
+    upper = (above < below) | ((above <= below) & (most + least > 0.0))
+    x = third + np.where(disc > 0.0, alone, np.where(upper, most, least))
+    for _ in range(2):
+        value = ((x - w) * x + linear_) * x + rest
+        slope = (3.0 * x - 2.0 * w) * x + linear_
+        x = x - value * slope / (slope * slope + 1e-30)
+    return x, np.abs(slope) < 1e-6
+
+
+def _longest(sizes: list[Entry], vectors: list[list[Entry]]) -> list[Entry]:
+    """That of three vectors whose size is the largest."""
+    later = sizes[1] > sizes[0]
+    size = np.maximum(sizes[0], sizes[1])
+    last = sizes[2] > size
+    return [np.where(last, z, np.where(later, y, x)) for x, y, z in zip(*vectors, strict=True)]

@@ -1,0 +1,316 @@
+"""Three joints of any kind and arrangement that place a point: the quartic and its special cases.
+
+Undo joint 1: of ``x = link[1] Z2 y(q3)``, y the tip in the frame of joint 2, only what joint
+1 cannot change is known. For a revolute joint 1 that is its height on the axis and its
+distance, for a prismatic one its two components across the axis. Both are linear in
+``g = Rz(q2) y`` (Pieper, The Kinematics of Manipulators under Computer Control, 1968).
+
+Revolute joint 2: two equations ``A (gx, gy) = r(q3)`` with a constant A.
+  A regular: ``|A^-1 r|^2 = |y across joint 2|^2``, a quadratic form in (1, cos q3, sin q3) or,
+  joint 3 prismatic, in (1, d3, d3^2): a quartic, up to four branches.
+  A of rank one (neighbouring axes parallel, intersecting, or at right angles): a combination
+  of the equations holds q3 alone, two roots; the other gives q2, two roots each.
+Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse.closed.geometry import EXACT, NEAR, Geometry
+from armkin.inverse.closed.subproblems import (
+    Candidates,
+    Pair,
+    Prefer,
+    half_tangent,
+    linear,
+    normalised,
+    quadratic,
+    rotation_between,
+    spin,
+    trig_quadratic,
+)
+from armkin.inverse.tasks.task import Task, rank
+from armkin.model.chain import Chain
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Position:
+    """``link[0] Z1 link[1] Z2 link[2] Z3 tip``, three joints, revolute or prismatic, any geometry."""
+
+    def __init__(self, chain: Chain, tip: Array, tolerance: float = EXACT) -> None:
+        """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm].
+
+        tolerance: what still counts as a special case. `close` says that the arm is farther from one than that,
+        but so near that its branches lie too close together for the general case's equations.
+
+        Raises UsageError if the three joints cannot place a point in space.
+        """
+        self.prismatic = [bool(p) for p in chain.prismatic[:3]]
+        self.scale = max(float(np.abs(chain.link[1:3, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
+        self.from_base = pose.constant(inverse(chain.link[0]))
+        L1, L2 = chain.link[1], chain.link[2]
+        self.L1 = pose.constant(L1)
+        R2, t2 = L2[:3, :3], L2[:3, 3]
+        # y = Y b with b = (1, cos q3, sin q3) or (1, d3, d3^2)
+        if self.prismatic[2]:
+            self.Y = np.column_stack([R2 @ tip + t2, R2[:, 2], np.zeros(3)])
+        else:
+            x, y, z = tip
+            self.Y = np.column_stack([R2[:, 2] * z + t2, R2[:, :2] @ [x, y], R2[:, :2] @ [-y, x]])
+        self.across = _form(self.Y[:2])  # |y across joint 2|^2 as a quadratic form in b
+        self.square = _form(self.Y)  # |y|^2
+        self.rows, self.rest, self.forms = self._equations(L1)
+        self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
+        self.tolerance = tolerance
+        self.close = False
+        self.why = self._split()
+
+    def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
+        """What joint 1 cannot change, as ``rows[k] . g + form_k(b) = known_k - rest[k]``."""
+        R, t = L1[:3, :3], L1[:3, 3]
+        none = np.zeros((3, 3))
+        if self.prismatic[0]:
+            return R[:2], t[:2], [none, none]
+        # height: R[2] . g + t_z; half the squared distance: (|y|^2 or |g|^2) / 2 + (R^T t) . g + |t|^2 / 2
+        return np.array([R[2], R.T @ t]), np.array([t[2], t @ t / 2]), [none, self.square / 2]
+
+    def _split(self) -> str:
+        """Find the combination of the two equations without q2, if there is one; say what was found."""
+        weight = np.array([1.0, 1.0 if self.prismatic[0] else 1.0 / self.scale])
+        scaled = self.A * weight[:, None]
+        if self.prismatic[1]:
+            # one unknown d2 (its square cancels in no combination): eliminate it between the rows
+            self.regular = not self.prismatic[0] and self._is_regular(abs(float(self.rows[0, 2])))
+            if self.prismatic[0] and np.abs(self.A).max() < 1e-9:
+                raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
+            return "joint 2 slides, so its value is eliminated first"
+        U, S, _ = np.linalg.svd(scaled)
+        if S[0] < 1e-9:
+            raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
+        self.regular = self._is_regular(float(S[1] / S[0]))
+        self.alone = U[:, 1] * weight  # combination that holds q3 alone
+        self.main = U[:, 0] * weight  # the one that gives q2
+        return "a quartic gives joint 3" if self.regular else "special axes give joint 3 by itself"
+
+    def _is_regular(self, off: float) -> bool:
+        """Whether the general equations serve, off being how far the arm is from a special case."""
+        self.close = self.tolerance < off <= NEAR
+        return off > self.tolerance
+
+    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+        """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
+        x, y, z = pose.apply(self.from_base, p)
+        square = x * x + y * y + z * z
+        # a slide may be far longer than the links
+        size = np.sqrt(self.scale**2 + square) if any(self.prismatic) else self.scale
+        known = [x, y] if self.prismatic[0] else [z, 0.5 * square]
+        known = [arrays.sub(value, float(rest)) for value, rest in zip(known, self.rest, strict=True)]
+        if self.prismatic[1]:
+            third, second, doubt = self._slide(known, size, prefer)
+        elif self.regular:
+            third, second, doubt = self._quartic(known, size, prefer)
+        else:
+            third, second, doubt = self._rank_one(known, size, prefer)
+        g = self._tip(third)
+        g = spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
+        there = pose.apply(self.L1, g)
+        if self.prismatic[0]:
+            first = Pair(z - there[2], None)
+        else:
+            first, doubt1 = rotation_between(there[0], there[1], x, y, size, prefer[0])
+            doubt = doubt | doubt1
+        return [first, second, third], doubt
+
+    def _tip(self, third: Pair) -> list[Entry]:
+        """The tip in the frame of joint 2."""
+        return [_at(row.tolist(), third) for row in self.Y]
+
+    def _affine(self, weights: Array, known: list[Entry]) -> list[Entry]:
+        """``weights . (known - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
+        fixed = np.zeros(6)
+        for w, row, form in zip(weights, self.rows, self.forms, strict=True):
+            fixed[:3] -= w * row[2] * self.Y[2]
+            fixed -= w * _six(form)
+        if not self.prismatic[2]:
+            # |y|^2 is affine in (cos, sin) although its form is quadratic: cos^2 + sin^2 = 1
+            fixed[[0, 3, 5]] += fixed[5] * np.array([1.0, -1.0, -1.0])
+        six: list[Entry] = fixed.tolist()
+        six[0] = arrays.add(six[0], arrays.dot(weights.tolist(), known))
+        return six
+
+    def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+        g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
+        across = (-_six(self.across)).tolist()
+        if not self.prismatic[2]:
+            third, doubt = self._roots(_sum(across, *(_product(six, six) for six in g)), size)
+        else:
+            # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
+            k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
+            for six in g:
+                quad = [six[0], six[1], six[3]]
+                for i in range(3):
+                    for j in range(3):
+                        k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
+            if self.prismatic[0]:  # nothing beyond d^2
+                d, doubt = quadratic(k[2], k[1], k[0], 0, size, 1e-12 * size * size, prefer[2])
+                third = Pair(d, None)
+            else:
+                power: Entry = 1.0
+                for i in range(1, 5):
+                    power = arrays.mul(power, size)
+                    k[i] = arrays.mul(k[i], power)
+                k0, k1, k2, k3, k4 = k
+                ecc = 0.25 * (k4 + k0 - k2)
+                form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
+                turn, doubt = trig_quadratic(form, size * size)
+                third = Pair(size * half_tangent(turn), None)
+        gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
+        y = self._tip(third)
+        second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
+        return third, second, doubt | doubt2
+
+    def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Bool]:
+        """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
+        pair, doubt = trig_quadratic(six, size * size)
+        return normalised(pair), doubt
+
+    def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+        alone = self._affine(self.alone, known)
+        if self.prismatic[2]:
+            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, 1e-12 * size, prefer[2])
+            third = Pair(d, None)
+        else:
+            # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
+            third, doubt = linear(alone[1], alone[2], arrays.mul(-1.0, alone[0]), 0, size, prefer[2])
+            third = normalised(third)
+        y = self._tip(third)
+        main = self._affine(self.main, known)
+        right = _at([main[0], main[1], main[2] if third.s is not None else main[3]], third, 2)
+        ax, ay = (self.main @ self.A).tolist()
+        a, b = (
+            arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1])),
+            arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1])),
+        )
+        second, doubt2 = linear(a, b, right, 1, size, prefer[1])
+        return third, normalised(second), doubt | doubt2
+
+    def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+        """Joint 2 prismatic: g = y + d2 z."""
+        # known_k - rows_k . y, coefficients of (1, b1, b2)
+        across: list[list[Entry]] = (-self.rows @ self.Y).tolist()
+        for k in range(2):
+            across[k][0] = arrays.add(across[k][0], known[k])
+        z0, z1 = self.rows[:, 2].tolist()
+        if self.prismatic[0]:
+            # two equations linear in d2: eliminate it, then take it from the larger one
+            only = [arrays.sub(arrays.mul(z1, a), arrays.mul(z0, b)) for a, b in zip(*across, strict=True)]
+            third, doubt = self._one_unknown(only, size, prefer)
+            k = 0 if abs(z0) >= abs(z1) else 1
+            return third, Pair(_at(across[k], third) / float(self.rows[k, 2]), None), doubt
+        # |y|^2 / 2, for a revolute joint 3 affine in b: cos^2 and sin^2 have equal factors and no product
+        half = [self.square[0, 0] / 2, self.square[0, 1], self.square[0, 2]]
+        curved = self.square[1, 1] / 2
+        if not self.prismatic[2]:
+            half[0], curved = half[0] + curved, 0.0
+        half, curved = [float(v) for v in half], float(curved)
+        if not self.regular:
+            # the height does not feel d2: it gives joint 3, then the distance gives d2
+            third, doubt = self._one_unknown(across[0], size, prefer)
+            rest = arrays.sub(_at(across[1], third), _at(half, third))
+            if third.s is None:
+                rest = arrays.sub(rest, arrays.mul(curved, third.c * third.c))
+            # d^2 / 2 + (y_z + rows_z) d - rest = 0
+            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, 1e-300, None)
+            return third, Pair(d, None), doubt | doubt2
+        # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
+        d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
+        constant = [
+            arrays.add(arrays.sub(h, a), arrays.mul(z1, d)) for h, a, d in zip(half, across[1], d2, strict=True)
+        ]
+        factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
+        six = _sum([*constant, curved, 0.0, 0.0], _product(d2, factor))
+        if self.prismatic[2]:
+            d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
+            third = Pair(d, None)
+        else:
+            third, doubt = self._roots(six, size)
+        return third, Pair(_at(d2, third), None), doubt
+
+    def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Bool]:
+        """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
+        known, slope, other = coefficients
+        if self.prismatic[2]:
+            if abs(slope) < 1e-12:
+                raise UsageError("the three joints cannot place a point: they slide in one plane")
+            return Pair(arrays.mul(-1.0 / slope, known), None), np.zeros(1, bool)
+        third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])
+        return normalised(third), doubt
+
+
+def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
+    """``k0 + k1 b1 + k2 b2``, b2 the sine or, of a prismatic joint, that power of d: by default there is no b2."""
+    total = arrays.add(coefficients[0], arrays.mul(coefficients[1], third.c))
+    if third.s is not None:
+        return arrays.add(total, arrays.mul(coefficients[2], third.s))
+    return total if power == 1 else arrays.add(total, arrays.mul(coefficients[2], third.c * third.c))
+
+
+def _form(rows: Array) -> Array:
+    """The quadratic form G (3, 3) with ``b^T G b = |rows b|^2``."""
+    return np.asarray(rows.T @ rows)
+
+
+def _six(form: Array) -> Array:
+    """A symmetric 3 x 3 form in (1, b1, b2) as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
+    return np.array([form[0, 0], 2 * form[0, 1], 2 * form[0, 2], form[1, 1], 2 * form[1, 2], form[2, 2]])
+
+
+def _product(u: list[Entry], v: list[Entry]) -> list[Entry]:
+    """Product of two affine functions of (b1, b2), as six coefficients; what follows the first three is not read."""
+
+    def mixed(i: int, j: int) -> Entry:
+        return arrays.add(arrays.mul(u[i], v[j]), arrays.mul(u[j], v[i]))
+
+    return [
+        arrays.mul(u[0], v[0]),
+        mixed(0, 1),
+        mixed(0, 2),
+        arrays.mul(u[1], v[1]),
+        mixed(1, 2),
+        arrays.mul(u[2], v[2]),
+    ]
+
+
+def _sum(*terms: list[Entry]) -> list[Entry]:
+    total = terms[0]
+    for term in terms[1:]:
+        total = [arrays.add(a, b) for a, b in zip(total, term, strict=True)]
+    return total
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Any three joints that place a point."""
+    if task.name != "xyz" or arm.n != 3:
+        return None
+    if rank(arm, task) < 3:
+        raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance)
+    if position.close and tolerance == EXACT:
+        return None
+    kinds = "".join("P" if p else "R" for p in arm.prismatic)
+    why = f"{kinds}: {position.why}"
+
+    def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
+        return Candidates(*position.solve(goal, prefer))
+
+    # a quartic's roots come in no order
+    return Geometry("three joints", why, True, solve, ordered=not position.regular)

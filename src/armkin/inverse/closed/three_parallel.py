@@ -1,0 +1,162 @@
+"""Six revolute joints, axes 2, 3 and 4 parallel, axes 5 and 6 meeting: the UR arms and their kin.
+
+Joints 2, 3 and 4 keep the distance along their common direction n, and the angle between n
+and axis 6. The first gives joint 1, the second joint 5; joint 6 follows from n seen from
+the tool, and a planar arm of three joints with a known direction is left (Hawkins, Analytic
+Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, in coordinates of any
+convention). The chain walked from the tool to the base covers axes 3, 4 and 5.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array
+from armkin.formula.pose import Pose
+from armkin.inverse.closed.elbow import TwoLink
+from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Six revolute joints and a full pose."""
+    if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
+        return None
+    chain = Chain(arm.link, arm.prismatic)
+    if fits(chain, tolerance, arm.reach):
+        why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
+        labels = ("shoulder", "elbow", "wrist")
+        return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=labels)
+    chain = reverse(chain)
+    if not fits(chain, tolerance, arm.reach):
+        return None
+    solver = ThreeParallel(chain)
+
+    def solve(goal: Pose, prefer: Prefer) -> Candidates:
+        return solver.solve(pose.inverse(goal), prefer[::-1]).reversed()
+
+    return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
+
+
+def fits(chain: Chain, tolerance: float, reach: float) -> bool:
+    """Whether axes 2, 3 and 4 are parallel, axes 1 and 5 are not, and axes 5 and 6 meet."""
+    L1, L2, L3, L4, L5 = chain.link[1:6]
+    if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
+        return False
+    if any(is_parallel(L, max(tolerance, 1e-6)) for L in (L1, L4, L5)):
+        return False
+    return float(np.hypot(*_meeting(L5)[1])) <= tolerance * reach
+
+
+def _meeting(L5: Array) -> tuple[float, Array]:
+    """Height on axis 6 of its point nearest to axis 5, and that point's distance from axis 5 (2,)."""
+    t, b = L5[:2, 3], L5[:2, 2]
+    height = -float(t @ b) / float(b @ b)
+    return height, t + height * b
+
+
+class ThreeParallel:
+    """``link[0] Z1 ... Z6 link[6]`` with axes 2, 3, 4 parallel and axes 5, 6 meeting."""
+
+    def __init__(self, chain: Chain) -> None:
+        L1, L2, L3, L4, L5 = chain.link[1:6]
+        self.from_base = pose.constant(inverse(chain.link[0]))
+        self.from_tool = pose.constant(inverse(chain.link[6]))
+        self.shoulder = pose.constant(L1)
+        self.to_joint2 = pose.constant(inverse(L1))
+        self.back5, self.back4 = pose.constant(inverse(L5)), pose.constant(inverse(L4))
+        self.height6, _ = _meeting(L5)
+        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), 1e-9)
+        # common direction of the parallel axes, along joint 2's, seen from joint 5
+        self.sense3 = 1.0 if L2[2, 2] > 0 else -1.0
+        self.sense4 = self.sense3 * (1.0 if L3[2, 2] > 0 else -1.0)
+        m = self.sense4 * L4[2, :3]
+        b = L5[:3, 2]
+        # m . Rz(q5) b
+        self.cos5, self.sin5 = float(m[0] * b[0] + m[1] * b[1]), float(m[1] * b[0] - m[0] * b[1])
+        self.rest5 = float(m[2] * b[2])
+        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.m = [float(v) for v in m]
+        self.B = pose.constant(L5)
+        # distance along the common direction from joint 2 to the point where axes 5 and 6 meet
+        meeting = L5[:3, 3] + self.height6 * b
+        past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
+        R23 = L2[:3, :3] @ L3[:3, :3]
+        self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
+        self.height4 = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3])[2])
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
+        self.turned = [float(R23[0, 0]), float(R23[1, 0])]
+        fore = L2[:3, :3] @ L3[:3, 3]
+        self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
+
+    def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
+        """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
+        D = pose.times(pose.times(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
+        n, o = self.shoulder[6:9], self.shoulder[9:12]
+        g = arrays.combine(1.0, D[9:12], self.height6, D[6:9])
+        a = arrays.add(arrays.mul(n[0], g[0]), arrays.mul(n[1], g[1]))
+        b = arrays.sub(arrays.mul(n[0], g[1]), arrays.mul(n[1], g[0]))
+        rest = arrays.sub(self.along + arrays.dot(n, o), arrays.mul(n[2], g[2]))
+        first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+        c1, s1 = first
+        # n seen from joint 6
+        turned = [
+            arrays.sub(arrays.mul(c1, n[0]), arrays.mul(s1, n[1])),
+            arrays.add(arrays.mul(s1, n[0]), arrays.mul(c1, n[1])),
+            n[2],
+        ]
+        w = pose.turn_back(D, turned)
+        disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
+        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        c5, s5 = fifth
+        mx, my, mz = self.m
+        v = pose.turn_back(
+            self.B,
+            [
+                arrays.add(arrays.mul(c5, mx), arrays.mul(s5, my)),
+                arrays.sub(arrays.mul(c5, my), arrays.mul(s5, mx)),
+                mz,
+            ],
+        )
+        # Rz(-q6) v = w
+        sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5], disc)
+        # joint 4's frame seen from joint 2
+        X = pose.times(pose.rotate(D, sixth.c, -sixth.s), self.back5)
+        X = pose.times(pose.rotate(X, c5, -s5), self.back4)
+        p = pose.apply(self.to_joint2, _unrotate(c1, s1, X[9:12]))
+        x = pose.turn(self.to_joint2, _unrotate(c1, s1, X[0:3]))
+        second, third, doubt23 = self.two_link.solve(p[0], p[1], prefer[1], prefer[2])
+        # x = Rz(q2 +- q3 +- q4) turned
+        tx, ty = self.turned
+        c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
+        c23, s23 = _together(second, third, self.sense3)
+        fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
+        doubt = doubt1 | doubt5 | doubt6 | doubt23
+        # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
+        # common direction; about that joint 4 takes whatever angle is left
+        reached = spin(*second, self.two_link.reach(third))
+        miss = distance2(reached, p[:2]) + (p[2] - self.height4) ** 2
+        miss = miss * (1.0 / self.reach**2)
+        along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
+        miss = miss + distance2(along, [0.0, 0.0, self.sense4])
+        return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
+
+
+def _together(first: Pair, second: Pair, sense: float) -> Pair:
+    """Two angles about one direction: their sum, or with sense -1 their difference."""
+    s2 = arrays.mul(sense, second.s)
+    return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
+
+
+def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
+    """``Rz(-q) v``."""
+    return [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]

@@ -1,0 +1,111 @@
+"""Fifteen numbers of a line on which every rigid motion acts linearly.
+
+For a point ``p`` and a unit direction ``l`` of a line let
+
+    f(p, l) = [p, l, p.p, p.l, p x l, (p.p) l - 2 (p.l) p, 1].
+
+The first fourteen are the functions whose equations Raghavan and Roth (1990, "Kinematic analysis of
+the 6R manipulator of general geometry") equate; with the constant they span a space that rigid
+motions map to itself:
+
+    f(R p + t, R l) = Rep(R, t) f(p, l),     Rep(X Y) = Rep(X) Rep(Y),
+
+so that no trigonometric expansion ever has to be written down.  A joint's Rep is an affine function
+of two numbers ``(b1, b2)``: ``(cos q, sin q)`` if it is revolute, ``(q, q^2)`` if it is prismatic:
+
+    Rep(J(q)) = U0 + U1 b1(q) + U2 b2(q).
+"""
+
+from functools import cache
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+
+SIZE = 15
+_P, _L, _PP, _PL, _M, _W, _ONE = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11), slice(11, 14), 14
+
+Z_AXIS: Array = np.zeros(SIZE)
+"""f(o, z): the features of a frame's own z axis (point 0, direction e3)."""
+Z_AXIS[[5, _ONE]] = 1.0
+
+
+def features(p: Array, direction: Array) -> Array:
+    """Features of the lines through ``p`` (..., 3) with unit ``direction`` (..., 3), as (..., 15).
+
+    >>> features(np.array([1.0, 2, 3]), np.array([0.0, 0, 1]))[6:8]      # p.p and p.l
+    array([14.,  3.])
+    """
+    out = np.empty((*p.shape[:-1], SIZE))
+    square = np.sum(p * p, axis=-1)
+    along = np.sum(p * direction, axis=-1)
+    out[..., _P] = p
+    out[..., _L] = direction
+    out[..., _PP] = square
+    out[..., _PL] = along
+    out[..., _M] = np.cross(p, direction)
+    out[..., _W] = square[..., None] * direction - 2 * along[..., None] * p
+    out[..., _ONE] = 1.0
+    return out
+
+
+def rep(motion: Array) -> Array:
+    """The 15 x 15 matrices by which rigid motions (..., 4, 4) act on line features.
+
+    The rows are the transformation laws of p, l, p.p, p.l, the moment m = p x l and
+    w = (p.p) l - 2 (p.l) p:
+
+        p.p' = p.p + 2 t.Rp + t.t        p.l' = p.l + t.Rl        m' = R m + t x R l
+        w'   = R w - 2 t x R m + (t.t R - 2 t t^T R) l - 2 t (p.l)
+    """
+    R, t = motion[..., :3, :3], motion[..., :3, 3]
+    out = np.zeros((*motion.shape[:-2], SIZE, SIZE))
+    t_R = np.matmul(t[..., None, :], R)[..., 0, :]
+    t_t = np.sum(t * t, axis=-1)
+    cross_R = np.empty_like(R)  # [t]x R, row by row
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        cross_R[..., i, :] = t[..., j, None] * R[..., k, :] - t[..., k, None] * R[..., j, :]
+    out[..., _P, _P] = out[..., _L, _L] = out[..., _M, _M] = out[..., _W, _W] = R
+    out[..., _P, _ONE] = t
+    out[..., _PP, _P] = 2 * t_R
+    out[..., _PP, _ONE] = t_t
+    out[..., _PP, _PP] = out[..., _PL, _PL] = out[..., _ONE, _ONE] = 1.0
+    out[..., _PL, _L] = t_R
+    out[..., _M, _L] = cross_R
+    out[..., _W, _M] = -2 * cross_R
+    out[..., _W, _L] = t_t[..., None, None] * R - 2 * t[..., :, None] * t_R[..., None, :]
+    out[..., _W, _PL] = -2 * t
+    return out
+
+
+def joint_motion(prismatic: bool, q: float) -> Array:
+    """Z(q): a turn of q [rad] about z, or a shift of q along z, as a (4, 4) matrix."""
+    out = np.eye(4)
+    if prismatic:
+        out[2, 3] = q
+    else:
+        c, s = np.cos(q), np.sin(q)
+        out[:2, :2] = [[c, -s], [s, c]]
+    return out
+
+
+@cache
+def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
+    """``[U0, U1, U2]`` (3, 15, 15) of a joint, or of its inverse motion, read-only.
+
+    Found by sampling: a revolute joint at 0, 120 and 240 degrees, a prismatic one at -1, 0 and 1.
+    """
+    if prismatic:
+        back, rest, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
+        U: Array = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
+        odd = 1  # the coefficient that changes its sign with q
+    else:
+        angles = 2 * np.pi / 3 * np.arange(3)
+        samples = np.stack([rep(joint_motion(False, angle)) for angle in angles])
+        weights = np.stack([np.full(3, 1 / 3), 2 / 3 * np.cos(angles), 2 / 3 * np.sin(angles)])
+        U = np.einsum("uk,kij->uij", weights, samples)
+        odd = 2
+    if inverse:
+        U[odd] *= -1
+    U.flags.writeable = False
+    return U

@@ -1,0 +1,125 @@
+"""One row a branch: equal answers merged, the rest sorted and packed by pose."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.elimination.polish import pose_error, tip
+
+Int = NDArray[np.int64]
+
+SAME = 1e-6  # answers closer than this [rad, scaled length] are one
+NEAR = 1e-2  # answers closer than this are examined
+EXACT = 1e-13  # residual of a point halfway between two answers that makes them one
+WEAK = 1e4  # |J^-1| from which on an answer is near a singularity
+MOST = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
+
+# A projection of the joint circles that tells different answers apart: it orders a pose's answers, the
+# same way every time, and shows which of them can be equal.
+_WEIGHTS: Array = np.random.default_rng(11).uniform(-1, 1, (2, 6))
+
+
+class Answers(NamedTuple):
+    """Exact solutions of many poses, in any order.
+
+    pose: (M,).  q: (M, 6) wrapped, scaled.  residual: (M,).  weakness: (M,) norm of the inverse Jacobian.
+    """
+
+    pose: Int
+    q: Array
+    residual: Array
+    weakness: Array
+
+    def take(self, index: Int | Bool) -> "Answers":
+        """Some of the answers, by index or mask."""
+        return Answers(self.pose[index], self.q[index], self.residual[index], self.weakness[index])
+
+
+def concatenate(parts: list[Answers]) -> Answers:
+    """All answers of several sets."""
+    return Answers(
+        np.concatenate([part.pose for part in parts]),
+        np.concatenate([part.q for part in parts]),
+        np.concatenate([part.residual for part in parts]),
+        np.concatenate([part.weakness for part in parts]),
+    )
+
+
+def projection(prismatic: Bool, q: Array) -> Array:
+    """One number for each joint vector (M, 6), equal for equal poses of the joints, else hardly ever."""
+    cosine, sine = np.where(prismatic, q, np.cos(q)), np.where(prismatic, q, np.sin(q))
+    return np.asarray(cosine @ _WEIGHTS[0] + sine @ _WEIGHTS[1])
+
+
+def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple[Answers, Bool]:
+    """Sort answers by pose and keep one of each set of equal ones.
+
+    Two answers are one if the point halfway between them is an answer too, to the accuracy that both
+    have, or if one lies within the other's uncertainty: the radius is 1e-6 where the Jacobian is good
+    and grows like residual / sigma_min, up to the root of the residual, where it is weak.  Two real roots
+    near a fold stay apart: halfway, the pose is off by the square of their distance.
+
+    Args:
+        chain, prismatic: (7, 4, 4) and (6,), scaled.
+        goal: (N, 4, 4) poses.
+        answers: to be merged.
+
+    Returns:
+        The answers that stay, poses ascending, and for each pose (N,) whether two answers further apart
+        than rounding explains were merged.
+    """
+    key = projection(prismatic, answers.q)
+    order = np.lexsort((key, answers.pose))
+    key, answers = key[order], answers.take(order)
+    pose, q, residual = answers.pose, answers.q, answers.residual
+    keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
+    widest = float(np.abs(_WEIGHTS).sum()) * NEAR
+    for gap in range(1, pose.size):
+        first = np.flatnonzero((pose[gap:] == pose[:-gap]) & (key[gap:] - key[:-gap] < widest))
+        if first.size == 0:
+            break
+        second = first + gap
+        step = q[second] - q[first]
+        step = np.where(prismatic, step, step - 2 * np.pi * np.round(step / (2 * np.pi)))
+        distance = np.abs(step).max(axis=1)
+        near = np.flatnonzero((distance < NEAR) & keep[first] & keep[second])
+        if near.size == 0:
+            continue
+        first, second, step, distance = first[near], second[near], step[near], distance[near]
+        target = np.ascontiguousarray(np.moveaxis(goal[pose[first], :3], 0, -1))
+        _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
+        blur = np.maximum(EXACT, 4 * np.maximum(residual[first], residual[second]))
+        # How far off an answer may be itself: its next Newton step, along a valley that may well be curved.
+        radius = 3 * answers.weakness * residual
+        reach = np.maximum(radius[first], radius[second])
+        same = (distance < np.maximum(SAME, reach)) | (halfway < blur)
+        worse = residual[second] > residual[first]
+        keep[np.where(worse, second, first)[same]] = False
+        merged[pose[first[same & (distance > 1e-2 * SAME)]]] = True
+    return answers.take(keep), merged
+
+
+def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
+    """Answers, poses ascending, as (N, B, 6) with NaN past a pose's last one; and the doubtful poses (N,).
+
+    Doubtful are poses with an answer near a singularity or with more answers than can be isolated; of
+    these the 16 furthest from singularities are given.
+    """
+    number = np.bincount(answers.pose, minlength=count)
+    doubtful = number > MOST
+    doubtful[answers.pose[answers.weakness > WEAK]] = True
+    if number.max(initial=0) > MOST:
+        rank = np.empty(answers.pose.size, dtype=np.int64)
+        rank[np.lexsort((answers.weakness, answers.pose))] = _column(number)
+        answers, number = answers.take(rank < MOST), np.minimum(number, MOST)
+    q = np.full((count, int(number.max(initial=0)), 6), np.nan)
+    q[answers.pose, _column(number)] = answers.q
+    return q, doubtful
+
+
+def _column(number: Int) -> Int:
+    """0, 1, .. for each of the runs of lengths ``number`` (N,)."""
+    end = np.cumsum(number)
+    return np.arange(int(number.sum()), dtype=np.int64) - np.repeat(end - number, number)

@@ -1,0 +1,305 @@
+"""General 6-joint inverse kinematics by numeric elimination: every isolated branch of any 6R, 5R1P, 4R2P.
+
+The method.  Closing the chain over the pose and cutting it at two joints gives fourteen equations that are
+linear in products of the joints' sines and cosines (Raghavan and Roth 1990, "Kinematic analysis of the 6R
+manipulator of general geometry"; here by the features of `line_features`, in which rigid motions
+are matrices).  Two joints are eliminated by a null space, two by the dialytic step, and the last one is the
+eigenvalue of a matrix pencil (Manocha and Canny 1994, "Efficient inverse kinematics for general 6R
+manipulators") of size 12 to 24: `pencil`.  Every candidate is then moved onto the true chain by
+Newton's method; what does not close the chain to 1e-10 is no answer.
+
+Why the answers are complete.
+(i) Every solution satisfies (2) = (3) of `pencil`, for these are features of the same line.
+(ii) N left = 0, the dialytic products and the linearisation are consequences of that: they may add roots but
+lose none, so every solution is a real eigenvalue x with its v as eigenvector, whatever the offset psi, unless
+x is infinite.
+(iii) If the pencil is regular all its eigenvalues are computed, backward stably; each gives its joints if its
+eigenspace has dimension one.
+(iv) Regularity depends on the arm: a pair of parallel axes makes most roles identically singular.  `prepare`
+measures it on random poses, and only roles that give their generating joints back are used.
+(v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
+rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
+roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none.
+Such a pose is solved again, with another offset, other hidden joints, and moved by 1e-6 to 1e-3: an isolated
+solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
+longer.  This goes on until a pass shows none of these, or seven are done; all passes' answers count.
+Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
+the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
+self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
+
+Three prismatic joints leave the orientation to the three others: `slides`, in closed form.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.elimination import closed_loop, roots, slides
+from armkin.inverse.elimination.closed_loop import Loop
+from armkin.inverse.elimination.merge import Answers, concatenate, merge, pack, projection
+from armkin.inverse.elimination.pencil import Pencil, build
+from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
+from armkin.inverse.elimination.walks import Role, roles
+from armkin.model.rotation import inverse
+
+Int = NDArray[np.int64]
+
+CHUNK = 256  # poses worked on at once: more of them leave the cache
+BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
+ACCEPTED = 1e-10  # residual of an answer, lengths scaled
+TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
+PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
+TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
+SHAKES = (0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
+SAMPLES = 11  # random poses on which roles are compared
+# log10 of a role's raw error: nothing better needed, good enough, unfit
+EXCELLENT, HEALTHY, USELESS = -9.5, -8.0, -5.0
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """A 6-joint chain prepared for `solve`: read-only, so that threads may share it.
+
+    loop: the scaled chain.  plans: the pencils of the main pass and of the passes for poses that it leaves
+    open; none if three joints are prismatic.  score: log10 of the main pencil's raw error.
+    """
+
+    loop: Loop
+    plans: tuple[Pencil, ...]
+    score: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether the completeness argument of the module's text holds: a regular pencil was found."""
+        return self.score < HEALTHY
+
+
+def prepare(link: Array, prismatic: Bool) -> Elimination:
+    """Choose how to walk a chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]``.
+
+    Args:
+        link: (7, 4, 4) [mm].
+        prismatic: (6,): Z is a shift along z instead of a turn about it.
+    """
+    closed = closed_loop.close(link, prismatic)
+    if np.sum(prismatic) >= 3:
+        return Elimination(closed, (), -np.inf)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
+    q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
+    frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    goal = np.tile(np.eye(4), (SAMPLES, 1, 1))
+    goal[:, :3] = np.moveaxis(frame, -1, 0)
+    size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
+    # Collinear axes, say: no solution is isolated and no role can do better.
+    redundant = bool(np.all(size[:, -1] < 1e-9))
+    rated: list[_Rating] = []
+    # The first slots nearly always do; some arms with two prismatic joints need the others.
+    for slot, hidden in _SEARCH:
+        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
+        if _enough(rated, redundant, len(hidden) > 1):
+            break
+    rated.sort(key=lambda rating: rating.cost)
+    best = rated[0].pencil
+    others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
+    # Equal roots of one joint are rarely equal in another: hide another joint early.
+    hidden_joint = best.hidden_joint
+    others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
+    again = build(best.role, closed.links, closed.prismatic, PSI[1])
+    plans = [best, *others[:1], again, *others[1:]]
+    while len(plans) < len(SHAKES):
+        plans.append(plans[-2])
+    return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0].error)
+
+
+class _Rating(NamedTuple):
+    """How well a role does on an arm: the raw error is the 90th percentile of log10 over random poses."""
+
+    cost: float
+    error: float
+    pencil: Pencil
+
+
+# Where the pose is carried (slot of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
+_SEARCH: list[tuple[int, tuple[int, ...]]] = [
+    *((slot, (0,)) for slot in (1, 0, 5)),
+    *((slot, (1, 2)) for slot in (1, 0, 5)),
+    *((slot, (0, 1, 2)) for slot in (2, 3, 4)),
+]
+
+
+def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
+    """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
+    quick ones are all known, any that is healthy."""
+    sound = [rating for rating in rated if rating.error < EXCELLENT and rating.pencil.size <= 16]
+    if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
+        return True
+    tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
+    return tried_all and (redundant or any(rating.error < HEALTHY for rating in rated))
+
+
+def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
+    """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
+    pencil = build(role, closed.links, closed.prismatic, PSI[0])
+    first, spurious = _raw_error(pencil, closed, q[:3], goal[:3])
+    if np.median(first) > 1e-2:  # a role that the arm makes singular loses every pose: no need to try more
+        return _Rating(20.0 + pencil.size, 0.0, pencil)
+    rest, more = _raw_error(pencil, closed, q[3:], goal[3:])
+    error = float(np.quantile(np.log10(np.concatenate([first, rest]) + 1e-16), 0.9))
+    # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
+    cost = 0.15 * pencil.size + 4 * float(np.mean([*spurious, *more])) - 0.5 * (role.slot == 1)
+    return _Rating(max(error, -11.0) + cost, error, pencil)
+
+
+def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
+    """Distance of the nearest candidate before any Newton step, and whether there are real roots that solve
+    nothing, both (N,)."""
+    found = roots.seeds(pencil, inverse(goal), TILT[0])
+    difference = np.abs(found.q - q[found.pose])
+    turned = np.abs(np.mod(difference + np.pi, 2 * np.pi) - np.pi)
+    distance = np.where(closed.prismatic, difference, turned).max(axis=1, initial=0.0)
+    nearest = np.ones(q.shape[0])
+    np.minimum.at(nearest, found.pose, distance)
+    target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
+    spurious = found.rough.copy()
+    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > 1e-3)]] = True
+    return nearest, spurious
+
+
+def solve(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
+    """All isolated branches of many targets.
+
+    Args:
+        elimination: from `prepare`.
+        T: (N, 4, 4) targets [mm].
+
+    Returns:
+        q: (N, B, 6) [rad in (-pi, pi] | mm], sorted by a fixed projection, NaN past a target's last branch;
+        B is the largest number of branches, at most 16.
+        doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
+        answers that were merged across more than rounding, or with two roots that just touch or just miss.
+    """
+    count = T.shape[0]
+    parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
+    q = np.full((count, max((part.shape[1] for part, _ in parts), default=0), 6), np.nan)
+    doubtful = np.zeros(count, dtype=np.bool_)
+    for number, (branches, doubt) in enumerate(parts):
+        rows = slice(number * BLOCK, number * BLOCK + len(doubt))
+        q[rows, : branches.shape[1]], doubtful[rows] = branches, doubt
+    return q, doubtful
+
+
+def _solve_block(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
+    """`solve` for as many targets as one should keep intermediate results of."""
+    closed, count = elimination.loop, T.shape[0]
+    finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
+    goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
+    if not elimination.plans:
+        answers, touching = _slides(closed, goal)
+    else:
+        answers, touching = _passes(elimination, goal)
+    # A closest point stands in for answers only where there are none.
+    exact = answers.residual < ACCEPTED
+    answered = np.bincount(answers.pose[exact], minlength=count) > 0
+    answers = answers.take((exact | ~answered[answers.pose]) & finite[answers.pose])
+    answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
+    q, weak = pack(answers, count)
+    q *= np.where(closed.prismatic, closed.length, 1.0)
+    return q, (weak | merged | touching) & finite
+
+
+def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
+    """Answers of all passes, each over the poses that the last one left open; and touching pairs (N,)."""
+    found = []
+    touching = np.zeros(goal.shape[0], dtype=np.bool_)
+    open_poses = np.arange(goal.shape[0])
+    for number, pencil in enumerate(elimination.plans):
+        still = np.zeros(open_poses.size, dtype=np.bool_)
+        for begin in range(0, open_poses.size, CHUNK):
+            part = open_poses[begin : begin + CHUNK]
+            answers, unsettled, touch = _attempt(elimination.loop, pencil, goal[part], number)
+            found.append(answers._replace(pose=part[answers.pose]))
+            still[begin : begin + CHUNK] = unsettled
+            touching[part] |= touch
+        open_poses = open_poses[still]
+        if open_poses.size == 0:
+            break
+    return concatenate(found) if found else _none(), touching
+
+
+def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool]:
+    """Answers of one pass for goals (N, 4, 4), the poses it leaves open and those with touching roots."""
+    careful, shake = number > 0, SHAKES[number]
+    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful])
+    target = goal[seed.pose]
+    if careful:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
+    else:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
+    good = done.residual < (TOUCHING if careful else ACCEPTED)
+    unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
+    # A complex pair that steps brought near the pose may be a real one, seen through rounding.
+    missed = ~good & ((seed.tilt < 1e-4) | (done.residual < (1e-5 if careful else 1e-3)))
+    touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
+    # A move of the pose may turn two close real roots into such a pair.
+    unsure = good & (seed.tilt > 0) & (seed.tilt < 1e-4 + 10 * np.sqrt(shake))
+    # A real root that was far from the answer it led to may have stood for another one.
+    strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
+    unsettled[seed.pose[missed | unsure | strayed]] = True
+    touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
+    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
+    # and if the two answers are not the same.
+    answers = _answers(closed, seed.pose, done, good)
+    hidden, blurred = seed.hidden[good], done.guess[good] > 1e-5 + 10 * shake
+    order = np.lexsort((hidden, answers.pose))
+    close = (np.diff(answers.pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
+    close &= blurred[order][1:] | blurred[order][:-1]
+    unsettled[answers.pose[order][1:][close]] = True
+    key = projection(closed.prismatic, answers.q)
+    order = np.lexsort((key, answers.pose))
+    twice = (np.diff(answers.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
+    unsettled[answers.pose[order][1:][twice]] = True
+    return answers, unsettled, touching
+
+
+def _shaken(goal: Array, size: float) -> Array:
+    """Goals (N, 4, 4) moved a little, in a direction that no arm is made for."""
+    if size == 0:
+        return goal
+    x, y, z = size * np.array([0.61, -0.49, 0.63])
+    spin = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    move = np.eye(4)
+    move[:3, :3] = np.linalg.solve(np.eye(3) - spin / 2, np.eye(3) + spin / 2)  # Cayley: a rotation
+    move[:3, 3] = size * np.array([-0.53, 0.57, 0.47])
+    return np.asarray(move @ goal)
+
+
+def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
+    """Both answers of a chain with three prismatic joints."""
+    found, touching = [_none()], np.zeros(goal.shape[0], dtype=np.bool_)
+    if np.sum(closed.prismatic) > 3:
+        return found[0], touching
+    for begin in range(0, goal.shape[0], CHUNK):
+        part = goal[begin : begin + CHUNK]
+        q = slides.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
+        pose = np.repeat(np.arange(part.shape[0]), 2)
+        done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
+        good = done.residual < TOUCHING
+        touching[begin + pose[good & (done.residual > ACCEPTED)]] = True
+        found.append(_answers(closed, begin + pose, done, good))
+    return concatenate(found), touching
+
+
+def _answers(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
+    """The good ones, their revolute joints wrapped to (-pi, pi]."""
+    wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
+    return Answers(pose, wrapped, done.residual, done.weakness).take(good)
+
+
+def _none() -> Answers:
+    """No answers."""
+    return Answers(np.empty(0, dtype=np.int64), np.empty((0, 6)), np.empty(0), np.empty(0))

@@ -1,0 +1,173 @@
+"""Newton and Levenberg-Marquardt on the full pose, for many candidates at once.
+
+Candidates live in the last axis (structure of arrays): a frame is a (3, 4, M) block of its rotation's
+columns and its origin, so that a constant link is one matrix product and a joint six vector operations.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.linalg import nudged
+
+LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
+CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower
+
+
+class Polished(NamedTuple):
+    """What `refine` returns.
+
+    q: (M, 6) best points met.  residual: (M,) there, guess: (M,) at the start.
+    weakness: (M,) Frobenius norm of the last inverse Jacobian, about 1 / its smallest singular value.
+    """
+
+    q: Array
+    residual: Array
+    guess: Array
+    weakness: Array
+
+
+def turn(frame: Array, q: Array, prismatic: bool) -> Array:
+    """``frame @ Z(q)`` for blocks (3, 4, M) and joint values (M,)."""
+    out = np.empty_like(frame)
+    if prismatic:
+        out[:, :3] = frame[:, :3]
+        out[:, 3] = frame[:, 3] + q * frame[:, 2]
+        return out
+    c, s = np.cos(q), np.sin(q)
+    x, y = frame[:, 0], frame[:, 1]
+    out[:, 0] = c * x + s * y
+    out[:, 1] = c * y - s * x
+    out[:, 2:] = frame[:, 2:]
+    return out
+
+
+def advance(frame: Array, link: Array) -> Array:
+    """``frame @ link`` for blocks (3, 4, M) and one (4, 4) link, or one link a candidate (4, 4, M)."""
+    out: Array = np.matmul(link.T, frame) if link.ndim == 2 else np.einsum("ikm,kjm->ijm", frame, link)
+    return out
+
+
+def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, list[Array]]:
+    """The last frame (3, 4, M) for joint values (6, M), and every joint's frame before it turns."""
+    frame = np.repeat(link[0, :3, :, None], q.shape[1], axis=2)
+    joints = []
+    for i in range(q.shape[0]):
+        joints.append(frame)
+        frame = advance(turn(frame, q[i], bool(prismatic[i])), link[i + 1])
+    return frame, joints
+
+
+def pose_error(frame: Array, goal: Array) -> tuple[Array, Array]:
+    """What leads from frames (3, 4, M) to goals: (6, M) linear rows first; and the Frobenius norm (M,).
+
+    The rotation vector is half the sum of the columns' cross products (Luh, Walker & Paul 1980).
+    """
+    difference = goal - frame
+    error = np.empty((6, frame.shape[2]))
+    error[:3] = difference[:, 3]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        error[3 + i] = 0.5 * (frame[j, :3] * goal[k, :3] - frame[k, :3] * goal[j, :3]).sum(axis=0)
+    return error, np.sqrt(np.einsum("ijm,ijm->m", difference, difference))
+
+
+def jacobian(frame: Array, joints: list[Array], prismatic: Bool) -> Array:
+    """Jacobians (M, 6, 6) in the base's axes, from the frames that `tip` returns."""
+    out = np.empty((frame.shape[2], 6, len(joints)))
+    for i, joint in enumerate(joints):
+        axis = joint[:, 2]
+        if prismatic[i]:
+            out[:, :3, i], out[:, 3:, i] = axis.T, 0.0
+            continue
+        arm = frame[:, 3] - joint[:, 3]
+        out[:, 3:, i] = axis.T
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            out[:, x, i] = axis[y] * arm[z] - axis[z] * arm[y]
+    return out
+
+
+def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False) -> Polished:
+    """Newton steps (Levenberg-Marquardt ones if ``damped``), keeping the best point met.
+
+    Args:
+        link, prismatic: the chain, scaled to about unit length.
+        q: (M, 6) first guesses, scaled.
+        goal: (M, 4, 4), scaled.
+        steps: at most so many steps; candidates that have converged drop out.
+        damped: damp all but the last two steps by the residual, for poor guesses and weak Jacobians.
+    """
+    count = q.shape[0]
+    value = np.ascontiguousarray(q.T)
+    target = np.ascontiguousarray(np.moveaxis(goal[:, :3], 0, -1))
+    best, residual = value.copy(), np.full(count, np.inf)
+    weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
+    active, last = np.arange(count), np.zeros(count)
+    for step in range(steps + 1):
+        frame, joints = tip(link, prismatic, value)
+        error, size = pose_error(frame, target)
+        if step == 0:
+            guess = size
+        better = size < residual[active]
+        index = active[better]
+        best[:, index], residual[index] = value[:, better], size[better]
+        # While the residual falls steeply the last inverse Jacobian is good for one more step.
+        stale = np.flatnonzero((size > 1e-3 * last) & (size > CONVERGED)) if step else active
+        last = size
+        if stale.size:
+            chosen = slice(None) if stale.size == active.size else stale
+            square = jacobian(frame[..., chosen], [joint[..., chosen] for joint in joints], prismatic)
+            fresh = nudged(np.linalg.inv, square)
+            index = active[chosen]
+            weakness[index] = np.sqrt(np.einsum("mij,mij->m", fresh, fresh))
+            if damped and step < steps - 2:
+                transposed = np.swapaxes(square, 1, 2)
+                damping = size[chosen] * np.minimum(size[chosen], 1.0)
+                normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
+                fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
+            inverse[index] = fresh
+        going = np.flatnonzero(size > CONVERGED)
+        if step == steps or going.size == 0:
+            break
+        if going.size < active.size:
+            active, value, target = active[going], value[:, going], target[..., going]
+            error, last = error[:, going], last[going]
+        move = np.matmul(inverse[active], error.T[:, :, None])[:, :, 0].T
+        longest = np.abs(move).max(axis=0)
+        move[:, ~np.isfinite(longest)] = 0.0  # the inverse of an all but singular Jacobian has overflown
+        value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
+    return Polished(best.T, residual, guess, weakness)
+
+
+def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False) -> tuple[Array, Array]:
+    """Move approximate solutions of a 6-joint chain onto their targets.
+
+    Args:
+        link: (7, 4, 4) the chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]`` [mm].
+        prismatic: (6,).
+        q: (M, 6) first guesses [rad | mm].
+        T: (M, 4, 4) targets [mm].
+        steps: at most so many Newton steps.
+        damped: Levenberg-Marquardt instead, for guesses that are far away or near a singularity.
+
+    Returns:
+        The best point met by each guess, (M, 6) [rad | mm, not wrapped], and its residual (M,): the
+        Frobenius norm of the pose difference, lengths divided by the sum of the links' lengths.
+    """
+    length = reach(link)
+    unit = np.where(prismatic, length, 1.0)
+    found = refine(shrink(link, length), prismatic, q / unit, shrink(T, length), steps, damped)
+    return found.q * unit, found.residual
+
+
+def reach(link: Array) -> float:
+    """Sum of the lengths of the links between and after the joints [mm], 300 if all are zero."""
+    total = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum())
+    return total if total > 0 else 300.0
+
+
+def shrink(motion: Array, length: float) -> Array:
+    """Motions (..., 4, 4) with their translations divided by ``length``."""
+    out = motion.copy()
+    out[..., :3, 3] /= length
+    return out

@@ -1,0 +1,141 @@
+"""The roots of a pose's pencil, and the six joint values that each of them stands for.
+
+See `pencil` for the symbols.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.elimination import line_features
+from armkin.inverse.elimination.end_joints import eliminate
+from armkin.inverse.elimination.pencil import Pencil
+from armkin.inverse.elimination.polish import advance, turn
+from armkin.inverse.numeric.linalg import nudged
+from armkin.model.rotation import inverse
+
+Int = NDArray[np.int64]
+
+FAR = 1e4  # a prismatic value [scaled] that is a root at infinity, seen through rounding
+
+
+class Seeds(NamedTuple):
+    """Approximate real solutions of many poses, one row a candidate, poses ascending.
+
+    pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
+    tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
+    """
+
+    pose: Int
+    q: Array
+    hidden: Array
+    tilt: Array
+    rough: Bool
+
+
+def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
+    """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``."""
+    Y = inverse(X) if pencil.role.backward else X
+    equations, recover = _equations(pencil, Y)
+    lead = pencil.W.shape[0]
+    G = nudged(np.linalg.solve, equations[:, :, :lead], equations[:, :, lead:])
+    rough = np.abs(G).max(axis=(1, 2)) > 1e6
+    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
+    companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
+    companion[:, :12] = -G
+    companion[:, 12:, 2 * r : 12] = np.eye(w)
+    roots, vectors = np.linalg.eig(companion)
+    tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
+    pose, which = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
+    x = roots[pose, which].real
+    # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
+    # pair of roots that almost touch.
+    middle = _middle_joints(pencil, x, vectors.real[pose, :, which])
+    near = np.flatnonzero((np.abs(middle) < FAR).all(axis=0))
+    if near.size < pose.size:
+        pose, which, middle = pose[near], which[near], middle[:, near]
+    a, b, e = _other_joints(pencil, middle, Y, pose, recover)
+    q = np.empty((pose.size, 6))
+    for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
+        q[:, joint] = -value if pencil.role.backward else value
+    return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough)
+
+
+def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
+    """The twelve rows of (4), (N, 12, c), and the factors (N or 1, 5, 15) of back substitution."""
+    N, recover = eliminate(pencil.ends, Y)
+    if pencil.role.at_an_end:
+        rows = N @ pencil.columns
+    else:
+        rows = pencil.left @ line_features.rep(Y)
+        if pencil.right.size:
+            rows = (rows @ pencil.right).reshape(Y.shape[0], -1, 27)
+        rows = rows @ pencil.columns
+    rows = rows.reshape(Y.shape[0], 2 * rows.shape[1], -1)
+    return (rows if pencil.mix is None else pencil.mix @ rows), recover
+
+
+def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
+    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size)."""
+    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
+    a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
+    x = x[:, None]
+    large = np.abs(x) > 1
+    flat = np.where(large, y / np.where(large, x, 1.0), low)  # y = x w: take the safer one
+    v = flat @ pencil.W.T
+    if r:
+        square = x * x + 1
+        v += ((a1 * x + a2) / square) @ pencil.K_re.T - ((a1 - a2 * x) / square) @ pencil.K_im.T
+    v = v.reshape(-1, 4, 3)
+    row = np.arange(v.shape[0])
+    size = v * v
+    four = v[row, :, size.sum(axis=1).argmax(axis=1)]
+    three = v[row, size.sum(axis=2).argmax(axis=1)]
+    hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
+    value = np.empty((3, v.shape[0]))
+    if pencil.prismatic[hidden]:
+        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x[:, 0]) < 1e-100, 1e-100, x[:, 0])
+    else:
+        value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x[:, 0])
+    if pencil.prismatic[dialytic]:
+        value[pencil.role.dialytic] = _ratio(four)
+    else:
+        value[pencil.role.dialytic] = 2 * np.arctan2(four[:, 3], four[:, 2])
+    if pencil.prismatic[third]:
+        value[pencil.role.third] = _ratio(three)
+    else:
+        sign = np.where(three[:, 0] < 0, -1.0, 1.0)
+        value[pencil.role.third] = np.arctan2(sign * three[:, 2], sign * three[:, 1])
+    return value
+
+
+def _ratio(powers: Array) -> Array:
+    """q from multiples of (1, q, q^2, ..) (M, k): the least-squares quotient of neighbours."""
+    below = powers[:, :-1]
+    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), 1e-300)
+    return out
+
+
+def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: Array) -> tuple[Array, Array, Array]:
+    """Values of a, b and e once the middle joints (3, M) are known."""
+    links: list[Array] = list(pencil.links)
+    links[pencil.role.slot] = np.ascontiguousarray(np.moveaxis(Y[pose], 0, -1))
+    is_a, is_b = bool(pencil.prismatic[0]), bool(pencil.prismatic[1])
+    start = np.repeat(np.eye(3, 4)[:, :, None], pose.size, axis=2)
+    A = advance(start, links[1])
+    for i in range(3):
+        A = advance(turn(A, middle[i], bool(pencil.prismatic[2 + i])), links[2 + i])
+    feature = line_features.features(A[:, 3].T, A[:, 2].T)
+    factors = recover[pose] if recover.shape[0] > 1 else recover
+    one, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
+    sign = np.where(one < 0, -1.0, 1.0)
+    safe = np.where(np.abs(one) < 1e-300, 1.0, one)
+    a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
+    b = b1 / safe if is_b else np.arctan2(sign * b2, sign * b1)
+    before = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)
+    # before @ A = Je^-1, a turn by -e about z
+    sine = np.sum(before[0, :3] * A[:, 1] - before[1, :3] * A[:, 0], axis=0)
+    cosine = np.sum(before[0, :3] * A[:, 0] + before[1, :3] * A[:, 1], axis=0)
+    return a, b, np.arctan2(sine, cosine)

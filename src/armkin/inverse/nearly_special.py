@@ -1,0 +1,192 @@
+"""Arms that miss a class by a little: rounded tables, calibrated axes, links that were meant to be zero.
+
+The closed form of the class that such an arm almost belongs to gives seeds, which Newton's
+method moves onto the true arm. Branches continue each other as long as no singularity lies
+between the two arms: where those of the similar arm move too much, appear or vanish as the
+target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
+then go to the elimination, which needs no special class; for fewer, the similar arm's branches
+at the targets around give more seeds. There is no proof that nothing is lost in between,
+hence `complete` is False.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk
+from armkin.inverse import general
+from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
+from armkin.inverse.closed.candidates import Recorded, recorded
+from armkin.inverse.closed.geometry import NEAR, Geometry
+from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.task import PARALLEL, Task, distance, targets_of
+from armkin.model.rotation import rotation_about
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+CHUNK = 1024  # poses corrected at once
+ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad
+AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
+WEAK = 0.05  # singular value below which no branch counts as steady, however close the arm is to its class
+HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
+
+
+class _Corrected(NamedTuple):
+    """Seeds moved onto the arm: q (N, B, n), good (N, B) if they are branches, doubt (N,)."""
+
+    q: Array
+    good: Bool
+    doubt: Bool
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Arms that a closed form would fit if their axes moved by up to `NEAR`; by `PARALLEL` where nothing else fits."""
+    if task.orientation == "axis":
+        return None  # see `armkin.inverse.tool_axis`
+    classes = ((planar, PARALLEL), (elbow, PARALLEL), (three_joints, NEAR), (spherical, NEAR), (three_parallel, NEAR))
+    found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
+    if not found:
+        return None
+    off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
+    elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
+
+    def rows(target: Array) -> tuple[Array, Bool]:
+        starts = range(0, max(len(target), 1), CHUNK)
+        parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
+        width = max(q.shape[1] for q, _ in parts)
+        q = np.full((len(target), width, arm.n), np.nan)
+        for k, (part, _) in zip(starts, parts, strict=True):
+            q[k : k + len(part), : part.shape[1]] = part
+        return q, np.concatenate([doubt for _, doubt in parts])
+
+    sizes = [2 if label else 1 for label in alike.labels]
+    why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
+    return Geometry(
+        f"near {alike.name}",
+        why,
+        False,
+        rows=rows,
+        labels=alike.labels,
+        ordered=alike.ordered,
+        branches=int(np.prod(sizes)) if sizes else None,
+    )
+
+
+def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
+    """How far the arm is from its class: residual of the seeds for postures of its own, lengths in reaches."""
+    q = np.random.default_rng(2).uniform(-2.5, 2.5, (64, arm.n)) * np.where(arm.prismatic, arm.reach / 5, 1.0)
+    target = targets_of(task, fk(arm, q), q)
+    seed, _, _ = recorded(arm, task, alike).rows(target)
+    B = seed.shape[1]
+    rough = newton.missing(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
+    return float(np.quantile(rough.min(axis=1), 0.8)) + 1e-14
+
+
+def _around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
+    """The targets (N, m) or (N, 4, 4) moved by size (N,) [reaches, rad] both ways along each of their coordinates."""
+    for way in (size, -size):
+        if task.orientation == "full":
+            for axis in range(3):
+                there = target.copy()
+                there[:, axis, 3] += way * arm.reach
+                yield there
+                turned = target.copy()
+                turned[:, :3, :3] = rotation_about(axis, way) @ target[:, :3, :3]
+                yield turned
+        else:
+            for k in range(target.shape[1]):
+                there = target.copy()
+                there[:, k] += way * (arm.reach if k < task.position else 1.0)
+                yield there
+
+
+def _solve(
+    arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
+) -> tuple[Array, Bool]:
+    """Branches (N, B, n) and doubts (N,) of some targets; the similar arm's branches keep their places."""
+    source = recorded(arm, task, alike)
+    off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
+    found = _correct(arm, task, source, off, off_here, target)
+    q = np.where(found.good[:, :, None], found.q, np.nan)
+    few = np.flatnonzero(found.doubt)
+    if not len(few):
+        return q, found.doubt
+    goals = target[few]
+    if elimination is not None:
+        solver = elimination()
+        assert solver is not None
+        assert solver.rows is not None
+        others = [solver.rows(goals)[0]]
+    else:
+        rings = (_around(arm, task, goals, size * off_here[few]) for size in RINGS)
+        others = [source.rows(there)[0] for ring in rings for there in ring]
+    more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
+    out = np.full((len(target), more.shape[1], arm.n), np.nan)
+    out[:, : q.shape[1]] = q
+    out[few] = more
+    return out, found.doubt
+
+
+def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
+    """Seeds (N, B, n) moved onto the arm: the first `own` in their places, then what else they lead to, once."""
+    N, B, n = q.shape
+    flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
+    some = np.flatnonzero(newton.missing(arm, task, flat, goals) < HOPELESS)
+    size = np.full(len(flat), np.inf)
+    flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20)
+    flat[size > 1e-9] = np.nan
+    q = _packed(flat.reshape(N, B, n), own)
+    with np.errstate(invalid="ignore"):
+        for i in range(1, q.shape[1]):
+            again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < 1e-6
+            q[again.any(axis=1), i] = np.nan
+    return _packed(q, own)
+
+
+def _packed(q: Array, own: int) -> Array:
+    """Rows (N, B, n) without the columns that are nan, but for the first `own`."""
+    there = ~np.isnan(q[:, own:, 0])
+    order = own + np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
+    return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
+
+
+def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array, target: Array) -> _Corrected:
+    """Move the seeds onto the arm, and find the poses for which that may not be all.
+
+    off_here: `off` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
+    another, not much more than that away. Hence a pose is sure only if the similar arm's branches hardly move
+    all around it: where one comes or goes, it moves with the square root of the distance.
+    """
+    seed, miss, doubt = source.rows(target)
+    N, B, n = seed.shape
+    weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
+    limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
+    real = miss < limit
+    for there in _around(arm, task, target, AROUND * off_here):
+        q, miss, doubt_there = source.rows(there)
+        with np.errstate(invalid="ignore"):
+            steady = newton.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
+        doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
+    goals = np.repeat(target, B, axis=0)
+    flat = seed.reshape(-1, n)
+    rough = newton.missing(arm, task, flat, goals)
+    some = np.flatnonzero(rough < HOPELESS)
+    q, size = flat.copy(), np.full(N * B, np.inf)
+    q[some], size[some] = newton.newton(arm, task, flat[some], goals[some], steps=6)
+    branch, good = q.reshape(N, B, n), (size <= ACCEPTED).reshape(N, B)
+    # what is unreachable for the similar arm may yet be reached
+    doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
+    for i in range(B):
+        for j in range(i):
+            with np.errstate(invalid="ignore"):
+                same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < 1e-6
+            doubt |= same & good[:, i] & good[:, j]
+    return _Corrected(branch, good, doubt)

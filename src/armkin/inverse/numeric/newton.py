@@ -1,0 +1,117 @@
+"""Newton corrections of joint values onto a task, for any arm and task."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, wrapped
+from armkin.forward import fk, jacobian
+from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.tasks.task import Task, axis_projected, residual, task_jacobian
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+    """Residual (M, r) and Jacobian (M, r, n) with lengths in units of the arm's reach.
+
+    Prismatic columns too: a joint value is then worth one radian or one reach.
+    """
+    T = fk(arm, q)
+    r = residual(task, T, q, target)
+    J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T)
+    r[:, : task.position] /= arm.reach
+    J = J * np.where(arm.prismatic, arm.reach, 1.0)
+    J[:, : task.position] /= arm.reach
+    return r, J
+
+
+def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Size of the residual (M,), lengths in units of the arm's reach."""
+    r = residual(task, fk(arm, q), q, target)
+    r[:, : task.position] /= arm.reach
+    size: Array = np.linalg.norm(r, axis=1)
+    return np.where(np.isnan(size), np.inf, size)
+
+
+def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
+    """Gauss-Newton with steps of least norm: q (M, n) moved onto its targets.
+
+    Returns the best q met and its `missing`. Small singular values are left out of a step,
+    so that a singular posture is approached without running away.
+    """
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    best, best_size = q.copy(), missing(arm, task, q, target)
+    active = np.flatnonzero(np.isfinite(best_size) & (best_size > 0))
+    q = q.copy()
+    for _ in range(steps):
+        if not len(active):
+            break
+        r, J = scaled(arm, task, q[active], target[active])
+        size = np.linalg.norm(r, axis=1)
+        # a singular value below the residual's own size would throw the step out of the linear range
+        U, S, Vt = np.linalg.svd(J, full_matrices=False)
+        gain = np.where(np.maximum(1e-10, 0.1 * size)[:, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
+        step = np.einsum("mij,mi->mj", Vt, gain * np.einsum("mji,mj->mi", U, r))
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        q[active] += step * unit
+        now = missing(arm, task, q[active], target[active])
+        before = best_size[active]
+        better = now < before
+        best[active[better]], best_size[active[better]] = q[active[better]], now[better]
+        # done when rounding is all that is left
+        active = active[np.isfinite(now) & (now > 1e-15) & ((now > 1e-11) | (now < 0.5 * before))]
+    return best, best_size
+
+
+def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[Array, Array]:
+    """Newton's method for tasks with as many constraints as joints, from starts (M, n) close to a solution.
+
+    Returns the best q met and its `missing`.
+    """
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
+    active = np.arange(len(q))
+    for _ in range(steps + 1):
+        if not len(active):
+            break
+        r, J = scaled(arm, task, q[active], target[active])
+        size = np.linalg.norm(r, axis=1)
+        better = size < best_size[active]
+        gained = size < 0.5 * best_size[active]
+        rows = active[better]
+        best[rows], best_size[rows] = q[rows], size[better]
+        step = nudged(np.linalg.solve, J, r[:, :, None])[:, :, 0]
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        q[active] += step * unit
+        # a residual of rounding's size falls no further; a step that gains nothing is the last one
+        active = active[(size > 1e-15) & (gained | (size > 1e-3))]
+    return best, best_size
+
+
+def difference(arm: Arm, a: Array, b: Array) -> Array:
+    """Joint values a less b modulo whole turns, prismatic ones in units of the reach: (..., n)."""
+    d = a - b
+    return np.where(arm.prismatic, d / arm.reach, wrapped(d))
+
+
+def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
+    """The largest `difference`: (..., n) -> (...)."""
+    largest: Array = np.abs(difference(arm, a, b)).max(axis=-1)
+    return largest
+
+
+def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
+    _, J = scaled(arm, task, q, target)
+    _, S, Vt = np.linalg.svd(J, full_matrices=True)
+    full = np.zeros((len(q), arm.n))
+    full[:, : S.shape[1]] = S
+    # a task with an axis has one more row than constraints
+    count = min(task.constraints, arm.n)
+    nullity = arm.n - (full > 1e-6).sum(axis=1)
+    return full[:, count - 1], Vt, nullity - (arm.n - count)

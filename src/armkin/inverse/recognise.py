@@ -1,0 +1,77 @@
+"""Which class an arm belongs to.
+
+A new geometry is one new file with a function ``recognise(arm, task) -> Geometry | None``
+and a line in `_CLASSES`, the most special class first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from armkin.errors import UsageError
+from armkin.inverse import general, nearly_special, tool_axis
+from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.tasks.task import Task, default_task, rank, task_for
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+@lru_cache(maxsize=64)
+def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
+    """The task and the solver for an arm, prepared once.
+
+    Raises UsageError if the task does not fit the arm.
+    """
+    task = task_for(arm, task_name)
+    if arm.n > task.constraints:
+        surplus = arm.n - task.constraints
+        raise UsageError(
+            f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
+            f"{surplus} degree{'s' if surplus > 1 else ''} of freedom: fix {surplus} of "
+            f"{', '.join(arm.joint_names)} with --lock JOINT=VALUE, or try values with --sweep JOINT=LOW:HIGH:COUNT"
+        )
+    effective = rank(arm, task, 1e-9)
+    if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
+        usual = default_task(arm)
+        fix = f"fix {arm.n - effective} of {', '.join(arm.joint_names)} with --lock JOINT=VALUE"
+        way_out = fix if usual in (None, task.name) else f"its usual task is {usual}"
+        raise UsageError(
+            f"{arm.name}: task {task.name} has {task.constraints} constraints, of which its {arm.n} joints can meet "
+            f"{effective} at a time:\nthere would be infinitely many solutions or none; {way_out}"
+        )
+    for recognise in _CLASSES:
+        geometry = recognise(arm, task)
+        if geometry is not None:
+            return task, geometry
+    usual = default_task(arm)
+    hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
+    locked = arm.file is not None and len(arm.file.joints) > arm.n
+    joints = f"the {arm.n} joints left after --lock" if locked else f"its {arm.n} joints"
+    raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}")
+
+
+def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
+    """Solver class of an arm, why it applies, and whether it guarantees all branches."""
+    geometry = solver(arm, task)[1]
+    return geometry.name, geometry.why, geometry.complete
+
+
+def _tool_axis(arm: Arm, task: Task) -> Geometry | None:
+    """The class of an arm of five joints with a virtual sixth one is asked of the same list."""
+    return tool_axis.recognise(arm, task, lambda six: solver(six, "pose")[1])
+
+
+_CLASSES: tuple[Callable[[Arm, Task], Geometry | None], ...] = (
+    planar.recognise,
+    elbow.recognise,
+    three_joints.recognise,
+    spherical.recognise,
+    three_parallel.recognise,
+    nearly_special.recognise,
+    _tool_axis,
+    general.recognise,
+)

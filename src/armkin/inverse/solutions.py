@@ -1,0 +1,94 @@
+"""The answer of `armkin.ik`: all branches of a batch of targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.inverse.tasks.task import Task, residual
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Status(IntEnum):
+    """What the geometry says of a target, limits apart."""
+
+    EXACT = 0  # isolated branches
+    BOUNDARY = 1  # two branches merge: the target lies on the edge of what that posture reaches
+    SINGULAR = 2  # a whole curve of joint values answers: some joints are free
+    UNREACHABLE = 3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solutions:
+    """All branches of a batch of targets; leading axes (...) are the batch's.
+
+    q: (..., B, n) [rad | mm], one row a branch modulo whole turns, the legal copy nearest
+    `near`; rows past the last branch are nan. valid: (..., B) the row reaches the target to
+    1e-9 of the arm's reach. within_limits: (..., B). branch: (..., B) index into `names`, -1
+    past the last. status: (...) of `Status`. free: (..., n) joints that a singular target
+    leaves free. complete: every isolated real branch is guaranteed to be there (never of a
+    sliding arm's targets more than 20 reaches away).
+    """
+
+    arm: Arm
+    task: Task
+    target: Array
+    near: Array
+    q: Array
+    valid: NDArray[np.bool_]
+    within_limits: NDArray[np.bool_]
+    branch: NDArray[np.int8]
+    status: NDArray[np.int8]
+    free: NDArray[np.bool_]
+    names: tuple[str, ...]
+    method: str
+    why: str
+    complete: bool
+
+    def __repr__(self) -> str:
+        batch, sure = self.status.shape, "complete" if self.complete else "not proved complete"
+        return f"<Solutions {batch} of {self.arm.name}, {self.task.name}: {self.valid.sum()} branches, {sure}>"
+
+    @cached_property
+    def motion(self) -> Array:
+        """(..., B) sum of |change| from `near` in joint units (degrees or mm); nan where there is no branch."""
+        unit = np.where(self.arm.prismatic, 1.0, 180.0 / np.pi)
+        total: Array = (np.abs(self.q - self.near[..., None, :]) * unit).sum(axis=-1)
+        return total
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """(..., B) branches by rank: within limits first, then by motion, missing ones last."""
+        key = np.where(self.valid, self.motion, np.inf)
+        by_motion = np.argsort(key, axis=-1, kind="stable")
+        outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
+        by_limits = np.argsort(outside, axis=-1, kind="stable")
+        return np.take_along_axis(by_motion, by_limits, axis=-1)
+
+    @cached_property
+    def best(self) -> NDArray[np.intp]:
+        """(...) index of the branch within limits that moves the joints least, or -1."""
+        key = np.where(self.within_limits, self.motion, np.inf)
+        index = np.argmin(key, axis=-1)
+        return np.where(np.isfinite(np.min(key, axis=-1)), index, -1)
+
+    def residual(self) -> tuple[Array, Array]:
+        """What each branch misses, recomputed from its joint values: (..., B) [mm] and (..., B) [rad]."""
+        from armkin.forward import fk
+
+        B, n = self.q.shape[-2:]
+        q = self.q.reshape(-1, n)
+        rows = self.target.reshape(-1, *self.target.shape[self.status.ndim :])
+        missing = residual(self.task, fk(self.arm, q), q, np.repeat(rows, B, axis=0))
+        p = self.task.position
+        mm = np.linalg.norm(missing[:, :p], axis=1).reshape(self.valid.shape)
+        rad = np.linalg.norm(missing[:, p:], axis=1).reshape(self.valid.shape)
+        return mm, rad

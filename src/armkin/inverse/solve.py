@@ -1,0 +1,260 @@
+"""`armkin.ik`: from targets to all branches within limits.
+
+The way of a target: task -> geometry -> candidate branches -> residual of each, through the
+forward kinematics -> whole turns and limits -> the few doubtful ones through `edges`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.errors import UsageError
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse import singularities
+from armkin.inverse.branches.names import branch_names
+from armkin.inverse.branches.tracking import follow
+from armkin.inverse.branches.turns import nearest_copy, nearest_row
+from armkin.inverse.closed.candidates import entries, recorded
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.subproblems import Pair
+from armkin.inverse.recognise import solver
+from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.tasks.task import Task, distance, read_targets
+from armkin.model.limits import SLACK
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
+ACCEPTED_MM = 5e-10  # and as a length
+FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete: rounding grows
+BLOCK = 512  # poses whose rows are written joint by joint while they are in the cache
+NEARBY = 1e-6  # residual up to which a candidate is worth correcting
+
+
+class _Out(NamedTuple):
+    """Results of a batch, filled chunk by chunk."""
+
+    q: Array
+    valid: Bool
+    within: Bool
+    branch: NDArray[np.int8]
+    status: NDArray[np.int8]
+    free: Bool
+
+    def part(self, rows: slice) -> _Out:
+        return _Out(
+            self.q[rows],
+            self.valid[rows],
+            self.within[rows],
+            self.branch[rows],
+            self.status[rows],
+            self.free[rows],
+        )
+
+
+def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Solutions:
+    """All real branches of inverse kinematics.
+
+    targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
+    arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home.
+    Raises UsageError if the task does not fit the arm or a target is malformed.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> s = armkin.ik(arm, [390, 80, 300])
+    >>> s.names[s.branch[s.best]], np.rad2deg(s.q[s.best]).round(4).tolist()
+    ('left, elbow up', [10.1529, 44.656, -46.5354])
+    """
+    definition, geometry = solver(arm, task)
+    target, lead = read_targets(definition, targets)
+    close = arm.home if near is None else arrays.real(near, "near")
+    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
+        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
+    if not np.isfinite(close).all():
+        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    many = close.ndim == 1 and len(target) != 1
+    each = np.broadcast_to(close, (len(target), arm.n)) if many else close.reshape(-1, arm.n)
+    one = close if close.ndim == 1 else None
+    if geometry.pairs:
+        out = _closed(arm, definition, geometry, target, each, one)
+    else:
+        out = _rows(arm, definition, geometry, target, each)
+    if not geometry.ordered:
+        out.branch[...] = follow(arm, definition, out.q, target)
+    names = branch_names(arm, definition, geometry, out.q.shape[1])
+    each_branch = (*lead, out.q.shape[1])
+    return Solutions(
+        arm=arm,
+        task=definition,
+        target=target.reshape(lead + target.shape[1:]),
+        near=close if close.shape == (*lead, arm.n) else np.broadcast_to(close, (*lead, arm.n)),
+        q=out.q.reshape(*each_branch, arm.n),
+        valid=out.valid.reshape(each_branch),
+        within_limits=out.within.reshape(each_branch),
+        branch=out.branch.reshape(each_branch),
+        status=out.status.reshape(lead),
+        free=out.free.reshape(*lead, arm.n),
+        names=names,
+        method=geometry.name,
+        why=geometry.why,
+        complete=geometry.complete and not (arm.prismatic.any() and (distance(arm, definition, target) > FAR).any()),
+    )
+
+
+def _empty(N: int, B: int, n: int) -> _Out:
+    return _Out(
+        np.empty((N, B, n)),
+        np.empty((N, B), bool),
+        np.empty((N, B), bool),
+        np.empty((N, B), np.int8),
+        np.zeros(N, np.int8),
+        np.zeros((N, n), bool),
+    )
+
+
+def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
+    """Closed forms: chunks of poses that stay in the cache, entry by entry."""
+    out: _Out | None = None
+    runner = recorded(arm, task, geometry)
+    straight = runner.code.get(len(target))
+    workspace: list[NDArray[np.generic]] = []
+    for start in range(0, max(len(target), 1), arrays.CHUNK):
+        rows = slice(start, start + arrays.CHUNK)
+        goal, close = target[rows], near[rows] if one is None else one
+        N = len(goal)
+        if straight is None:
+            *values, miss, doubt = runner.candidates(entries(task, goal), _prefer(arm, close))
+        elif N == 1:
+            one_goal = pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()
+            *values, miss, doubt = straight.single(one_goal)
+        else:
+            if not workspace or workspace[-1].shape[-1] != N:
+                workspace = straight.workspace(N)
+            *values, miss, doubt = straight.run(entries(task, goal), workspace)
+        if runner.axes is None:
+            runner.axes = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))[:-1]
+        shape, B = (*runner.axes, N), math.prod(runner.axes)
+        if out is None:
+            out = _empty(len(target), B, arm.n)
+        if N == 0:
+            break
+        part = out.part(rows)
+        miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
+        valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
+        _fill(arm, part, values, valid.reshape(shape), close)
+        full = bool(valid.all())
+        doubtful = _doubtful(miss, valid, doubt, full)
+        if full and not len(doubtful):
+            continue
+        count = valid.sum(axis=0)
+        part.status[count == 0] = Status.UNREACHABLE
+        if len(doubtful) and straight is not None:
+            # again, with the preferred values for joints that are free
+            again = runner.candidates(
+                entries(task, goal[doubtful]), _prefer(arm, close[doubtful] if one is None else one)
+            )
+            for i in range(arm.n):
+                few = np.broadcast_to(again[i], (*shape[:-1], len(doubtful)))
+                part.q[doubtful, :, i] = few.reshape(B, -1).T
+        _tidy(arm, task, part, goal, near[rows], doubtful, count < B)
+    assert out is not None
+    return out
+
+
+def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) -> None:
+    """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
+    *axes, N = valid.shape
+    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
+    within, legal = valid, []
+    for i in range(arm.n):
+        value, inside = _legal(arm, i, values[i], close)
+        legal.append(value)
+        if inside is not True:
+            within = within & inside
+    for start in range(0, N, BLOCK):
+        some = slice(start, start + BLOCK)
+        for i, value in enumerate(legal):
+            grid[..., some, i] = value[..., some] if np.shape(value)[-1:] == (N,) else value
+    part.valid[...] = valid.reshape(-1, N).T
+    part.within[...] = within.reshape(-1, N).T
+    part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
+
+
+def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
+    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
+
+    miss, valid: (B, N); full: valid everywhere.
+    """
+    if full and not np.any(doubt):
+        return np.empty(0, np.intp)
+    shape = np.broadcast_shapes(np.shape(doubt), (1, 1, 1, miss.shape[1]))
+    edge = np.any(np.broadcast_to(doubt, shape), axis=(0, 1, 2))
+    if not full:
+        edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
+    return np.flatnonzero(edge)
+
+
+def _prefer(arm: Arm, close: Array) -> list[Pair]:
+    """What a free joint is given: close (N, n), or (n,) for all."""
+    values = list(np.ascontiguousarray(close.T))
+    return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
+
+
+def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
+    """A joint's values at their nearest legal copies, and whether they are within limits."""
+    lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
+    if not arm.prismatic[joint]:
+        close = float(near[joint]) if near.ndim == 1 else near[:, joint]
+        return nearest_copy(value, close, lower, upper)
+    if lower == -np.inf and upper == np.inf:
+        return value, True
+    return value, (value >= lower - SLACK) & (value <= upper + SLACK)
+
+
+def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
+    """Solvers that return joint values row by row."""
+    assert geometry.rows is not None
+    q, doubt = geometry.rows(target)
+    B = q.shape[1]
+    out = _empty(len(target), B, arm.n)
+    out.q[...], inside = nearest_row(arm, q, near[:, None, :])
+    out.valid[...] = ~np.isnan(q).any(axis=2)
+    out.within[...] = inside & out.valid
+    out.branch[...] = np.where(out.valid, np.arange(B), -1)
+    count = out.valid.sum(axis=1)
+    out.status[count == 0] = Status.UNREACHABLE
+    _tidy(arm, task, out, target, near, np.flatnonzero(doubt), count < B)
+    return out
+
+
+def _tidy(
+    arm: Arm, task: Task, part: _Out, goal: Array, near: Array, doubtful: NDArray[np.intp], partial: Bool
+) -> None:
+    """Examine the doubtful targets; then move every target's branches to the front, nan behind."""
+    if len(doubtful):
+        seen = singularities.examine(arm, task, part.q[doubtful], goal[doubtful])
+        q, inside = nearest_row(arm, np.nan_to_num(seen.q), near[doubtful][:, None, :])
+        part.q[doubtful] = q
+        part.valid[doubtful] = seen.valid
+        part.within[doubtful] = inside & seen.valid
+        part.status[doubtful] = seen.status
+        part.free[doubtful] = seen.free
+        partial[doubtful] |= ~seen.valid.all(axis=1)
+    some = np.flatnonzero(partial)
+    if len(some):
+        valid = part.valid[some]
+        count = valid.sum(axis=1)
+        row, column = np.nonzero(valid)
+        place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
+        for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+            old = array[some]
+            new = np.full_like(old, missing)
+            new[row, place] = old[row, column]
+            array[some] = new
+        part.valid[some] = np.arange(valid.shape[1]) < count[:, None]

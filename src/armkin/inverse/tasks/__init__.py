@@ -1,0 +1,1 @@
+"""What a target prescribes, and which task fits an arm."""

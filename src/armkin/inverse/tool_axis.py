@@ -1,0 +1,61 @@
+"""Position and direction of the tool's z axis with five joints: xyz_axis.
+
+A sixth, virtual joint about the tool's z axis makes it a full pose whose turn about z is
+anything: any orientation with the wanted axis will do, and the virtual joint is dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.tasks.task import Task
+from armkin.model.arm import from_links
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geometry | None:
+    """Five joints of any geometry; class_of: the class of an arm of six joints for full poses."""
+    if task.name != "xyz_axis" or arm.n != 5:
+        return None
+    six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
+    inner = class_of(six)
+    why = f"with a virtual joint about the tool's axis: {inner.why}"
+    if inner.pairs is not None:
+        solve = inner.pairs
+
+        def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
+            virtual = None if prefer[0] is None else Pair(1.0, 0.0)
+            found = solve(_pose(goal), [*prefer, virtual])
+            return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
+
+        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered)
+    solve_rows = inner.rows
+    assert solve_rows is not None
+
+    def rows(goal: Array) -> tuple[Array, Bool]:
+        T = np.empty((len(goal), 4, 4))
+        pose.write(_pose(list(goal.T)), T)
+        q, doubt = solve_rows(T)
+        return q[:, :, :5], doubt
+
+    return Geometry(
+        inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered
+    )
+
+
+def _pose(goal: list[Entry]) -> pose.Pose:
+    """A pose at x y z whose z axis is ax ay az; x is across, without a jump near the poles' axis (Duff et al. 2017)."""
+    x, y, z = goal[3:6]
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return [1.0 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y, x, y, z, *goal[:3]]

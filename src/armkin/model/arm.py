@@ -1,0 +1,115 @@
+"""The arm: frozen arrays, one chain for all conventions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from armkin.robot_file import RobotFile
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Arm:
+    """An arm as arrays, read-only, lengths in mm and angles in rad.
+
+    The tool's pose is ``link[0] Z1(q1) link[1] ... Zn(qn) link[n]`` with Z = Rz or Tz:
+    signs, offsets, base and tool are inside `link`.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    prismatic: NDArray[np.bool_]  # (n,)
+    link: Array  # (n + 1, 4, 4)
+    frame: Array  # (n, 4, 4): reported frame i = chain up to Zi, times frame[i]
+    base: Array  # (4, 4)
+    lower: Array  # (n,) -inf where unlimited
+    upper: Array  # (n,)
+    home: Array  # (n,)
+    max_speed: Array  # (n,) rad/s | mm/s, nan where the file has none
+    max_accel: Array  # (n,)
+    dh_sign: Array  # (n,) DH angle = dh_sign * joint value + dh_theta
+    dh_theta: Array  # (n,)
+    pitch_offset: float  # [rad]
+    task: str | None  # as the file says; None: by structure
+    motor_gain: Array  # (motors, n) pulses per rad | mm
+    motor_bias: Array  # (motors,) pulses at home
+    reach: float  # [mm] no point of the chain is farther from its first joint
+    path: str = ""  # of the robot file, as given
+    sha256: str = ""  # of the robot file's bytes
+    file: RobotFile | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.prismatic)
+
+    def __repr__(self) -> str:
+        """What tells arms apart, without their arrays."""
+        return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
+
+
+def from_links(
+    link: ArrayLike,
+    prismatic: Sequence[bool],
+    *,
+    name: str = "arm",
+    joint_names: tuple[str, ...] = (),
+    frame: ArrayLike | None = None,
+    base: ArrayLike | None = None,
+    limits: ArrayLike | None = None,
+    home: ArrayLike | None = None,
+    max_speed: ArrayLike | None = None,
+    max_accel: ArrayLike | None = None,
+    dh_sign: ArrayLike | None = None,
+    dh_theta: ArrayLike | None = None,
+    pitch_offset: float = 0.0,
+    task: str | None = None,
+    motor_gain: ArrayLike | None = None,
+    motor_bias: ArrayLike | None = None,
+    path: str = "",
+    sha256: str = "",
+    file: RobotFile | None = None,
+) -> Arm:
+    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the rest optional."""
+    n = len(prismatic)
+    links = _frozen(link)
+    span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
+    gain = np.zeros((0, n)) if motor_gain is None else motor_gain
+    sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
+    return Arm(
+        name=name,
+        joint_names=joint_names or tuple(f"q{i + 1}" for i in range(n)),
+        prismatic=_frozen(prismatic, bool),
+        link=links,
+        frame=_frozen(np.broadcast_to(np.eye(4), (n, 4, 4)) if frame is None else frame),
+        base=_frozen(np.eye(4) if base is None else base),
+        lower=_frozen(span[:, 0]),
+        upper=_frozen(span[:, 1]),
+        home=_frozen(np.zeros(n) if home is None else home),
+        max_speed=_frozen(np.full(n, math.nan) if max_speed is None else max_speed),
+        max_accel=_frozen(np.full(n, math.nan) if max_accel is None else max_accel),
+        dh_sign=_frozen(np.ones(n) if dh_sign is None else dh_sign),
+        dh_theta=_frozen(np.zeros(n) if dh_theta is None else dh_theta),
+        pitch_offset=pitch_offset,
+        task=task,
+        motor_gain=_frozen(gain),
+        motor_bias=_frozen(np.zeros(len(np.asarray(gain))) if motor_bias is None else motor_bias),
+        reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
+        path=path,
+        sha256=sha256,
+        file=file,
+    )
+
+
+def _frozen(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+    array: NDArray[Any] = np.array(values, dtype=dtype)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,136 @@
+"""A validated robot file turned into an arm: DH tables and screws become one chain of constant links."""
+
+from __future__ import annotations
+
+import math
+from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.model.arm import Arm, from_links
+from armkin.model.rotation import FLIP, cos_sin_deg, inverse, transform
+
+if TYPE_CHECKING:
+    from armkin.robot_file import Joint, RobotFile
+
+
+def load(path: str | PathLike[str]) -> Arm:
+    """Read and validate a robot file.
+
+    Raises FileError if it cannot be read and RobotFileError if it is not valid.
+    """
+    from armkin import robot_file
+
+    return build(robot_file.read(path))
+
+
+def build(file: RobotFile) -> Arm:
+    """The arm of a validated robot file."""
+    base = transform(file.base.xyz, file.base.rpy)
+    tool = transform(file.tool.xyz, file.tool.rpy)
+    before, after, frame = [], [], []
+    for joint in file.joints:
+        if file.convention == "screws":
+            pre, post, at = _screw(joint)
+        else:
+            pre, post, at = _dh(joint, modified=file.convention == "modified")
+        flip = FLIP if joint.sign < 0 else np.eye(4)
+        before.append(pre @ flip)
+        after.append(flip @ post)
+        frame.append(flip @ at)
+    end = tool if file.zero_pose is None else transform(file.zero_pose.xyz, file.zero_pose.rpy) @ tool
+    link = [base @ before[0]]
+    link += [after[i] @ before[i + 1] for i in range(len(before) - 1)]
+    link.append(after[-1] @ end)
+
+    unit = np.array([1.0 if j.type == "prismatic" else math.pi / 180 for j in file.joints])
+    gain, bias = _motors(file, unit)
+    return from_links(
+        link,
+        [j.type == "prismatic" for j in file.joints],
+        name=file.name,
+        joint_names=tuple(j.name for j in file.joints),
+        frame=frame,
+        base=base,
+        limits=[(-math.inf, math.inf) if j.limits is None else j.limits for j in file.joints] * unit[:, None],
+        home=np.array([j.home for j in file.joints]) * unit,
+        max_speed=np.array([math.nan if j.max_speed is None else j.max_speed for j in file.joints]) * unit,
+        max_accel=np.array([math.nan if j.max_accel is None else j.max_accel for j in file.joints]) * unit,
+        dh_sign=[float(j.sign) for j in file.joints],
+        dh_theta=[0.0 if j.dh is None else math.radians(j.dh.theta) for j in file.joints],
+        pitch_offset=math.radians(file.pitch_offset),
+        task=file.task,
+        motor_gain=gain,
+        motor_bias=bias,
+        path=file.path,
+        sha256=file.sha256,
+        file=file,
+    )
+
+
+def _dh(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
+    """Constant factors before and after a joint's motion, and its frame after the motion.
+
+    Standard: A = Rz(theta + q) Tz(d) Tx(a) Rx(alpha). Modified (Craig): the row's a and
+    alpha stand before the joint: A = Rx(alpha) Tx(a) Rz(theta + q) Tz(d).
+    """
+    assert joint.dh is not None
+    dh = joint.dh
+    ct, st = cos_sin_deg(dh.theta)
+    ca, sa = cos_sin_deg(dh.alpha)
+    z_part = np.array([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, dh.d], [0, 0, 0, 1.0]])
+    x_part = np.array([[1, 0, 0, dh.a], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1.0]])
+    if modified:
+        return x_part, z_part, z_part
+    return np.eye(4), z_part @ x_part, z_part @ x_part
+
+
+def _screw(joint: Joint) -> tuple[Array, Array, Array]:
+    """exp([S] q) = B Z(q) B^-1 with B's z axis on the screw's axis (Lynch & Park, Modern Robotics, 3.3.2)."""
+    assert joint.screw is not None
+    w, v = (np.array(part, dtype=float) for part in joint.twist())
+    if joint.type == "prismatic":
+        direction, point = v, np.zeros(3)
+    else:
+        direction, point = w, np.cross(w, v) if joint.screw.q is None else np.array(joint.screw.q, dtype=float)
+    B = np.eye(4)
+    B[:3, 2] = direction
+    B[:3, 0] = _perpendicular(direction)
+    B[:3, 1] = np.cross(direction, B[:3, 0])
+    B[:3, 3] = point
+    at = np.eye(4)
+    at[:3, 3] = point
+    back = inverse(B)
+    return B, back, back @ at
+
+
+def _perpendicular(z: Array) -> Array:
+    """A unit vector perpendicular to z, exact for axis-aligned z."""
+    across = np.zeros(3)
+    across[int(np.argmin(np.abs(z)))] = 1.0
+    x = across - (across @ z) * z
+    return np.asarray(x / np.linalg.norm(x))
+
+
+def _motors(file: RobotFile, unit: Array) -> tuple[Array, Array]:
+    """Pulses per rad | mm of every motor and joint, and the pulses at home (servos only).
+
+    A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley,
+    counted from home; a servo's pulse width is linear in its joint over `travel`, and
+    `invert` mirrors it (for a stepper it is wiring: the level of DIR, not the count).
+    """
+    index = {joint.name: i for i, joint in enumerate(file.joints)}
+    home = [joint.home for joint in file.joints]
+    motors = file.motor_list()
+    gain = np.zeros((len(motors), len(file.joints)))
+    bias = np.zeros(len(motors))
+    for k, motor in enumerate(motors):
+        servo = motor.travel if motor.kind == "servo" and motor.pulse_us is not None else None
+        turn = -1.0 if servo is not None and motor.invert else 1.0
+        for name, weight in motor.joints.items():
+            gain[k, index[name]] = turn * weight * motor.pulses_per_unit()
+        if servo is not None and motor.pulse_us is not None:
+            bias[k] = motor.pulse_us[0] + (motor.zero - servo[0]) * motor.pulses_per_unit() + gain[k] @ home
+    return gain / unit, bias

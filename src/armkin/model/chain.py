@@ -1,0 +1,47 @@
+"""Chains of joints as the geometries of `armkin.ik` see them: flipped, reversed, shortened."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.model.rotation import FLIP, inverse
+
+
+class Chain(NamedTuple):
+    """``link[0] Z1(q1) link[1] ... Zn(qn) link[n]`` with Z = Rz or Tz."""
+
+    link: Array  # (n + 1, 4, 4)
+    prismatic: NDArray[np.bool_]  # (n,)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.prismatic)
+
+
+def reverse(chain: Chain) -> Chain:
+    """The chain walked from the tool to the base: its pose is the inverse, its joints are in reverse order."""
+    links = FLIP @ inverse(chain.link[::-1]) @ FLIP
+    links[0] = FLIP @ links[0]
+    links[-1] = links[-1] @ FLIP
+    return Chain(links, chain.prismatic[::-1])
+
+
+def axes(chain: Chain) -> tuple[Array, Array]:
+    """Points (n, 3) and directions (n, 3) of the joint axes when all joints are zero."""
+    P = np.eye(4)
+    points, directions = [], []
+    for i in range(chain.n):
+        P = P @ chain.link[i]
+        points.append(P[:3, 3])
+        directions.append(P[:3, 2])
+    return np.array(points), np.array(directions)
+
+
+def is_parallel(L: Array, tolerance: float) -> bool:
+    """Whether the joint axes on both sides of a link are parallel (or antiparallel)."""
+    return bool(np.hypot(L[0, 2], L[1, 2]) <= tolerance)

@@ -1,0 +1,42 @@
+"""Joint limits: who is outside."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+SLACK = 1e-9  # [rad | mm] a joint this far outside still counts as on its limit
+
+
+def outside(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
+    """Which joints are outside their limits.
+
+    q: (..., n) [rad | mm]. Returns (..., n); a joint without limits is never outside.
+
+    >>> import armkin, numpy as np
+    >>> outside(armkin.load("robots/three_dof.yaml"), np.deg2rad([0, 121, 0])).tolist()
+    [False, True, False]
+    """
+    values = np.asarray(q, dtype=float)
+    return (values < arm.lower - SLACK) | (values > arm.upper + SLACK)
+
+
+def said(arm: Arm, joint: int, value: float) -> str:
+    """A joint outside its limits in words.
+
+    value: [rad | mm].
+
+    >>> import armkin, math
+    >>> said(armkin.load("robots/three_dof.yaml"), 1, math.radians(130))
+    'q2 = 130 deg is outside -20 to 120 deg'
+    """
+    size, unit = (1.0, "mm") if arm.prismatic[joint] else (math.pi / 180, "deg")
+    ends = (arm.lower[joint], arm.upper[joint])
+    low, high = (f"{end / size + 0.0:.10g}" if math.isfinite(end) else "any" for end in ends)
+    return f"{arm.joint_names[joint]} = {value / size:.10g} {unit} is outside {low} to {high} {unit}"

@@ -1,0 +1,92 @@
+"""Arms with joints held at fixed values: how a redundant arm becomes one that `ik` can solve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula import arrays
+from armkin.formula.arrays import Array
+from armkin.model.rotation import rotation_about
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
+    """The arm with some joints held: fewer joints, the held motions folded into its links.
+
+    held: joint name -> value [rad | mm]. Raises UsageError for an unknown joint or if none is
+    left. Branches of the result go back to the full arm with `unlock`.
+
+    >>> import armkin
+    >>> lock(armkin.load("robots/panda.yaml"), {"J3": 0.35}).joint_names
+    ('J1', 'J2', 'J4', 'J5', 'J6', 'J7')
+    """
+    for name, value in held.items():
+        joint_index(arm, name)
+        number = arrays.real(value, name)
+        if number.ndim or not np.isfinite(number):
+            raise UsageError(f"{name} cannot be held at {value}: give one finite number")
+    if len(held) >= arm.n:
+        raise UsageError(f"{arm.name}: with {', '.join(held)} held no joint is left to solve for")
+    links, frame, kept = [arm.link[0]], [], []
+    for i, name in enumerate(arm.joint_names):
+        if name in held:
+            links[-1] = links[-1] @ _motion(bool(arm.prismatic[i]), held[name]) @ arm.link[i + 1]
+        else:
+            kept.append(i)
+            frame.append(arm.frame[i])
+            links.append(arm.link[i + 1])
+    rest = {
+        field: getattr(arm, field)[kept]
+        for field in ("prismatic", "lower", "upper", "home", "max_speed", "max_accel", "dh_sign", "dh_theta")
+    }
+    return replace(
+        arm,
+        joint_names=tuple(arm.joint_names[i] for i in kept),
+        link=np.array(links),
+        frame=np.array(frame),
+        motor_gain=arm.motor_gain[:, kept],
+        **rest,
+    )
+
+
+def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
+    """Joint values of a locked arm as those of the full one: (..., n - held) -> (..., n).
+
+    >>> import armkin
+    >>> unlock(armkin.load("robots/three_dof.yaml"), {"q2": 0.5}, [0.1, 0.2]).tolist()
+    [0.1, 0.5, 0.2]
+    """
+    values = np.asarray(q, dtype=float)
+    missing = np.isnan(values).any(axis=-1)
+    out = np.empty((*values.shape[:-1], arm.n))
+    rest = iter(range(values.shape[-1]))
+    for i, name in enumerate(arm.joint_names):
+        out[..., i] = np.where(missing, np.nan, held[name]) if name in held else values[..., next(rest)]
+    return out
+
+
+def joint_index(arm: Arm, name: str) -> int:
+    """Index of a joint by its name; UsageError lists the names."""
+    if name in arm.joint_names:
+        return arm.joint_names.index(name)
+    close = get_close_matches(name, arm.joint_names, 1, 0.5)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    raise UsageError(f"{arm.name} has no joint '{name}'{hint}; its joints are {', '.join(arm.joint_names)}")
+
+
+def _motion(prismatic: bool, value: float) -> Array:
+    Z = np.eye(4)
+    if prismatic:
+        Z[2, 3] = value
+    else:
+        Z[:3, :3] = rotation_about(2, value)
+    return Z

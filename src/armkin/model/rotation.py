@@ -1,0 +1,109 @@
+"""Rotations as matrices, roll, pitch, yaw and quaternions; rigid transforms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula.arrays import Array
+
+# Turns z and y over: conjugating a joint's motion with it reverses the joint.
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def rpy(R: ArrayLike) -> Array:
+    """Roll, pitch, yaw of rotations: R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    R: (..., 3, 3). Returns (..., 3) [rad], pitch in [-pi/2, pi/2]. Where the pitch is a quarter turn only
+    yaw - roll or yaw + roll is determined: roll is 0 there (Craig, Introduction to Robotics, eq. 2.67).
+
+    >>> rpy([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(6).tolist()
+    [0.0, 0.0, 1.570796]
+    """
+    R = np.asarray(R, dtype=float)
+    level = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    pitch = np.arctan2(-R[..., 2, 0], level)
+    # below 1e-9 the quotients are rounding noise
+    upright = level < 1e-9
+    roll = np.where(upright, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(upright, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], axis=-1) + 0.0  # no negative zeros
+
+
+def quaternion(R: ArrayLike) -> Array:
+    """Unit quaternions w, x, y, z of rotations, w >= 0.
+
+    R: (..., 3, 3). Returns (..., 4). The largest of the four components is taken from the diagonal and
+    divides the others, so that none is lost near half a turn (Shepperd, Quaternion from rotation
+    matrix, 1978).
+
+    >>> quaternion([[1, 0, 0], [0, -1, 0], [0, 0, -1]]).tolist()
+    [0.0, 1.0, 0.0, 0.0]
+    """
+    R = np.asarray(R, dtype=float)
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    xy, yz, zx = R[..., 0, 1] + R[..., 1, 0], R[..., 1, 2] + R[..., 2, 1], R[..., 2, 0] + R[..., 0, 2]
+    # 4 q q^T: each row is the quaternion times one of its own components
+    outer = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, x, y, z], axis=-1),
+            np.stack([x, 1 + xx - yy - zz, xy, zx], axis=-1),
+            np.stack([y, xy, 1 - xx + yy - zz, yz], axis=-1),
+            np.stack([z, zx, yz, 1 - xx - yy + zz], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.einsum("...ii->...i", outer), axis=-1)
+    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    row = row * np.where(row[..., :1] < 0, -1.0, 1.0)
+    return np.asarray(row / np.linalg.norm(row, axis=-1, keepdims=True) + 0.0)
+
+
+def rotation_about(axis: int, angle: ArrayLike) -> Array:
+    """Rotations (..., 3, 3) by angles (...) [rad] about the x, y or z axis (0, 1, 2).
+
+    >>> rotation_about(2, np.pi / 2).round(6).tolist()
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.zeros((*np.shape(angle), 3, 3)) + np.eye(3)
+    R[..., i, i] = R[..., j, j] = np.cos(angle)
+    R[..., i, j], R[..., j, i] = -np.sin(angle), np.sin(angle)
+    return R
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of rigid transforms (..., 4, 4)."""
+    out = np.zeros(T.shape)
+    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = Rt
+    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
+    """4 x 4 transform from a position [mm] and roll, pitch, yaw [deg]: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    cr, sr = cos_sin_deg(rpy[0])
+    cp, sp = cos_sin_deg(rpy[1])
+    cy, sy = cos_sin_deg(rpy[2])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
+            [-sp, cp * sr, cp * cr, xyz[2]],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def cos_sin_deg(angle: float) -> tuple[float, float]:
+    """Cosine and sine of an angle in degrees, exact at multiples of 90."""
+    quarter, rest = divmod(angle, 90.0)
+    if rest == 0.0:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
+    return math.cos(math.radians(angle)), math.sin(math.radians(angle))

@@ -1,0 +1,252 @@
+"""Joint values to motor pulses and back, and what the rounding costs at the tip.
+
+A motor's exact pulse is linear in the joints,
+
+    x = motor_bias + motor_gain (q - home)
+
+with the bias 0 for steppers, whose pulses are counted from home, and the pulse width at home [us]
+for RC servos. Motors and joints need not be one to one (belts, differentials, two motors on one
+shoulder): the joints follow from the pulses through the pseudoinverse of the matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.errors import UsageError
+from armkin.formula import arrays
+from armkin.formula.arrays import Array
+from armkin.forward import as_joints, position
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Pulses = NDArray[np.int64]
+
+_LARGEST = 2.0**53  # beyond it a double no longer counts whole pulses
+_HALF = 1e-9  # pulses: closer than this to a half is a half, as degrees have no exact radians
+_CANDIDATES = 4096  # pulse vectors that `best_pulses` tries for one pose
+_AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Joint values as whole pulses: where the motors go, and where the tip goes with them."""
+
+    joints: Array  # (..., n) [rad | mm] as asked
+    pulses: Pulses  # (..., motors) [steps from home | us]
+    actual_joints: Array  # (..., n) [rad | mm] where those pulses put the joints
+    theoretical: Array  # (..., 3) [mm] the tip for the exact joints
+    actual: Array  # (..., 3) [mm] the tip for the actual joints
+
+    @property
+    def difference(self) -> Array:
+        """(..., 3) [mm] how far the actual tip is off along each axis, without sign."""
+        return np.abs(self.actual - self.theoretical)
+
+    @property
+    def error(self) -> Array:
+        """(...) [mm] distance between the exact and the actual tip."""
+        return np.asarray(np.linalg.norm(self.actual - self.theoretical, axis=-1))
+
+
+@dataclass(frozen=True)
+class Best:
+    """The pulses whose tip is nearest to the exact one, beside plain rounding."""
+
+    chosen: Rounding
+    rounded: Rounding  # every motor rounded by itself
+    tried: int  # pulse vectors compared for each pose
+
+    @property
+    def gain(self) -> Array:
+        """(...) [mm] how much nearer the chosen pulses are than the rounded ones; never negative."""
+        return self.rounded.error - self.chosen.error
+
+
+def pulses(arm: Arm, q: ArrayLike) -> Pulses:
+    """Whole pulses of every motor: steps counted from home, or servo pulse widths in us.
+
+    q: (..., n) [rad | mm]. Returns (..., motors). Halves round away from zero. A width outside
+    the servo's travel is returned as it is, see `outside_travel`: nothing is clamped.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> armkin.pulses(arm, np.deg2rad([-30, 5, -5])).tolist()
+    [-1067, -10144, 5667]
+    """
+    exact, slack = _exact(arm, q)
+    whole = np.floor(np.abs(exact) + (0.5 + slack))
+    return np.copysign(whole, exact).astype(np.int64)
+
+
+def joints(arm: Arm, p: ArrayLike) -> Array:
+    """Joint values where the motors stand at these pulses.
+
+    p: (..., motors) [steps from home | us]. Returns (..., n) [rad | mm]. With more motors than
+    joints, the joints that fit all motors best (least squares); motors that contradict each other
+    by more than their rounding are an error.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> np.rad2deg(armkin.joints(arm, [-1067, -10144, 5667])).round(6).tolist()
+    [-30.009375, 4.998371, -4.995]
+    """
+    inverse = joints_per_pulse(arm)
+    values = arrays.real(p, "pulses")
+    m = len(arm.motor_gain)
+    if values.ndim == 0 or values.shape[-1] != m:
+        got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
+        raise UsageError(f"{arm.name} has {m} motors: expected {m} pulses on the last axis, got {got}")
+    if not np.all(np.abs(values) <= _LARGEST):
+        raise UsageError("pulses must be finite, and at most 2^53 from 0")
+    offset = values - arm.motor_bias
+    q = offset @ inverse.T
+    if m > arm.n:
+        apart = np.abs(q @ arm.motor_gain.T - offset)
+        # Each motor is rounded by up to half a pulse; least squares can gather all of it in one.
+        if np.any(apart > 0.5 * np.sqrt(m) + _HALF):
+            worst = motor_names(arm)[np.unravel_index(np.argmax(apart), apart.shape)[-1]]
+            raise UsageError(
+                f"the pulses contradict each other: motor {worst} is {apart.max():.1f} pulses from where "
+                "the other motors put its joints; motors of one joint must agree"
+            )
+    return np.asarray(arm.home + q)
+
+
+def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
+    """Exact and actual joints and tips of the pulses for q.
+
+    q: (..., n) [rad | mm]; p: (..., motors) the pulses, by default `pulses(arm, q)`.
+    """
+    exact = as_joints(arm, q)
+    counts = pulses(arm, exact) if p is None else np.asarray(p, dtype=np.int64)
+    actual = joints(arm, counts)
+    return Rounding(exact, counts, actual, position(arm, exact), position(arm, actual))
+
+
+def best_pulses(arm: Arm, q: ArrayLike) -> Best:
+    """Among the pulse vectors around the exact one, that whose tip is nearest to the exact tip.
+
+    q: (..., n) [rad | mm]. The search is complete over its neighbourhood: every motor takes the two
+    pulses on either side of its exact value (one on either side for more than six motors). Only the
+    tip's position counts, its direction may turn by as much as those pulses are worth. A vector that
+    leaves the joint limits or the servos' travel farther than plain rounding does is not considered,
+    nor one that makes two motors of a joint work against each other.
+    """
+    exact, _ = _exact(arm, q)
+    values = as_joints(arm, q)
+    m = len(arm.motor_gain)
+    steps = (-1.0, 0.0, 1.0, 2.0) if 4**m <= _CANDIDATES else (0.0, 1.0)
+    if len(steps) ** m > _CANDIDATES:
+        raise UsageError(f"{arm.name} has {m} motors: --best tries all neighbours of up to 12")
+    around = np.array(list(product(steps, repeat=m)))
+    flat_q, flat_x = values.reshape(-1, arm.n), exact.reshape(-1, m)
+    chosen = np.empty((len(flat_q), m), dtype=np.int64)
+    block = max(1, _AT_ONCE // len(around))
+    for start in range(0, len(flat_q), block):
+        part = slice(start, start + block)
+        chosen[part] = _nearest(arm, flat_q[part], flat_x[part], around)
+    return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(around) + 1)
+
+
+def resolution(arm: Arm) -> Array:
+    """What one pulse is worth at each joint: (n,) [rad | mm].
+
+    Rounding the motors puts a joint within half of this of its exact value. With one motor a joint
+    it is the joint's step; where several motors turn a joint, their steps add up.
+    """
+    return np.asarray(np.abs(joints_per_pulse(arm)).sum(axis=1))
+
+
+def motor_names(arm: Arm) -> list[str]:
+    """Names of the motors, in the order of the pulses."""
+    if arm.file is None:
+        return [f"M{k + 1}" for k in range(len(arm.motor_gain))]
+    return [motor.name for motor in arm.file.motor_list()]
+
+
+def pulse_units(arm: Arm) -> list[str]:
+    """``"step"`` or ``"us"`` for every motor."""
+    if arm.file is None:
+        return ["step"] * len(arm.motor_gain)
+    return ["us" if motor.kind == "servo" else "step" for motor in arm.file.motor_list()]
+
+
+def pulse_range(arm: Arm) -> Array:
+    """Lowest and highest pulse width of every servo: (motors, 2) [us]; steppers -inf, inf."""
+    allowed = np.tile([-np.inf, np.inf], (len(arm.motor_gain), 1))
+    for k, motor in enumerate(arm.file.motor_list() if arm.file is not None else ()):
+        if motor.kind == "servo" and motor.pulse_us is not None:
+            allowed[k] = motor.pulse_us
+    return allowed
+
+
+def outside_travel(arm: Arm, p: ArrayLike) -> NDArray[np.bool_]:
+    """Which pulses no servo can take: (..., motors) -> (..., motors) bool. Steppers have no such range."""
+    values, allowed = np.asarray(p), pulse_range(arm)
+    return np.asarray((values < allowed[:, 0]) | (values > allowed[:, 1]))
+
+
+def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
+    """Pulses before rounding, and how far arithmetic may have moved them: (..., motors) twice."""
+    joints_per_pulse(arm)
+    values = as_joints(arm, q)
+    if not np.all(np.isfinite(values)):
+        raise UsageError("joint values must be finite to become pulses")
+    exact = (values - arm.home) @ arm.motor_gain.T + arm.motor_bias
+    if not np.all(np.abs(exact) <= _LARGEST):
+        raise UsageError("the joint values are too large: more than 2^53 pulses")
+    size = (np.abs(values) + np.abs(arm.home)) @ np.abs(arm.motor_gain).T
+    return exact, _HALF + 4 * np.finfo(float).eps * size
+
+
+def joints_per_pulse(arm: Arm) -> Array:
+    """How far a pulse of each motor moves each joint: (n, motors) [rad | mm].
+
+    Raises UsageError if the motors do not determine the joints.
+    """
+    gain = arm.motor_gain
+    still = [name for name, column in zip(arm.joint_names, gain.T, strict=True) if not column.any()]
+    if len(still) == arm.n:
+        raise UsageError(f"{arm.name} has no drives; add drive: to its joints, or motors:")
+    if still:
+        names = ", ".join(still)
+        raise UsageError(f"{arm.name} has no motor for {names}; add drive: to each joint, or motors:")
+    # In units of each joint's own pulse, so that rad and mm, or coarse and fine drives, compare.
+    scale = np.abs(gain).max(axis=0)
+    if np.linalg.matrix_rank(gain / scale) < arm.n:
+        raise UsageError(
+            f"{arm.name}'s motors do not determine its joints; give it as many independent motors as joints"
+        )
+    if np.count_nonzero(gain) == len(gain) == arm.n:  # one to one: exact, without a factorisation
+        return np.asarray(np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T)
+    return np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
+
+
+def _nearest(arm: Arm, q: Array, exact: Array, around: Array) -> Array:
+    """Per pose, the neighbouring pulses with the nearest tip: (N, motors)."""
+    rounded = pulses(arm, q).astype(float)
+    near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + around], axis=1)  # (N, C, motors)
+    actual = arm.home + (near - arm.motor_bias) @ joints_per_pulse(arm).T
+    tip = position(arm, actual)
+    distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)
+
+    allowed = pulse_range(arm)
+    overrun = np.maximum(arm.lower - actual, actual - arm.upper).max(axis=-1)
+    overdrive = np.maximum(allowed[:, 0] - near, near - allowed[:, 1]).max(axis=-1)
+    strain = np.abs((actual - arm.home) @ arm.motor_gain.T + arm.motor_bias - near).max(axis=-1)
+    tolerance = 1e-9
+    bad = overrun > np.maximum(overrun[:, :1], 0.0) + tolerance
+    bad |= overdrive > np.maximum(overdrive[:, :1], 0.0)
+    bad |= strain > np.maximum(strain[:, :1], 0.5 - 1e-6)
+    distance[bad] = np.inf
+    # The rounded vector comes first, and argmin keeps the first of equals.
+    pick = np.argmin(distance, axis=1)
+    improved = distance[np.arange(len(q)), pick] < distance[:, 0] * (1 - 1e-12)
+    return np.asarray(near[np.arange(len(q)), np.where(improved, pick, 0)])

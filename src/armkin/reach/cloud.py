@@ -1,0 +1,116 @@
+"""A cloud of samples as a file, written chunk by chunk, whole or not at all.
+
+.csv  one row a sample: joints [deg | mm], x, y, z [mm], the measures asked for; ten digits, nine decimals
+.npz  arrays of doubles: joints (N, n) [deg | mm], position (N, 3) [mm], one array a measure; joint_names
+.ply  a point cloud for MeshLab, CloudCompare, Blender: x, y, z and the measures as floats
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.files import whole
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Write = Callable[[Array, Array, list[Array]], None]
+
+_ENDS = (".csv", ".npz", ".ply")
+
+
+def check(path: str) -> str:
+    """The kind of cloud that a file's name asks for."""
+    end = Path(path).suffix.lower()
+    if end not in _ENDS:
+        raise UsageError(f"{path}: a cloud is written as {', '.join(_ENDS)}; end the file's name with one of them")
+    return end
+
+
+@contextmanager
+def cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+    """The function that writes a chunk: joints (N, n) [rad | mm], tips (N, 3) [mm], measures (N,) each.
+
+    count: samples in all. Raises FileError, after which there is no file.
+    """
+    writer = {".csv": _csv, ".npz": _npz, ".ply": _ply}[check(path)]
+    with whole(path, "wb") as file, writer(file, path, arm, count, measures) as write:
+        yield write
+
+
+def _degrees(arm: Arm) -> Array:
+    """Files hold degrees and mm."""
+    return np.where(arm.prismatic, 1.0, 180.0 / np.pi)
+
+
+@contextmanager
+def _csv(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+    heading = [*arm.joint_names, "x", "y", "z", *measures]
+    file.write(f"{','.join(heading)}\n".encode())
+    row = ",".join(["%.10g"] * len(heading)) + "\n"
+    scale = _degrees(arm)
+
+    def write(q: Array, tip: Array, values: list[Array]) -> None:
+        table = np.round(np.column_stack([q * scale, tip, *values]), 9) + 0.0  # + 0.0: no -0
+        for start in range(0, len(table), 4096):
+            part = table[start : start + 4096]
+            file.write((row * len(part) % tuple(part.ravel().tolist())).encode())
+
+    yield write
+
+
+@contextmanager
+def _ply(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+    lines = ["ply", "format binary_little_endian 1.0", f"comment {arm.name}, tip positions in mm, by armkin"]
+    lines += [f"element vertex {count}", *(f"property float {name}" for name in ("x", "y", "z", *measures))]
+    # The header is ASCII and a line of it a line, whatever an arm is called.
+    file.write("".join(f"{line}\n" for line in [*lines, "end_header"]).encode("ascii", "replace"))
+
+    def write(q: Array, tip: Array, values: list[Array]) -> None:
+        file.write(np.column_stack([tip, *values]).astype("<f4").tobytes())
+
+    yield write
+
+
+@contextmanager
+def _npz(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+    # A zip file takes one member after the other: each array waits in a nameless file beside the target.
+    folder = os.path.dirname(os.path.realpath(path))
+    shapes = {"joints": (count, arm.n), "position": (count, 3), **dict.fromkeys(measures, (count,))}
+    scale = _degrees(arm)
+    with ExitStack() as stack:
+        parts = {name: stack.enter_context(tempfile.TemporaryFile(dir=folder)) for name in shapes}
+
+        def write(q: Array, tip: Array, values: list[Array]) -> None:
+            for part, array in zip(parts.values(), [q * scale, tip, *values], strict=True):
+                part.write(np.ascontiguousarray(array, dtype="<f8").tobytes())
+
+        yield write
+        with zipfile.ZipFile(file, "w") as archive:
+            with archive.open(_member("joint_names"), "w") as member:
+                names = io.BytesIO()
+                np.save(names, np.array(arm.joint_names))
+                member.write(names.getvalue())
+            for name, part in parts.items():
+                part.seek(0)
+                with archive.open(_member(name), "w", force_zip64=True) as member:
+                    header = {"descr": "<f8", "fortran_order": False, "shape": shapes[name]}
+                    np.lib.format.write_array_header_1_0(member, header)
+                    shutil.copyfileobj(part, member, 1 << 20)
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    # A date of its own, so that the same samples are the same file.
+    return zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))

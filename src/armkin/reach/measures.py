@@ -1,0 +1,77 @@
+"""How well an arm can move its tip at a pose, and how finely."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula.arrays import Array
+from armkin.forward import jacobian
+from armkin.motors import joints_per_pulse
+from armkin.reach.volume import motion
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+MEASURES = ("manipulability", "step_error")
+
+
+def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
+    """The function (N, n) -> (N,) of a measure's name, its constants worked out."""
+    if name == "step_error":
+        half = 0.5 * joints_per_pulse(arm)
+        return lambda q: _worst(jacobian(arm, q)[:, :3] @ half)
+    normal, _ = motion(arm)
+    basis = np.eye(3) if normal is None else np.linalg.svd(normal[None])[2][1:]
+    return lambda q: _volume(basis @ jacobian(arm, q)[:, :3])
+
+
+def step_error(arm: Arm, q: ArrayLike) -> Array:
+    """How far the tip is off when every motor is half a pulse off, in the worst combination of signs.
+
+    q: (..., n) [rad | mm]. Returns (...) [mm]: the largest ``|J M^-1 s / 2|`` over all s of +1 and -1,
+    J the linear rows of the Jacobian, M the motors matrix (pulses per rad | mm). To first order it
+    bounds the error of rounding joint values to pulses.
+    """
+    values = np.asarray(q, dtype=float)
+    return measure(arm, "step_error")(values.reshape(-1, arm.n)).reshape(values.shape[:-1])
+
+
+def tip_manipulability(arm: Arm, q: ArrayLike) -> Array:
+    """Yoshikawa's measure of the tip's position, within the plane of a planar arm.
+
+    q: (..., n) [rad | mm]. Returns (...): the product of the singular values of the Jacobian's linear
+    rows (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 13); a power of mm.
+    """
+    values = np.asarray(q, dtype=float)
+    return measure(arm, "manipulability")(values.reshape(-1, arm.n)).reshape(values.shape[:-1])
+
+
+def _volume(J: Array) -> Array:
+    """Product of the singular values of J (N, k, n)."""
+    k, n = J.shape[1:]
+    if k == n:  # no square root, hence no loss of digits at a singular pose
+        return np.asarray(np.abs(np.linalg.det(J)))
+    square = J @ J.transpose(0, 2, 1) if k < n else J.transpose(0, 2, 1) @ J
+    return np.asarray(np.sqrt(np.maximum(np.linalg.det(square), 0.0)))
+
+
+def _worst(columns: Array) -> Array:
+    """Largest length of a sum of +- the columns of (N, 3, m), all combinations of signs.
+
+    The combinations run in the order of a Gray code: each differs from the one before in one sign. The
+    last sign stays: the negative of a sum is as long as the sum.
+    """
+    step = 2.0 * np.ascontiguousarray(columns.transpose(2, 1, 0))  # (m, 3, N)
+    total = 0.5 * step.sum(axis=0)
+    worst = np.einsum("kn,kn->n", total, total)
+    positive = [True] * len(step)
+    for code in range(1, 1 << (len(step) - 1)):
+        flip = (code & -code).bit_length() - 1
+        total += -step[flip] if positive[flip] else step[flip]
+        positive[flip] = not positive[flip]
+        np.maximum(worst, np.einsum("kn,kn->n", total, total), out=worst)
+    return np.asarray(np.sqrt(worst))

@@ -1,0 +1,113 @@
+"""Joint values that cover an arm's range: random or a grid, chunk by chunk and repeatable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+CHUNK = 1 << 16  # samples in memory at once
+_MOST = 10**15  # more cannot end within a lifetime
+
+
+def span(arm: Arm) -> tuple[Array, Array]:
+    """Lower and upper end of what is sampled: (n,) twice [rad | mm].
+
+    The limits; for an unlimited revolute joint one turn, -180 to 180 degrees. An unlimited
+    prismatic joint has no finite range and is an error.
+    """
+    endless = [
+        name
+        for name, slides, low, high in zip(arm.joint_names, arm.prismatic, arm.lower, arm.upper, strict=True)
+        if slides and not (math.isfinite(low) and math.isfinite(high))
+    ]
+    if endless:
+        raise UsageError(f"prismatic joint {endless[0]} of {arm.name} has no limits; give it limits: [mm, mm]")
+    low = np.where(np.isfinite(arm.lower), arm.lower, -math.pi)
+    high = np.where(np.isfinite(arm.upper), arm.upper, math.pi)
+    return low, high
+
+
+@dataclass(frozen=True)
+class Random:
+    """`count` poses, every joint uniform and independent over its range."""
+
+    arm: Arm
+    count: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= _MOST:
+            raise UsageError(f"{self.count} samples: give 1 to 1e15")
+        if self.seed < 0:
+            raise UsageError(f"seed {self.seed}: give 0 or more")
+        span(self.arm)
+
+    def chunks(self) -> Iterator[Array]:
+        """The poses, (up to CHUNK, n) [rad | mm] at a time; the same ones at every call."""
+        rng = np.random.default_rng(self.seed)
+        low, high = span(self.arm)
+        for start in range(0, self.count, CHUNK):
+            yield low + (high - low) * rng.random((min(CHUNK, self.count - start), self.arm.n))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Every combination of evenly spaced joint values, the last joint changing fastest.
+
+    Both limits are on the grid. An unlimited joint's turn is half open: -180 is on it, 180 is not.
+    A single point stands in the middle of the range.
+    """
+
+    arm: Arm
+    points: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.points) != self.arm.n:
+            raise UsageError(
+                f"{self.arm.name} has {self.arm.n} joints ({', '.join(self.arm.joint_names)}): "
+                f"a grid needs {self.arm.n} numbers of points, or one for all; got {len(self.points)}"
+            )
+        if min(self.points) < 1:
+            raise UsageError(f"a grid needs at least 1 point on every joint, not {min(self.points)}")
+        if self.count > _MOST:
+            raise UsageError(f"the grid has {self.count:.3g} points; 1e15 at most")
+        span(self.arm)
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return math.prod(self.points)
+
+    def chunks(self) -> Iterator[Array]:
+        """The poses, (up to CHUNK, n) [rad | mm] at a time."""
+        low, high = span(self.arm)
+        step = np.zeros(self.arm.n)
+        first = low.copy()
+        for i, k in enumerate(self.points):
+            turn = not (np.isfinite(self.arm.lower[i]) and np.isfinite(self.arm.upper[i]))
+            if k == 1:
+                first[i] = 0.5 * (low[i] + high[i])
+            else:
+                step[i] = (high[i] - low[i]) / (k if turn else k - 1)
+        for start in range(0, self.count, CHUNK):
+            flat = np.arange(start, min(start + CHUNK, self.count))
+            index = np.stack(np.unravel_index(flat, self.points), axis=-1)
+            yield np.minimum(first + step * index, high)
+
+
+Sampling = Random | Grid
+
+
+def grid(arm: Arm, points: Sequence[int]) -> Grid:
+    """A grid of so many points a joint; a single number counts for every joint."""
+    return Grid(arm, tuple(points) * arm.n if len(points) == 1 else tuple(points))

@@ -1,0 +1,259 @@
+"""Volume or area of what the tool's tip can reach, with an error.
+
+The first joint's motion is exact: it sweeps the tip along a circle about its axis, or along a line.
+What is left is a section through the first joint's axis, (r^2/2, z) for a revolute joint, which the
+other joints fill; it is cut into cells of equal area, so that a cell stands for the volume
+
+    cell area x length swept at the cell,
+
+the length being an angle for a revolute joint (Pappus), or mm for a prismatic one. Every cell keeps
+the interval of where along the sweep its tips start (one interval for each stretch as long as the
+sweep itself: the union of the swept stretches is then exact, also where the arm reaches the same
+place from the front and over the shoulder).
+
+Cells are found by random sampling, with a share of the joints set exactly on their limits, followed
+by growth from the cells that were found last (Gaussian growth: Peidro, Reinoso, Gil, Marin, Paya,
+An improved Monte Carlo method based on Gaussian growth to calculate the workspace of robots,
+Engineering Applications of Artificial Intelligence 64, 2017).
+
+A cell on the border is reached in part. Counting all such cells gives an upper figure, counting none
+a lower one; as a border falls anywhere in its cells, the middle of the two is taken. The error is half
+of what is between the two, plus how far the figure moves when the cells are merged to twice their
+size, which shows what the samples have missed. Of all sizes the one with the least error is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.forward import jacobian, position
+from armkin.reach.sampling import span
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_SIDE = 512  # cells along each side of the section of an arm in space
+_LINE = 1 << 14  # cells of a planar arm's section, which is a line
+_STRETCHES = 64  # at most, along the sweep
+_UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples grown from them
+_CHUNK = 1 << 16
+_POOL = 1 << 14  # poses to grow from
+_OVERSHOOT = 0.04  # of the range: samples beyond a limit are set on it
+_MARGIN = 0.02  # of the section's size, around what a first look finds
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A volume or an area and how far it may be off."""
+
+    dimensions: int  # 3: volume [mm3]; 2: area [mm2]
+    value: float
+    error: float
+    method: str
+
+
+def extent(arm: Arm, seed: int = 0) -> Extent:
+    """Volume [mm3] of an arm's reach, or area [mm2] if it moves in a plane.
+
+    An arm whose tip has fewer freedoms than the space it moves in (two joints in space sweep a
+    surface) has the volume 0.
+    """
+    normal, freedoms = motion(arm)
+    dimensions = 3 if normal is None else 2
+    if freedoms < dimensions:
+        what = {0: "does not move", 1: "stays on a curve", 2: "stays on a surface"}[freedoms]
+        return Extent(dimensions, 0.0, 0.0, f"exact: the tip {what}")
+    section = _Section(arm, normal)
+    rng = np.random.default_rng(seed)
+    look = _Cells(section, *section.widest(), 64)
+    _fill(look, rng, 2, 2)
+    margin = _MARGIN * (look.most - look.least)
+    low, high = look.least - margin, look.most + margin
+    if section.revolute:
+        low[0] = max(low[0], 0.0)
+    cells = _Cells(section, low, high, _LINE if dimensions == 2 else _SIDE)
+    _fill(cells, rng, _UNIFORM, _GROWN)
+    levels = [cells]
+    while (coarse := levels[-1].merged()) is not None:
+        levels.append(coarse)
+    brackets = np.array([level.bracket() for level in levels])
+    middles = brackets.mean(axis=1)
+    errors = 0.5 * np.diff(brackets, axis=1)[:-1, 0] + np.abs(np.diff(middles))
+    chosen = int(np.argmin(errors))
+    cells = levels[chosen]
+    shape = " x ".join(str(k) for k in cells.shape)
+    sweep = "a full turn" if section.closed else "its range"
+    return Extent(
+        dimensions,
+        float(middles[chosen]),
+        float(errors[chosen]),
+        f"{shape} cells of equal area in a section, swept exactly by {arm.joint_names[0]} over {sweep}; "
+        "border cells count half; the error is that half and the change with cells of twice the size",
+    )
+
+
+def motion(arm: Arm) -> tuple[Array | None, int]:
+    """The normal of the plane that the tip moves in (None: space), and the tip's freedoms."""
+    low, high = span(arm)
+    q = low + (high - low) * np.random.default_rng(1).random((64, arm.n))
+    J = jacobian(arm, q)[:, :3] * (high - low)  # [mm] over a joint's whole range
+    tolerance = 1e-9 * arm.reach
+    freedoms = int((np.linalg.svd(J, compute_uv=False) > tolerance).sum(axis=-1).max())
+    directions, sizes, _ = np.linalg.svd(np.moveaxis(J, 1, 0).reshape(3, -1), full_matrices=False)
+    planar = sizes[2] <= tolerance * math.sqrt(J.size) if len(sizes) == 3 else True
+    return (directions[:, 2] if planar else None), freedoms
+
+
+class _Section:
+    """Tips with the first joint at 0, seen from its axis: where in the section, and where along the sweep."""
+
+    def __init__(self, arm: Arm, normal: Array | None) -> None:
+        self.arm = arm
+        self.revolute = not arm.prismatic[0]
+        self.low, self.high = span(arm)
+        self.sweep = float(self.high[0] - self.low[0])  # [rad | mm]
+        self.closed = self.revolute and self.sweep >= 2 * math.pi * (1 - 1e-12)
+        to_axis = np.linalg.inv(arm.link[0])
+        self._R, self._p = to_axis[:3, :3], to_axis[:3, 3]
+        # In a plane the section is a line: the radius, or across a first slide.
+        self.flat = normal is not None
+        across = np.array([1.0, 0.0, 0.0])
+        if normal is not None and not self.revolute:
+            across = np.cross(self._R @ normal, [0.0, 0.0, 1.0])
+        self._across = across
+
+    def widest(self) -> tuple[Array, Array]:
+        """Corners of a section that no tip can leave."""
+        reach = self.arm.reach * (1 + 1e-9)
+        low, high = np.array([-reach, -reach]), np.array([reach, reach])
+        if self.revolute:
+            low[0], high[0] = 0.0, 0.5 * reach**2
+        return (low[:1], high[:1]) if self.flat else (low, high)
+
+    def place(self, q: Array) -> tuple[list[Array], Array]:
+        """Section coordinates, a list of one or two (N,), and the start along the sweep (N,)."""
+        x, y, z = (position(self.arm, q) @ self._R.T + self._p).T
+        if self.revolute:
+            u = 0.5 * (x * x + y * y)
+            start = np.zeros(len(q)) if self.closed else np.arctan2(y, x)
+            return ([u] if self.flat else [u, z]), start
+        if self.flat:
+            return [self._across[0] * x + self._across[1] * y], z
+        return [x, y], z
+
+
+class _Cells:
+    """The section cut into cells, and what was found in each."""
+
+    def __init__(self, section: _Section, low: Array, high: Array, side: int) -> None:
+        self.section = section
+        reach = math.pi if section.revolute else section.arm.reach
+        # Stretches no longer than the sweep: two starts in one are always joined by what they sweep.
+        count = 1 if section.closed else min(_STRETCHES, math.ceil(2 * reach / section.sweep))
+        self.first_start, self.stretch, self.stretches = -reach, 2 * reach / count, count
+        if len(low) == 2:
+            side = 1 << (min(side, math.isqrt((1 << 20) // count)).bit_length() - 1)
+        self.shape = (side,) * len(low)
+        self.low, self.high = low, high
+        # Not below what floats can tell apart: an arm may hardly move.
+        self.size = np.maximum((high - low) / side, np.spacing(np.maximum(np.abs(low), np.abs(high))))
+        cells = math.prod(self.shape) * count
+        self.start_low = np.full(cells, np.inf)
+        self.start_high = np.full(cells, -np.inf)
+        self.least, self.most = np.full(len(low), np.inf), np.full(len(low), -np.inf)
+        self._notable = self.stretch / 64
+
+    def add(self, q: Array) -> NDArray[np.bool_]:
+        """Enter poses; which of them found something new."""
+        place, start = self.section.place(q)
+        flat = np.zeros(len(q), dtype=np.int64)
+        for k, x in enumerate(place):
+            self.least[k], self.most[k] = min(self.least[k], x.min()), max(self.most[k], x.max())
+            index = ((x - self.low[k]) / self.size[k]).astype(np.int64)
+            flat = flat * self.shape[k] + np.clip(index, 0, self.shape[k] - 1)
+        if self.stretches > 1:
+            part = ((start - self.first_start) / self.stretch).astype(np.int64)
+            flat = flat * self.stretches + np.clip(part, 0, self.stretches - 1)
+        new = start < self.start_low[flat] - self._notable
+        new |= start > self.start_high[flat] + self._notable
+        np.minimum.at(self.start_low, flat, start)
+        np.maximum.at(self.start_high, flat, start)
+        return np.asarray(new)
+
+    def merged(self) -> _Cells | None:
+        """The same with cells of twice the size along every side; None when they would be few."""
+        if self.shape[0] <= 32:
+            return None
+        coarse = _Cells(self.section, self.low, self.high, self.shape[0] // 2)
+        pairs = [k for n in coarse.shape for k in (n, 2)] + [self.stretches]
+        inner = tuple(range(1, 2 * len(self.shape), 2))
+        coarse.start_low = self.start_low.reshape(pairs).min(axis=inner).ravel()
+        coarse.start_high = self.start_high.reshape(pairs).max(axis=inner).ravel()
+        return coarse
+
+    def swept(self) -> Array:
+        """Length swept at each cell: (cells...) [rad | mm]."""
+        low = self.start_low.reshape(-1, self.stretches)
+        high = self.start_high.reshape(-1, self.stretches)
+        sweep = self.section.sweep
+        before = np.full(len(low), -np.inf)  # end of the starts seen so far
+        first = np.full(len(low), np.inf)
+        gaps = np.zeros(len(low))
+        for k in range(self.stretches):
+            found = np.isfinite(low[:, k])
+            gap = np.where(found, low[:, k], 0.0) - np.where(np.isfinite(before), before, np.inf) - sweep
+            gaps += np.where(found, np.maximum(gap, 0.0), 0.0)
+            first = np.where(np.isfinite(first), first, low[:, k])
+            before = np.where(found, high[:, k], before)
+        found = np.isfinite(first)
+        first, before = np.where(found, first, 0.0), np.where(found, before, 0.0)
+        if self.section.revolute:  # a circle: what is not in a gap, the last one reaching around to the first
+            total = 2 * math.pi - gaps - np.maximum(first + 2 * math.pi - before - sweep, 0.0)
+        else:
+            total = before - first + sweep - gaps
+        return np.where(found, total, 0.0).reshape(self.shape)
+
+    def bracket(self) -> tuple[float, float]:
+        """Lower and upper figure of the volume or area."""
+        most = self.swept()
+        # At r = 0 there is no border: the section ends there because the axis does.
+        axis = "edge" if self.section.revolute and self.low[0] == 0.0 else "constant"
+        least = most
+        for k in range(most.ndim):
+            sides: list[tuple[int, int]] = [(0, 0)] * most.ndim
+            sides[k] = (1, 0)
+            padded = np.pad(least, sides, mode=axis if k == 0 else "constant")  # type: ignore[call-overload]
+            sides[k] = (0, 1)
+            padded = np.pad(padded, sides)
+            n = self.shape[k]
+            least = np.minimum(
+                np.minimum(padded.take(range(n), k), padded.take(range(1, n + 1), k)),
+                padded.take(range(2, n + 2), k),
+            )
+        cell = float(np.prod(self.size))
+        return float(least.sum()) * cell, float(most.sum()) * cell
+
+
+def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int) -> None:
+    """Sample the other joints: at random first, then around the poses that last found something new."""
+    arm, low, high = cells.section.arm, cells.section.low, cells.section.high
+    limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+    width = high - low
+    pool = np.empty((0, arm.n))
+    for chunk in range(uniform + grown):
+        if chunk < uniform:
+            q = low - _OVERSHOOT * width + (1 + 2 * _OVERSHOOT) * width * rng.random((_CHUNK, arm.n))
+        else:
+            seeds = pool[rng.integers(len(pool), size=_CHUNK)]
+            step = 10.0 ** rng.uniform(-4.0, -0.5, (_CHUNK, 1))
+            q = seeds + step * width * rng.standard_normal((_CHUNK, arm.n))
+        q = np.where(limited, np.clip(q, low, high), q)
+        q[:, 0] = 0.0
+        new = cells.add(q)
+        pool = np.concatenate([q[new], pool])[:_POOL]

@@ -1,0 +1,328 @@
+"""YAML without its traps: every value is what it looks like, or an error with its line.
+
+The text is parsed into events (by libyaml where PyYAML has it) and the values are built here, so that
+nothing of YAML 1.1's guessing is left: ``80:16`` is not 4816, ``017`` is not 15, ``off`` is not false
+and ``1e3`` is not text. Anchors and aliases are refused as a whole, because a file of a few lines can
+unfold into gigabytes; so are tags, merge keys and several documents. A value that all YAML readers
+agree on (``-3.5``, ``.5``, ``1.0e+3``, ``true``, ``"text"``) is accepted.
+
+>>> loads("a: [1, 2.5]\\nb: {c: x}\\n").data
+{'a': (1, 2.5), 'b': {'c': 'x'}}
+>>> loads("gear: 80:16")
+Traceback (most recent call last):
+    ...
+armkin.robot_file.strict_yaml.StrictYamlError: 1: 80:16 is 4816 to YAML; write teeth as {motor: 16, joint: 80}
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+MAX_BYTES = 256 * 1024
+MAX_VALUES = 2_000  # an arm of twelve joints with all its motors has 500
+MAX_DEPTH = 12
+MAX_DIGITS = 15  # an integer of 15 digits is still exact as a float
+
+Path = tuple[str | int, ...]
+
+_EMPTY = "the file is empty; a robot file has at least name, convention and joints"
+
+_LOADER: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+
+# YAML 1.1's own patterns, from PyYAML's resolver.py, and what people write that misses them by a hair.
+# Plain text, compiled by `re` when first needed: most files need the first two only.
+_INT = r"[-+]?(?:0|[1-9][0-9]*)"
+_FLOAT = r"[-+]?(?:0|[1-9][0-9]*)\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?"
+_LIKE_FLOAT = r"([-+]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([-+]?)([0-9]+))?"
+_SEXAGESIMAL = r"[-+]?[0-9][0-9_]*(?::[0-9]+)+(?:\.[0-9_]*)?"
+_LEADING_ZERO = r"([-+]?)0+([0-9_]+(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?)"
+_OTHER_BASE = r"[-+]?0[xXbBoO][0-9a-fA-F_]+"
+_UNDERSCORE = r"[-+]?[0-9][0-9_]*_[0-9_]*(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?"
+_NOT_FINITE = r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+_TIMESTAMP = r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?"
+_WORDS_FOR_TRUE = ("yes", "on")
+_WORDS_FOR_FALSE = ("no", "off")
+
+
+class StrictYamlError(ValueError):
+    """A text that is not strict YAML: ``line`` (from 1; 0 for the file as a whole) and ``problem``."""
+
+    def __init__(self, line: int, problem: str) -> None:
+        super().__init__(f"{line}: {problem}" if line else problem)
+        self.line = line
+        self.problem = problem
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document's values, and the line on which each of them (or its key) stands."""
+
+    data: dict[str, Any]
+    lines: dict[Path, int] = field(repr=False)
+
+    def line(self, path: Path) -> int:
+        """Line of the value at ``path``, or of the nearest enclosing value that is there."""
+        while path not in self.lines:
+            path = path[:-1]
+        return self.lines[path]
+
+
+def loads(text: bytes | str) -> Document:
+    """Read one YAML document whose top level is a mapping.
+
+    text: bytes in UTF-8 (a byte order mark is accepted) or text
+    returns: mappings as dict, sequences as tuple, scalars as str, int, float and bool
+    """
+    return _build(_parse(_decode(text)))
+
+
+def _decode(raw: bytes | str) -> str:
+    if isinstance(raw, str):
+        text = raw
+    else:
+        if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            raise StrictYamlError(0, "the file is UTF-16; save it as UTF-8")
+        try:
+            text = raw.decode("utf-8")
+        except UnicodeDecodeError as error:
+            line = raw.count(b"\n", 0, error.start) + 1
+            what = f"byte 0x{raw[error.start]:02x} is not UTF-8"
+            raise StrictYamlError(line, f"{what}; save the file as UTF-8 text") from None
+    if len(text) > MAX_BYTES:
+        raise StrictYamlError(0, f"larger than {MAX_BYTES // 1024} kB; no robot file is that long")
+    text = text.removeprefix("\ufeff")
+    for character in set(text):
+        if not _is_text(ord(character)):
+            line = text.count("\n", 0, text.index(character)) + 1
+            what = f"U+{ord(character):04X} has no place in a robot file, which is YAML text"
+            raise StrictYamlError(line, f"character {what}")
+    return text
+
+
+def _is_text(code: int) -> bool:
+    """YAML 1.2, production 1, less the line breaks that no editor counts (U+0085, U+2028, U+2029)."""
+    if code < 0x7F:
+        return code >= 0x20 or code in (0x09, 0x0A, 0x0D)
+    if code < 0xA0 or code in (0x2028, 0x2029, 0xFEFF, 0xFFFE, 0xFFFF):
+        return False
+    return not 0xD800 <= code <= 0xDFFF
+
+
+def _parse(text: str) -> Iterator[Any]:
+    """Parser events, with syntax errors told in our words."""
+    try:
+        yield from yaml.parse(text, Loader=_LOADER)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        if mark is None:
+            raise StrictYamlError(0, f"not YAML: {error.problem}") from None
+        source = text.splitlines() or [""]
+        line = min(mark.line + 1, len(source))  # an end that came too early is on the last line
+        faulty = source[line - 1]
+        character = faulty[mark.column : mark.column + 1]
+        if character == "\t" or "\t" in faulty[: len(faulty) - len(faulty.lstrip())]:
+            raise StrictYamlError(line, "a tab is not allowed in YAML's indentation; use spaces") from None
+        if character and character in "%@`":
+            raise StrictYamlError(line, f"text cannot begin with {character}; put it in quotes") from None
+        problem = str(error.problem)
+        begin = error.context_mark.line + 1 if error.context_mark else line
+        where = f" ({error.context} that begins on line {begin})" if begin < line else ""
+        hint = "check the colon and space after keys, the indentation, brackets and quotes"
+        if problem.startswith("mapping values are not allowed"):
+            problem = "a key inside a value"
+            hint = "text with ': ' in it needs quotes; the keys of one mapping are indented alike"
+        raise StrictYamlError(line, f"not YAML: {problem}{where}; {hint}") from None
+    except yaml.YAMLError as error:  # the reader's: a character that YAML has no place for
+        raise StrictYamlError(0, f"not YAML: {' '.join(str(error).split())}") from None
+
+
+class _Node:
+    """A mapping or sequence under construction."""
+
+    __slots__ = ("items", "key", "mapping", "path")
+
+    def __init__(self, path: Path, mapping: bool) -> None:
+        self.path = path
+        self.mapping = mapping
+        self.items: Any = {} if mapping else []
+        self.key: str | None = None
+
+    def value_path(self) -> Path:
+        return (*self.path, self.key if self.mapping and self.key is not None else len(self.items))
+
+
+def _build(events: Iterator[Any]) -> Document:
+    lines: dict[Path, int] = {}
+    stack: list[_Node] = []
+    root: Any = None
+    documents = 0
+    for event in events:
+        line = event.start_mark.line + 1
+        if isinstance(event, yaml.DocumentStartEvent):
+            documents += 1
+            if documents > 1:
+                raise StrictYamlError(line, "a second document begins here; a robot file is one document")
+            continue
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+            mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
+            what = f"{mark}{shown(event.anchor)}: anchors and aliases are refused, as they can unfold"
+            hint = f"write the value out, or quote text that begins with {mark}"
+            raise StrictYamlError(line, f"{what} without bound; {hint}")
+        if getattr(event, "tag", None) is not None:
+            what = f"tag {shown(event.tag)} is refused: values are plain numbers, text, lists and mappings"
+            raise StrictYamlError(line, f"{what}; remove the tag")
+        parent = stack[-1] if stack else None
+        awaits_key = parent is not None and parent.mapping and parent.key is None
+
+        if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
+            if awaits_key:
+                raise StrictYamlError(line, "a key must be a word, not a list or mapping")
+            if len(stack) >= MAX_DEPTH:
+                raise StrictYamlError(line, f"nested more than {MAX_DEPTH} deep; a robot file never is")
+            path = parent.value_path() if parent else ()
+            lines.setdefault(path, line)
+            stack.append(_Node(path, isinstance(event, yaml.MappingStartEvent)))
+            continue
+        if isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
+            node = stack.pop()
+            value: Any = node.items if node.mapping else tuple(node.items)
+        elif isinstance(event, yaml.ScalarEvent):
+            if awaits_key and parent is not None:
+                parent.key = _key(event, parent, lines, line)
+                continue
+            value = _scalar(event, parent, line)
+            lines.setdefault(parent.value_path() if parent else (), line)
+        else:
+            continue  # stream and document marks
+
+        if len(lines) > MAX_VALUES:
+            raise StrictYamlError(line, f"more than {MAX_VALUES} values; no robot file has so many")
+        if not stack:
+            root = value
+            if not isinstance(root, dict):
+                found = "a list" if isinstance(root, tuple) else f"only the text {shown(str(root))}"
+                what = f"{found}; a robot file is a mapping: name, convention, joints, ..."
+                raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
+        elif stack[-1].mapping:
+            stack[-1].items[stack[-1].key] = value
+            stack[-1].key = None
+        else:
+            stack[-1].items.append(value)
+    if root is None:
+        raise StrictYamlError(0, _EMPTY)
+    return Document(root, lines)
+
+
+def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
+    text = str(event.value)
+    if event.implicit[0]:  # plain, without quotes
+        if text == "<<":
+            raise StrictYamlError(line, "merge keys (<<) are refused; write the values out")
+        if not text:
+            raise StrictYamlError(line, "a value without a key; write key: value")
+        if not isinstance(_resolve(text, line), str):
+            raise StrictYamlError(line, f"key {shown(text)} is not a word; names need a letter, or quotes")
+    _check_text(text, line)
+    path = (*parent.path, text)
+    if text in parent.items:
+        first = lines[path]
+        raise StrictYamlError(line, f"key {shown(text)} stands twice, first on line {first}; keep one")
+    lines[path] = line
+    return text
+
+
+def _scalar(event: Any, parent: _Node | None, line: int) -> Any:
+    text = str(event.value)
+    if not event.implicit[0]:  # in quotes, or a block of text
+        _check_text(text, line)
+        return text
+    if text in ("", "~", "null", "Null", "NULL"):
+        if parent is None:
+            raise StrictYamlError(0, _EMPTY)
+        if parent.mapping:
+            raise StrictYamlError(line, f"{shown(parent.key or '')} has no value; give one, or leave the key out")
+        raise StrictYamlError(line, f"item {len(parent.items) + 1} of a list has no value; give one")
+    value = _resolve(text, line)
+    if isinstance(value, str):
+        _check_text(text, line)
+    return value
+
+
+def _resolve(text: str, line: int) -> str | int | float | bool:
+    """Value of a plain scalar, or the trap that it is."""
+    first = text[0]
+    if first.isdigit() or first in "+-.":
+        return _number(text, line)
+    word = text.lower()
+    if word in ("true", "false"):
+        return word == "true"
+    if word in _WORDS_FOR_TRUE or word in _WORDS_FOR_FALSE:
+        meant = "true" if word in _WORDS_FOR_TRUE else "false"
+        what = f"{text} is {meant} to some YAML readers and text to others"
+        raise StrictYamlError(line, f'{what}; write {meant}, or "{text}" for text')
+    return text
+
+
+def _number(text: str, line: int) -> str | int | float:
+    if re.fullmatch(_INT, text):
+        if len(text) > MAX_DIGITS:
+            raise StrictYamlError(line, f"{shown(text)} has more than {MAX_DIGITS} digits; is it a number?")
+        return int(text)
+    if re.fullmatch(_FLOAT, text):
+        value = float(text)
+        if not math.isfinite(value):
+            raise StrictYamlError(line, f"{shown(text)} is too large for a number")
+        return value
+    if re.fullmatch(_NOT_FINITE, text):
+        raise StrictYamlError(line, f"{text} is not a finite number; leave the key out if there is no bound")
+    if re.fullmatch(_SEXAGESIMAL, text):
+        raise StrictYamlError(line, _sexagesimal(text))
+    if zeros := re.fullmatch(_LEADING_ZERO, text):
+        plain = zeros[1] + (zeros[2].lstrip("0") or "0") if "." not in zeros[2] else zeros[1] + zeros[2]
+        what = f"{shown(text)} begins with 0, which YAML may read as octal"
+        raise StrictYamlError(line, f"{what}; write {shown(plain)}, or quotes for text")
+    if re.fullmatch(_OTHER_BASE, text):
+        raise StrictYamlError(line, f"{shown(text)} is not decimal; write it in decimal, or in quotes")
+    if re.fullmatch(_UNDERSCORE, text):
+        plain = text.replace("_", "")
+        raise StrictYamlError(line, f"{shown(text)} has underscores; write {shown(plain)}")
+    if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
+        sign, whole, part, exponent_sign, exponent = near.groups()
+        better = f"{sign.replace('+', '')}{whole or '0'}.{part or '0'}"
+        if exponent:
+            better += f"e{exponent_sign or '+'}{exponent}"
+        what = f"{shown(text)} is text to YAML, not a number"
+        raise StrictYamlError(line, f"{what}; write {shown(better)}, or quotes for text")
+    if re.fullmatch(_TIMESTAMP, text):
+        raise StrictYamlError(line, f'{shown(text)} is a date to YAML; write "{text}" for text')
+    return text
+
+
+def _sexagesimal(text: str) -> str:
+    parts = text.lstrip("+-").split(":")
+    if len(parts) == 2 and all(part.isdigit() and len(part) < 6 for part in parts):
+        large, small = int(parts[0]), int(parts[1])
+        value = str(60 * large + small) if small < 60 else "text"
+        motor, joint = sorted((large, small))  # a reduction, most likely
+        return f"{text} is {value} to YAML; write teeth as {{motor: {motor}, joint: {joint}}}"
+    return f"{shown(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
+
+
+def _check_text(text: str, line: int) -> None:
+    """No terminal escapes and no half characters, which quotes can smuggle in as "\\e" or "\\ud800"."""
+    if text.isascii() and text.isprintable():
+        return
+    for character in set(text) - {"\t", "\n"}:
+        if not _is_text(ord(character)) or character == "\r":
+            what = f"control character U+{ord(character):04X} in a text"
+            raise StrictYamlError(line, f"{what}; remove it")
+
+
+def shown(text: str) -> str:
+    """The text as it goes into a message: one short line."""
+    text = " ".join(text.split())
+    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,0 +1,1 @@
+"""What an arm looks like: lines and points from its axes."""

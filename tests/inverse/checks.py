@@ -1,0 +1,79 @@
+"""What every answer of `armkin.ik` must satisfy, measured with the oracle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import oracle
+from numpy.typing import NDArray
+from oracle import Goal, Screws
+
+import armkin
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+class Report(NamedTuple):
+    """Figures over a batch of targets made from random joints."""
+
+    arm: Arm
+    screw: Screws
+    goals: Goal
+    q: Array  # (N, n) generating joints
+    solutions: armkin.Solutions
+    lost: NDArray[np.bool_]  # (N,) generating joints not among the branches
+    weak: Array  # (N,) smallest singular value at the generating joints
+    mm: float  # largest errors of any branch, by the oracle
+    deg: float
+    duplicates: int
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        return np.asarray(self.solutions.valid.sum(axis=1))
+
+
+def random_joints(screw: Screws, count: int, seed: int) -> Array:
+    """Joint values over a whole turn, slides over +-500 mm."""
+    rng = np.random.default_rng(seed)
+    n = len(screw.prismatic)
+    turn, slide = rng.uniform(-np.pi, np.pi, (count, n)), rng.uniform(-500, 500, (count, n))
+    return np.where(screw.prismatic, slide, turn)
+
+
+def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
+    """Solve for what the joints q (N, n) reach and compare with the oracle."""
+    definition, _ = solver(arm, task)
+    goals = oracle.goal(definition, screw, q)
+    s = armkin.ik(arm, goals.array(), task)
+    weak = oracle.weakness(screw, goals, q)
+    nearest = oracle.distance(screw, s.q, q[:, None]).min(axis=1, initial=np.inf)
+    # the square root of rounding is all that a double root can be known to
+    lost = nearest > 1e-6 + np.minimum(1e-13 / np.maximum(weak, 1e-300), 1e-3)
+    B = s.q.shape[1]
+    rows, columns = np.nonzero(s.valid)
+    mm, rad = oracle.missing(screw, goals.take(rows), s.q[rows, columns])
+    duplicates = 0
+    for i in range(B):
+        for j in range(i):
+            duplicates += int((oracle.distance(screw, s.q[:, i], s.q[:, j]) < 1e-6).sum())
+    assert np.isnan(s.q[~s.valid]).all()
+    return Report(
+        arm, screw, goals, q, s, lost, weak,
+        float(mm.max(initial=0.0)), float(np.degrees(rad.max(initial=0.0))), duplicates,
+    )  # fmt: skip
+
+
+def not_found(report: Report, rows: NDArray[np.int64], starts: int, seed: int) -> list[tuple[int, Array]]:
+    """Solutions that the multi-start oracle knows and `armkin.ik` does not: (row, joints)."""
+    known = oracle.branches(report.screw, report.goals.take(rows), starts, seed)
+    out = []
+    for row, solutions in zip(rows, known, strict=True):
+        if not len(solutions):
+            continue
+        ours = report.solutions.q[row]
+        d = oracle.distance(report.screw, solutions[:, None], ours[None]).min(axis=1, initial=np.inf)
+        out += [(int(row), q) for q in solutions[d > 1e-5]]
+    return out

@@ -1,0 +1,94 @@
+"""The nearest legal pose: within limits, reported truly, and a local optimum."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle import forward, screws
+
+import armkin
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+
+def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """What `closest` minimises, from the oracle's kinematics: squared distance and angle at a quarter of the reach."""
+    definition = task.task_for(arm, task)
+    T = forward(screws(arm.file), q)
+    goal, _ = task.read_targets(definition, target)
+    r = task.residual(definition, T, q, np.repeat(goal, len(q), axis=0))
+    p = definition.position
+    return (r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1)
+
+
+CASES = [
+    ("three_dof", None, [900, 80, 300]),  # too far
+    ("three_dof", None, [-300, 10, 300]),  # reached by branches outside limits only
+    ("three_dof", None, [0, 0, 170]),
+    ("yaw_two_link", None, [2000, 0, 0]),
+    ("planar_3dof", None, [900, 0, 0.3]),
+    ("ra02", None, [250, 0, 300, 2.0]),
+    ("labvolt_5150", None, [600, 0, 0, 0, 0.5]),
+    ("cobra600", None, [300, 500, 1000, 0.2]),
+]
+
+
+@pytest.mark.parametrize(("name", "task", "target"), CASES)
+def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: list[float]) -> None:
+    arm = armkin.load(ROBOTS / f"{name}.yaml")
+    found = armkin.closest(arm, target, task)
+    assert found.converged
+    assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
+    T = forward(screws(arm.file), found.q)
+    np.testing.assert_allclose(found.position, T[:3, 3], atol=1e-9)
+    p = task.task_for(arm, task).position
+    assert found.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
+    here = cost(arm, task, np.array(target), found.q[None])[0]
+    rng = np.random.default_rng(1)
+    for size in (1e-4, 1e-3, 1e-2, 0.1):
+        step = rng.normal(size=(2000, arm.n)) * size * np.where(arm.prismatic, arm.reach / 5, 1.0)
+        around = np.clip(found.q + step, arm.lower, arm.upper)
+        assert cost(arm, task, np.array(target), around).min() >= here * (1 - 1e-9) - 1e-9
+
+
+def test_poses_that_five_joints_cannot_reach() -> None:
+    arm = armkin.load(ROBOTS / "labvolt_5150.yaml")
+    q = np.radians([20, 40, -60, 80, 30.0])
+    T = armkin.fk(arm, q)
+    s = armkin.ik(arm, T, "pose")
+    assert s.status == armkin.Status.EXACT
+    assert s.valid.any()
+    assert s.complete
+    off = T.copy()
+    off[:3, :3] = off[:3, :3] @ np.array([[1, 0, 0], [0, np.cos(0.2), -np.sin(0.2)], [0, np.sin(0.2), np.cos(0.2)]])
+    s = armkin.ik(arm, off, "pose")
+    assert s.status == armkin.Status.UNREACHABLE
+    found = armkin.closest(arm, off, "pose")
+    assert found.converged
+    assert 0.0 < found.angle < 0.25
+    here = cost(arm, "pose", off, found.q[None])[0]
+    rng = np.random.default_rng(2)
+    for size in (1e-3, 1e-2, 0.1):
+        around = np.clip(found.q + rng.normal(size=(2000, 5)) * size, arm.lower, arm.upper)
+        assert cost(arm, "pose", off, around).min() >= here * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(("name", "count"), [("three_dof", 3), ("ra02", 4), ("moveo", 5), ("labvolt_5150", 5)])
+def test_full_poses_of_short_arms(name: str, count: int) -> None:
+    """Poses on the manifold that the arm reaches are solved exactly."""
+    arm = armkin.load(ROBOTS / f"{name}.yaml")
+    assert arm.n == count
+    q = np.random.default_rng(3).uniform(-2, 2, (40, count))
+    s = armkin.ik(arm, forward(screws(arm.file), q), "pose")
+    d = s.q - q[:, None]
+    d = np.abs(d - 2 * np.pi * np.rint(d / (2 * np.pi))).max(axis=2)
+    assert np.nanmin(d, axis=1).max() < 1e-6
+    assert s.residual()[0][s.valid].max() < 1e-9
+
+
+def test_a_reachable_legal_target_is_its_own_closest_pose() -> None:
+    arm = armkin.load(ROBOTS / "three_dof.yaml")
+    found = armkin.closest(arm, [390, 80, 300])
+    assert found.distance < 1e-6

@@ -1,0 +1,133 @@
+"""Every branch, for shipped robots and for random arms of every class, against the oracle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from checks import Report, examine, not_found, random_joints
+from geometries import CLASSES, random_case
+from oracle import Screws, exponential, forward, screws
+
+import armkin
+from armkin.model.arm import Arm
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+TASKLESS = {"pan_tilt"}
+NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml") if path.stem not in TASKLESS)
+SLOW = {"jaco_j2n6s300": 1000, "moveo": 1000, "panda": 1000}  # poses for arms that need the elimination
+# mean and largest number of branches, as known for random poses
+BRANCHES = {
+    "three_dof": (4.0, 4),
+    "puma560": (8.0, 8),
+    "ur5e": (6.97, 8),
+    "irb2400": (7.53, 8),
+    "jaco_j2n6s300": (6.73, 12),
+    "stanford": (8.0, 8),
+    "cobra600": (2.0, 2),
+    "planar_2dof": (2.0, 2),
+}
+
+
+def check(report: Report) -> None:
+    """Nothing lost, nothing false, nothing twice."""
+    s = report.solutions
+    assert not report.lost.any(), f"{report.lost.sum()} lost, the first: {report.q[report.lost][0]}"
+    assert report.mm < 1e-9
+    assert report.deg < 1e-9
+    assert report.duplicates == 0
+    assert (s.branch[~s.valid] == -1).all()
+    assert ((s.branch >= 0) & (s.branch < len(s.names)))[s.valid].all()
+    assert (s.valid.any(axis=1) == (s.status != armkin.Status.UNREACHABLE)).all()
+
+
+def shipped(name: str) -> tuple[Arm, Screws]:
+    arm = armkin.load(ROBOTS / f"{name}.yaml")
+    screw = screws(arm.file)
+    if name == "panda":  # seven joints: one of them is held
+        return armkin.lock(arm, {"J3": 0.35}), locked(screw, 2, 0.35)
+    return arm, screw
+
+
+def locked(screw: Screws, joint: int, value: float) -> Screws:
+    """The screws of what is left when one joint is held."""
+    E = exponential(screw, joint, np.array(value))
+    w, p = screw.w.copy(), screw.p.copy()
+    w[joint + 1 :] = w[joint + 1 :] @ E[:3, :3].T
+    p[joint + 1 :] = p[joint + 1 :] @ E[:3, :3].T + E[:3, 3]
+    kept = [i for i in range(len(w)) if i != joint]
+    return Screws(w[kept], p[kept], screw.prismatic[kept], E @ screw.M)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shipped_robots(name: str) -> None:
+    arm, screw = shipped(name)
+    q = random_joints(screw, SLOW.get(name, 10_000), 1)
+    np.testing.assert_allclose(armkin.fk(arm, q), forward(screw, q), atol=1e-9)
+    report = examine(arm, screw, None, q)
+    check(report)
+    assert report.solutions.complete
+    if name in BRANCHES:
+        mean, most = BRANCHES[name]
+        assert report.counts.mean() == pytest.approx(mean, abs=0.15)
+        assert report.counts.max() <= most
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in SLOW])
+def test_shipped_robots_against_the_oracle(name: str) -> None:
+    arm, screw = shipped(name)
+    report = examine(arm, screw, None, random_joints(screw, 12, 3))
+    assert not not_found(report, np.arange(12), 100 if arm.n < 5 else 250, 4)
+
+
+# arms of these classes have a whole preparation to go through, or need the elimination
+COSTLY = {name for name in CLASSES if CLASSES[name][1] in ("pose", "xyz_axis")}
+SEEDS = 12  # `tests/bench/check_ik.py --classes` has fifty
+
+
+@pytest.mark.parametrize("name", sorted(set(CLASSES) - COSTLY))
+def test_random_arms(name: str) -> None:
+    for seed in range(SEEDS):
+        case = random_case(name, seed)
+        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 40, seed)))
+
+
+def is_special(name: str) -> bool:
+    return "spherical" in name or (name.startswith("three parallel") and not name.endswith("none meet"))
+
+
+@pytest.mark.parametrize(
+    "name", sorted(name for name in COSTLY if is_special(name) and "1, 2, 3" not in name and "4, 5, 6" not in name)
+)
+def test_random_arms_with_six_joints(name: str) -> None:
+    for seed in range(SEEDS):
+        case = random_case(name, seed)
+        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
+        check(report)
+        assert report.solutions.method != "general elimination"
+
+
+@pytest.mark.parametrize("name", sorted(name for name in COSTLY if not is_special(name)))
+def test_random_arms_for_the_elimination(name: str) -> None:
+    for seed in range(3):
+        case = random_case(name, 100 + seed)
+        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 30, seed)))
+
+
+@pytest.mark.parametrize("name", sorted(set(CLASSES) - COSTLY))
+def test_random_arms_against_the_oracle(name: str) -> None:
+    for seed in range(3):
+        case = random_case(name, 200 + seed)
+        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 10, seed))
+        assert not not_found(report, np.arange(10), 60, seed)
+
+
+@pytest.mark.parametrize("name", [
+    "RRR and spherical wrist", "RPR and spherical wrist", "spherical shoulder", "UR table",
+    "three parallel axes 2, 3, 4", "three parallel axes 3, 4, 5",
+])  # fmt: skip
+def test_random_arms_with_six_joints_against_the_oracle(name: str) -> None:
+    case = random_case(name, 300)
+    report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 12, 1))
+    assert not not_found(report, np.arange(12), 250, 2)

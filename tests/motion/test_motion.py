@@ -1,0 +1,206 @@
+"""Laws of motion: exact sums, one trapezoid for all, no joint too fast, no device rate too high."""
+
+from __future__ import annotations
+
+import math
+from itertools import accumulate
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armkin.board.firmware import segments
+from armkin.board.firmware.protocol import Segment
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model import build as arms
+from armkin.model.arm import Arm
+from armkin.motion.plan import plan as plan_moves
+from armkin.motors import joints, pulses
+
+CLOCK, MIN_INTERVAL = segments.CLOCK, segments.MIN_INTERVAL
+counts = st.integers(-40_000, 40_000)
+
+
+@pytest.fixture(scope="module")
+def three_dof() -> Arm:
+    return arms.load("robots/three_dof.yaml")
+
+
+def tick_times(cut: tuple[Segment, ...]) -> list[int]:
+    """Cycle of every tick, as the device counts (PROTOCOL.md, section 6)."""
+    intervals = [(256 * s.interval + j * s.add) >> 8 for s in cut for j in range(s.ticks)]
+    return list(accumulate(intervals))
+
+
+def made(cut: tuple[Segment, ...], axis: int) -> list[int]:
+    """Net steps of an axis after every tick: the device's Bresenham."""
+    out, base = [], 0
+    for s in cut:
+        n, sign = abs(s.steps[axis]), 1 if s.steps[axis] > 0 else -1
+        done = ((j * n + s.ticks - 1 - s.ticks // 2) // s.ticks for j in range(1, s.ticks + 1))
+        out += [base + sign * d for d in done]
+        base += s.steps[axis]
+    return out
+
+
+def trapezoid(t: np.ndarray, length: float, top: float, accel: float) -> np.ndarray:
+    """Distance at time t, written down independently of the code under test."""
+    peak = min(top, math.sqrt(accel * length))
+    rise, whole = peak / accel, length / peak + peak / accel
+    t = np.clip(t, 0, whole)
+    cruise = peak * (t - rise / 2)
+    up, down = accel * t**2 / 2, length - accel * (whole - t) ** 2 / 2
+    return np.where(t < rise, up, np.where(t > whole - rise, down, cruise))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(counts, min_size=1, max_size=5), st.data())
+def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], data: st.DataObject) -> None:
+    end = [x + data.draw(st.integers(-2500, 2500)) for x in start]
+    n = max(abs(b - a) for a, b in zip(start, end, strict=True))
+    rate = data.draw(st.floats(20, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
+    accel = data.draw(st.floats(100, 400_000))
+    move = segments.line(start, end, rate / max(n, 1), accel / max(n, 1))
+
+    # No step lost or added; every segment is one that the device takes.
+    totals = [sum(s.steps[k] for s in move.segments) for k in range(len(start))]
+    assert [a + t for a, t in zip(start, totals, strict=True)] == end
+    for s in move.segments:
+        assert 1 <= s.ticks <= 65535
+        assert min(s.interval, s.last_interval) >= MIN_INTERVAL
+        assert max(s.interval, s.last_interval) <= 65535
+        assert abs(s.add) <= 32767
+        assert all(abs(x) <= min(s.ticks, 32767) for x in s.steps)
+    assert move.cycles == sum(segments.cycles_of(s) for s in move.segments)
+    if n == 0:
+        assert move.segments == ()
+        return
+    times = np.array(tick_times(move.segments))
+    assert times[-1] == move.cycles
+
+    # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid,
+    # gentler than what was asked for.
+    ideal = trapezoid(times / CLOCK, n, move.peak * n, accel * segments.EASE) / n
+    late = 1.25 + 4e-3 * n  # whole cycles make a cruise up to 0.2 % slower, and linear intervals are no root
+    for k, (a, b) in enumerate(zip(start, end, strict=True)):
+        assert np.abs(made(move.segments, k) - ideal * (b - a)).max() <= late
+        assert sum(s.steps[k] > 0 for s in move.segments) == 0 or b > a  # monotone
+        assert sum(s.steps[k] < 0 for s in move.segments) == 0 or b < a
+    # No tick is faster than the leader's top rate.
+    gaps = np.diff(times, prepend=0)
+    leader = next(k for k, (a, b) in enumerate(zip(start, end, strict=True)) if abs(b - a) == n)
+    per_tick = [abs(s.steps[leader]) / s.ticks for s in move.segments for _ in range(s.ticks)]
+    assert (per_tick / (gaps / CLOCK)).max() <= rate * (1 + 1e-9)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 20_000), st.floats(50, 40_000), st.floats(200, 400_000))
+def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
+    move = segments.line([0], [n], rate / n, accel / n)
+    times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
+    position = np.cumsum([0, *(s.steps[0] for s in move.segments)])
+    # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
+    # rounding of a step: the definition of an acceleration that whole steps allow.
+    for i in range(len(times) - 2):
+        t0, t1, t2 = times[i : i + 3]
+        p0, p1, p2 = position[i : i + 3]
+        bend = (p2 - p1) / (t2 - t1) - (p1 - p0) / (t1 - t0)
+        assert abs(bend) <= accel * (t2 - t0) / 2 + 0.02 * rate + 1 / (t2 - t0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 30_000), st.floats(50, 40_000), st.floats(200, 200_000))
+def test_a_queue_of_28_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
+    """PROTOCOL.md, section 7: DRY when the queued time falls to u^2 / (u + e) + u / 32 + 2 ms."""
+    move = segments.line([0], [n], rate / n, accel / n)
+    length = [segments.cycles_of(s) / CLOCK for s in move.segments]
+    rate_at = [[abs(s.steps[0]) * CLOCK / s.ticks / x for x in (s.interval, s.last_interval)] for s in move.segments]
+    for i in range(len(length) - 28):
+        u, e = rate_at[i][0] / accel, rate_at[i + 27][1] / accel
+        assert sum(length[i : i + 28]) > u * u / (u + e) + u / 32 + 0.002 + 0.02
+
+
+@given(st.integers(1, 2000), st.floats(50, 40_000), st.floats(200, 200_000))
+@settings(max_examples=30, deadline=None)
+def test_progress_inverts_the_ticks(n: int, rate: float, accel: float) -> None:
+    move = segments.line([0], [n], rate / n, accel / n)
+    times = np.array(tick_times(move.segments), dtype=float)
+    done = segments.progress(move, times)
+    assert np.all(np.diff(done) >= 0)
+    assert done[-1] == 1
+    assert np.abs(done * n - made(move.segments, 0)).max() <= 1
+    assert segments.progress(move, np.array([0.0]))[0] == 0
+
+
+def test_the_published_pose(three_dof: Arm) -> None:
+    plan = plan_moves(three_dof, [0, 0, 0], np.deg2rad([-30, 5, -5]))
+    assert plan.end.tolist() == [-1067, -10144, 5667]
+    totals = np.sum([s.steps for s in plan.moves[0].segments], axis=0)
+    assert totals.tolist() == [-1067, -10144, 5667]
+    assert np.all(plan.top_speed <= three_dof.max_speed * (1 + 1e-12))
+    # 85 deg at 60 deg/s with ramps of 120 deg/s^2 would take 1.917 s; ours are 10 % gentler.
+    assert 1.917 < plan.duration < 1.99
+
+
+def test_a_trace_starts_and_ends_where_the_counts_do(three_dof: Arm) -> None:
+    goals = np.deg2rad([[-30, 5, -5], [20, 60, -60], [20, 60, -60]])
+    plan = plan_moves(three_dof, [0, 0, 0], goals, speed=0.5)
+    trace = plan.trace(0.02)
+    assert len(plan.moves) == 3
+    assert trace.time[0] == 0
+    assert trace.time[-1] == pytest.approx(plan.duration)
+    assert np.all(np.diff(trace.time) >= 0)
+    assert trace.joints[0] == pytest.approx(three_dof.home)
+    assert trace.joints[-1] == pytest.approx(joints(three_dof, plan.end))
+    speed = np.abs(np.diff(trace.joints, axis=0)) / np.maximum(np.diff(trace.time), 1e-9)[:, None]
+    assert np.all(speed <= 0.5 * three_dof.max_speed * (1 + 1e-6))
+    assert trace.position.shape == (len(trace.time), 5, 3)
+    assert np.all(trace.position[:, 0] == 0)
+
+
+def test_nothing_to_do_is_an_empty_move(three_dof: Arm) -> None:
+    plan = plan_moves(three_dof, [0, 0, 0], three_dof.home)
+    assert plan.segments == 0
+    assert plan.duration == 0
+    assert plan.trace().joints[-1] == pytest.approx(three_dof.home)
+
+
+def test_a_target_outside_the_limits_is_refused_by_name(three_dof: Arm) -> None:
+    with pytest.raises(NoSolutionError, match=r"^q2 = 130 deg is outside -20 to 120 deg: nothing"):
+        plan_moves(three_dof, [0, 0, 0], np.deg2rad([0, 130, 0]))
+    with pytest.raises(NoSolutionError, match=r"^waypoint 2: q1 = 121 deg"):
+        plan_moves(three_dof, [0, 0, 0], np.deg2rad([[0, 90, 0], [121, 90, 0]]))
+
+
+def test_a_start_outside_the_limits_may_come_back(three_dof: Arm) -> None:
+    outside = pulses(three_dof, np.deg2rad([125, 90, -90]))
+    plan = plan_moves(three_dof, outside, np.deg2rad([110, 90, -90]))
+    assert plan.end[0] == 3911
+
+
+def test_missing_rates_are_named() -> None:
+    arm = arms.load("robots/planar_2dof.yaml")
+    with pytest.raises(UsageError, match=r"joint \w+ has no max_speed: .*planar_2dof"):
+        plan_moves(arm, [1500, 1500], [0.1, 0.1])
+
+
+def test_a_rate_beyond_the_device_is_refused_with_the_figure(three_dof: Arm) -> None:
+    goal = np.deg2rad([-30, 5, -5])
+    with pytest.raises(UsageError, match=r"joint q2 at 60 deg/s needs 7,160 counts/s of motor q2; .* 4,000\n") as e:
+        plan_moves(three_dof, [0, 0, 0], goal, min_interval=4000)
+    assert "--speed 55" in str(e.value)
+    plan_moves(three_dof, [0, 0, 0], goal, min_interval=4000, speed=0.55)
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, 1.01, math.nan])
+def test_speed_is_a_percentage(three_dof: Arm, speed: float) -> None:
+    with pytest.raises(UsageError, match="percent"):
+        plan_moves(three_dof, [0, 0, 0], three_dof.home, speed=speed)
+
+
+def test_values_that_are_no_pose_are_refused(three_dof: Arm) -> None:
+    with pytest.raises(UsageError, match="expected 3 values, got 2"):
+        plan_moves(three_dof, [0, 0, 0], [0.0, 0.0])
+    with pytest.raises(UsageError, match="finite"):
+        plan_moves(three_dof, [0, 0, 0], [0.0, math.nan, 0.0])
