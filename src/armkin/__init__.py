@@ -9,9 +9,7 @@ Millimetres and radians throughout; leading axes are batch axes. Importing this 
 numpy and the rest are imported with the first name that needs them.
 """
 
-import sys as _sys
 from importlib import import_module as _import_module
-from types import ModuleType as _ModuleType
 
 TYPE_CHECKING = False  # type checkers know better; importing typing would double the time of this import
 __version__ = "0.1.0"
@@ -92,14 +90,3 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-class _Package(_ModuleType):
-    """The package keeps a public function when a module of the same name is imported."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOME and isinstance(value, _ModuleType)):
-            super().__setattr__(name, value)
-
-
-_sys.modules[__name__].__class__ = _Package

@@ -15,10 +15,10 @@ ROBOTS = Path(__file__).parents[2] / "robots"
 
 def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -> np.ndarray:
     """What `closest` minimises, from the oracle's kinematics: squared distance and angle at a quarter of the reach."""
-    definition = task.task_for(arm, task)
+    definition = tasks.task_for(arm, task)
     T = forward(screws(arm.file), q)
-    goal, _ = task.read_targets(definition, target)
-    r = task.residual(definition, T, q, np.repeat(goal, len(q), axis=0))
+    goal, _ = tasks.read_targets(definition, target)
+    r = tasks.residual(definition, T, q, np.repeat(goal, len(q), axis=0))
     p = definition.position
     return (r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1)
 
@@ -43,7 +43,7 @@ def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: lis
     assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
     T = forward(screws(arm.file), found.q)
     np.testing.assert_allclose(found.position, T[:3, 3], atol=1e-9)
-    p = task.task_for(arm, task).position
+    p = tasks.task_for(arm, task).position
     assert found.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
     here = cost(arm, task, np.array(target), found.q[None])[0]
     rng = np.random.default_rng(1)
