@@ -9,6 +9,7 @@ import pytest
 from oracle import forward, screws
 
 import armkin
+from armkin.inverse.tasks import task as tasks
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
