@@ -25,6 +25,7 @@ def text(answer: dict[str, Any]) -> str:
         _screws(joints) if answer["convention"] == "screws" else _dh(joints),
         _frames(answer),
         _ranges(answer),
+        _poses(answer),
         _steppers(answer),
         _servos(answer),
         _matrix(answer),
@@ -99,6 +100,15 @@ def _ranges(answer: dict[str, Any]) -> str:
     if not any(row[-1] for row in rows[1:]):
         rows = [row[:-1] for row in rows]
     return table(rows, left=(0, 5, 6))
+
+
+def _poses(answer: dict[str, Any]) -> str:
+    """Named poses; home alone stands in the table of ranges."""
+    if len(answer["poses"]) == 1:
+        return ""
+    rows = [["pose", *(joint["name"] for joint in answer["joints"])]]
+    rows += [[name, *map(short, values)] for name, values in answer["poses"].items()]
+    return table(rows)
 
 
 def _steppers(answer: dict[str, Any]) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from armkin.cli.numbers import listed, numbers
+from armkin.cli.numbers import NOT_FINITE, listed, numbers
 from armkin.errors import UsageError
+from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -23,13 +26,29 @@ def load(robot: str) -> Arm:
 
 
 def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
-    """One value for each joint [deg | mm]."""
+    """One value for each joint [deg | mm], or the name of a pose."""
+    if words is not None and len(words) == 1 and (named := _pose(arm, words[0], "")) is not None:
+        return named
     return numbers(words or (), arm.joint_names, arm.name)
 
 
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
-    """One value for each joint [deg | mm], comma-separated."""
-    return listed(text, arm.joint_names, option)
+    """One value for each joint [deg | mm], comma-separated, or the name of a pose."""
+    named = _pose(arm, text, f"{option}: ")
+    return listed(text, arm.joint_names, option) if named is None else named
+
+
+def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
+    """The joint values of a named pose [deg | mm]; None for a word that is no name."""
+    poses = units.poses_out(arm)
+    if word in poses:
+        return poses[word]
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", word) or word.lower() in NOT_FINITE:
+        return None
+    close = get_close_matches(word, poses, 1)
+    hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(poses)}"
+    example = " ".join(arm.joint_names)
+    raise UsageError(f"{where}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
 
 
 def target(task: Task, words: Sequence[str] | None) -> list[float]:

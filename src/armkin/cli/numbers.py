@@ -7,6 +7,7 @@ from armkin.errors import UsageError
 
 # Far beyond any arm, in degrees or mm: what is larger is a slip, and would drown in rounding.
 LARGEST = 1e9
+NOT_FINITE = ("nan", "inf", "infinity")
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
@@ -63,7 +64,7 @@ def _why_not(plain: str, shown: str) -> str:
     bare = plain.lower().lstrip("+-")
     if not bare:
         return "a number is missing"
-    if bare in ("nan", "inf", "infinity"):
+    if bare in NOT_FINITE:
         return f"'{shown}' is not finite; give a number"
     for unit in ("mm", "degrees", "deg", "\u00b0"):
         if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):

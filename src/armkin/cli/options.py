@@ -7,7 +7,7 @@ import typer
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="Robot file, for example robots/three_dof.yaml.")]
 Joints = Annotated[
     list[str] | None,
-    typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm)."),
+    typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm), or a pose's name: home, ..."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
 JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,8 @@ class Arm:
     motor_gain: Array  # (motors, n) pulses per rad | mm
     motor_bias: Array  # (motors,) pulses at home
     reach: float  # [mm] no point of the chain is farther from its first joint
+    pose_names: tuple[str, ...]  # of the robot file's poses, besides home
+    pose_joints: Array  # (poses, n)
     path: str = ""  # of the robot file, as given
     sha256: str = ""  # of the robot file's bytes
     file: RobotFile | None = None
@@ -50,6 +52,11 @@ class Arm:
     def n(self) -> int:
         """Number of joints."""
         return len(self.prismatic)
+
+    @property
+    def poses(self) -> dict[str, Array]:
+        """Named joint values (n,) [rad | mm]: `home`, and those of the robot file."""
+        return {"home": self.home, **dict(zip(self.pose_names, self.pose_joints, strict=True))}
 
     def __repr__(self) -> str:
         """What tells arms apart, without their arrays."""
@@ -74,6 +81,7 @@ def from_links(
     task: str | None = None,
     motor_gain: ArrayLike | None = None,
     motor_bias: ArrayLike | None = None,
+    poses: Mapping[str, ArrayLike] | None = None,
     path: str = "",
     sha256: str = "",
     file: RobotFile | None = None,
@@ -103,6 +111,8 @@ def from_links(
         motor_gain=_frozen(gain),
         motor_bias=_frozen(np.zeros(len(np.asarray(gain))) if motor_bias is None else motor_bias),
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
+        pose_names=tuple(poses or ()),
+        pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
         path=path,
         sha256=sha256,
         file=file,

@@ -64,6 +64,7 @@ def build(file: RobotFile) -> Arm:
         task=file.task,
         motor_gain=gain,
         motor_bias=bias,
+        poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
         path=file.path,
         sha256=file.sha256,
         file=file,

@@ -54,6 +54,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
         link=np.array(links),
         frame=np.array(frame),
         motor_gain=arm.motor_gain[:, kept],
+        pose_joints=arm.pose_joints[:, kept],
         **rest,
     )
 

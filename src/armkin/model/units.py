@@ -52,6 +52,13 @@ def home_out(arm: Arm) -> list[float]:
     return [float(value) for value in joints_out(arm, arm.home)]
 
 
+def poses_out(arm: Arm) -> dict[str, list[float]]:
+    """Named poses [deg | mm], home first, as the robot file has them."""
+    if arm.file is not None:
+        return {"home": home_out(arm), **{name: list(values) for name, values in (arm.file.poses or {}).items()}}
+    return {name: joints_out(arm, q).tolist() for name, q in arm.poses.items()}
+
+
 def angles_out(angles: ArrayLike) -> Array:
     """Angles from [rad] to [deg]."""
     import numpy as np

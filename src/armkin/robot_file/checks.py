@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 MAX_JOINTS = 12
 MAX_MOTORS = 24  # two on each joint
+MAX_POSES = 100
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
@@ -55,8 +56,24 @@ def problems(robot: RobotFile) -> Iterator[Problem]:
     for i, joint in enumerate(robot.joints):
         for path, message in _joint(joint, robot.convention):
             yield ("joints", i, *path), message
+    yield from _poses(robot)
     yield from _motors(robot)
     yield from _axes(robot)
+
+
+def _poses(robot: RobotFile) -> Iterator[Problem]:
+    """Named joint values: one a joint, within its limits."""
+    n = len(robot.joints)
+    for name, values in (robot.poses or {}).items():
+        if name == "home":
+            yield ("poses", name), "home is always a pose: the joints' own home values; give this one another name"
+        if len(values) != n:
+            yield ("poses", name), f"has {len(values)} value{'s' * (len(values) != 1)}; the arm has {n} joints"
+            continue
+        for joint, value in zip(robot.joints, values, strict=True):
+            if joint.limits is not None and not joint.limits[0] <= value <= joint.limits[1]:
+                low, high = joint.limits
+                yield ("poses", name), f"{joint.name} = {value:g} is outside its limits {low:g} to {high:g}"
 
 
 def _repeated(what: str, names: list[str], key: str) -> Iterator[Problem]:

@@ -49,6 +49,7 @@ _EXAMPLES: dict[str, str] = {
     "gripper": "{kind: servo, axis: S0, travel: [0, 180], pulse_us: [500, 2500], open: 30, closed: 120}",
     "homing": "{switch: X, direction: -1, at: -90, speed: 10, backoff: 3, normally: open}",
     "name": "a word, for example q1",
+    "poses": "names with joint values: {park: [0, 90, -90]}",
     "gear": "a number or {motor: 16, joint: 80}",
     "pulley": "a number or {motor: 16, joint: 80}",
 }
@@ -110,7 +111,7 @@ def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
                 suggested.add((*error["loc"][:-1], key))
     wrong_lengths: set[Path] = set()
     for error in errors:
-        path: Path = error["loc"]
+        path: Path = tuple(part for part in error["loc"] if part != "[key]")
         if error["type"] == "problems":
             yield from error["ctx"]["problems"]
         elif error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
@@ -253,6 +254,8 @@ def _example(path: Path) -> str:
         return {"joints": "a joint: name: q1, dh: {...}", "motors": "a motor: name: M1, joints: {q1: 1}"}.get(
             key, "a number"
         )
+    if names[:1] == ["poses"] and len(names) > 1:
+        return "joint values, for example [0, 90, -90]"
     if key == "joints" and "motors" in names:
         return "{q1: 1, q2: 2}, weights by joint name"
     return _EXAMPLES.get(key, "a mapping of keys")

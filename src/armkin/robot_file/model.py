@@ -270,6 +270,11 @@ class RobotFile(_Model):
     )
     gripper: Gripper | None = Field(None, description="A servo or stepper with `open` and `closed`.")
     board: Board | None = Field(None, description="The controller, for `armkin send`.")
+    poses: dict[Name, tuple[Value, ...]] | None = Field(
+        None,
+        description="Named joint values in degrees or mm, as {park: [0, 90, -90]}; `home` is always one.",
+        max_length=checks.MAX_POSES,
+    )
 
     _path: str = PrivateAttr("")
     _sha256: str = PrivateAttr("")
