@@ -9,17 +9,19 @@ import pytest
 from oracle import forward, screws
 
 import armkin
-from armkin.inverse.tasks import task as tasks
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.residuals import residual
+from armkin.inverse.tasks.task import read_targets
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
 def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -> np.ndarray:
     """What `closest` minimises, from the oracle's kinematics: squared distance and angle at a quarter of the reach."""
-    definition = tasks.task_for(arm, task)
+    definition = task_for(arm, task)
     T = forward(screws(arm.file), q)
-    goal, _ = tasks.read_targets(definition, target)
-    r = tasks.residual(definition, T, q, np.repeat(goal, len(q), axis=0))
+    goal, _ = read_targets(definition, target)
+    r = residual(definition, T, q, np.repeat(goal, len(q), axis=0))
     p = definition.position
     return (r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1)
 
@@ -44,7 +46,7 @@ def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: lis
     assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
     T = forward(screws(arm.file), found.q)
     np.testing.assert_allclose(found.position, T[:3, 3], atol=1e-9)
-    p = tasks.task_for(arm, task).position
+    p = task_for(arm, task).position
     assert found.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
     here = cost(arm, task, np.array(target), found.q[None])[0]
     rng = np.random.default_rng(1)

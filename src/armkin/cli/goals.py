@@ -44,7 +44,7 @@ def goals(
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
     arm = inputs.load(robot)
     if target is not None:
-        from armkin.inverse.tasks.task import task_for
+        from armkin.inverse.tasks.fitting import task_for
 
         what = task_for(arm, task)
         values = listed(target, what.labels, f"--target (task {what.name})")

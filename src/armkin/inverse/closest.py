@@ -12,7 +12,9 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
-from armkin.inverse.tasks.task import Task, read_targets, residual, task_for
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.residuals import residual
+from armkin.inverse.tasks.task import Task, read_targets
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -24,7 +24,8 @@ from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_
 from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import NEAR, Geometry
 from armkin.inverse.numeric import newton
-from armkin.inverse.tasks.task import PARALLEL, Task, distance, targets_of
+from armkin.inverse.tasks.fitting import PARALLEL
+from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
 
 if TYPE_CHECKING:

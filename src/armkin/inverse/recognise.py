@@ -14,7 +14,8 @@ from armkin.errors import UsageError
 from armkin.inverse import general, nearly_special, tool_axis
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.tasks.task import Task, default_task, rank, task_for
+from armkin.inverse.tasks.fitting import default_task, rank, task_for
+from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.inverse.tasks.task import Task, residual
+from armkin.inverse.tasks.residuals import residual
+from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -53,7 +53,7 @@ def ik(
     Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
     the nearest pose within limits is shown instead.
     """
-    from armkin.inverse.tasks.task import task_for
+    from armkin.inverse.tasks.fitting import task_for
 
     output.spare(robot, out)
     arm = inputs.load(robot)

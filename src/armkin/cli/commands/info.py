@@ -84,7 +84,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
 def _task(arm: Arm, name: str | None) -> dict[str, Any]:
     """The task and its solver, or why there is none."""
     import armkin
-    from armkin.inverse.tasks.task import task_for
+    from armkin.inverse.tasks.fitting import task_for
 
     try:
         task = task_for(arm, name)

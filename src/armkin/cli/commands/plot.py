@@ -94,7 +94,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     import numpy as np
 
     from armkin.forward import position
-    from armkin.inverse.tasks.task import task_for
+    from armkin.inverse.tasks.fitting import task_for
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)

@@ -35,7 +35,8 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.tasks.task import Task, rank
+from armkin.inverse.tasks.fitting import rank
+from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
 from armkin.model.rotation import inverse
 

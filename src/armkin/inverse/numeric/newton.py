@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, wrapped
 from armkin.forward import fk, jacobian
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.tasks.task import Task, axis_projected, residual, task_jacobian
+from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -1,1 +1,6 @@
-"""What a target prescribes, and which task fits an arm."""
+"""Tasks: what a target prescribes.
+
+task.py       a target's numbers and how they are read
+residuals.py  what joint values miss of a target, and its Jacobian
+fitting.py    which task fits an arm
+"""

@@ -1,0 +1,152 @@
+"""Which task fits an arm: the one of the robot file, the one asked for, or the one that its structure suggests."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
+from armkin.inverse.tasks.task import LABELS, Task
+from armkin.model.chain import Chain, axes
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
+
+
+def task_for(arm: Arm, name: str | None = None) -> Task:
+    """The task of that name for this arm; without a name the robot file's, or the one its structure suggests.
+
+    Raises UsageError if the task does not exist or does not fit the arm's joints.
+    """
+    name = name or arm.task or default_task(arm)
+    if name is None:
+        raise UsageError(
+            f"{arm.name}: no task fits its {_joints(arm)}: there is no position that it could reach at will; "
+            "fk, pulses and workspace work, ik does not"
+        )
+    if name not in LABELS:
+        raise UsageError(f"unknown task '{name}'; tasks are {', '.join(LABELS)}")
+    task = _BUILDERS[name](arm, name)
+    if isinstance(task, str):
+        raise UsageError(f"{arm.name}: task {name} does not fit its {_joints(arm)}: {task}")
+    return task
+
+
+def default_task(arm: Arm) -> str | None:
+    """The task that the arm's structure suggests, or None."""
+    order = {
+        2: ("xy",),
+        3: ("xy_theta", "xyz"),
+        4: ("xyz_yaw", "xyz_pitch"),
+        5: ("xyz_pitch_roll", "xyz_axis"),
+    }.get(arm.n, ("pose",) if arm.n > 5 else ())
+    for name in order:
+        if not isinstance(task := _BUILDERS[name](arm, name), str) and rank(arm, task) == min(task.constraints, arm.n):
+            return name
+    return None
+
+
+def rank(arm: Arm, task: Task, tolerance: float = 1e-4) -> int:
+    """Rank of the task's Jacobian at poses in general position; tolerance: of the reach, and in rad."""
+    from armkin.forward import fk, jacobian
+
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, (4, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
+    Jt = axis_projected(task, task_jacobian(task, jacobian(arm, q)), fk(arm, q))
+    Jt[:, : task.position] /= arm.reach
+    Jt = Jt * np.where(arm.prismatic, arm.reach, 1.0)
+    return int(max(np.linalg.matrix_rank(Jt, tol=tolerance)))
+
+
+def _joints(arm: Arm) -> str:
+    kinds = "".join("P" if p else "R" for p in arm.prismatic)
+    return f"{arm.n} joints ({kinds})"
+
+
+def _plain(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
+    return Task(
+        name, position, np.asarray(sums, dtype=float).reshape(-1, arm.n), np.asarray(offsets, dtype=float), "none"
+    )
+
+
+def _free(arm: Arm, name: str) -> Task:
+    orientation: Literal["none", "axis", "full"] = {"xyz": "none", "xyz_axis": "axis", "pose": "full"}[name]  # type: ignore[assignment]
+    return Task(name, 3, np.zeros((0, arm.n)), np.zeros(0), orientation)
+
+
+def _directions(arm: Arm) -> Array:
+    return axes(Chain(arm.link, arm.prismatic))[1]
+
+
+def _along(directions: Array, reference: Array) -> NDArray[np.float64]:
+    """+1 or -1 where a direction is parallel or antiparallel to the reference, else 0."""
+    cosine = directions @ reference
+    across = np.linalg.norm(np.cross(directions, reference), axis=1)
+    return np.where(across < PARALLEL, np.sign(cosine), 0.0)
+
+
+def _planar(arm: Arm, name: str) -> Task | str:
+    w = _directions(arm)
+    z = np.array([0.0, 0.0, 1.0])
+    turns = np.where(arm.prismatic, 0.0, _along(w, z))
+    if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ z) > PARALLEL).any():
+        return "its joints do not all move in the base's x-y plane"
+    if name == "xy":
+        return _plain(arm, name, 2, np.zeros((0, arm.n)), np.zeros(0))
+    if not turns.any():
+        return "it has no joint that turns"
+    # DH angles about the base's z axis: theta is the direction of the last link
+    offset = float((turns * arm.dh_sign * arm.dh_theta).sum())
+    return _plain(arm, name, 2, turns, [offset])
+
+
+def _yaw(arm: Arm, name: str) -> Task | str:
+    from armkin.forward import fk
+
+    w = _directions(arm)
+    z = np.array([0.0, 0.0, 1.0])
+    turns = np.where(arm.prismatic, 0.0, _along(w, z))
+    lifts = np.where(arm.prismatic, _along(w, z), 0.0)
+    if (turns[~arm.prismatic] == 0).any() or not lifts.any() or not turns.any():
+        return "it needs joints that turn about the base's z axis and one that slides along it"
+    T0 = fk(arm, np.zeros(arm.n))
+    return _plain(arm, name, 3, turns, [np.arctan2(T0[1, 0], T0[0, 0])])
+
+
+def _pitch(arm: Arm, name: str) -> Task | str:
+    w = _directions(arm)
+    last = 3 if name == "xyz_pitch" else 4
+    if arm.n != last + 1:
+        return f"it needs {last + 1} joints"
+    if arm.prismatic[1:].any():
+        return "joints 2 and after must turn"
+    parallel = _along(w, w[1])
+    parallel[[0, *range(4, arm.n)]] = 0.0
+    if (parallel[1:4] == 0).any():
+        return "joints 2, 3 and 4 must be parallel"
+    # the canonical axis of a joint with sign -1 points against its DH axis
+    weights = parallel * arm.dh_sign[1]
+    offset = float((weights * arm.dh_sign * arm.dh_theta).sum()) + arm.pitch_offset
+    if name == "xyz_pitch":
+        return _plain(arm, name, 3, weights, [offset])
+    roll = np.zeros(arm.n)
+    roll[4] = arm.dh_sign[4]
+    return _plain(arm, name, 3, [weights, roll], [offset, arm.dh_theta[4]])
+
+
+# Each gives the task for an arm, or says why it does not fit.
+_BUILDERS = {
+    "xy": _planar,
+    "xy_theta": _planar,
+    "xyz": _free,
+    "xyz_pitch": _pitch,
+    "xyz_pitch_roll": _pitch,
+    "xyz_yaw": _yaw,
+    "xyz_axis": _free,
+    "pose": _free,
+}

@@ -1,0 +1,80 @@
+"""What joint values miss of their targets, and how it changes with them: the rows of every Newton step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armkin.formula.arrays import Array, wrapped
+from armkin.inverse.tasks.task import Task
+
+
+def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
+    """What is missing to the targets: (M, position + sums + orientation), mm first, then rad.
+
+    T: (M, 4, 4) the tool's poses; q: (M, n); target: (M, m) or (M, 4, 4).
+    """
+    parts = []
+    if task.orientation == "full":
+        parts.append(target[:, :3, 3] - T[:, :3, 3])
+        R, Rt = T[:, :3, :3], target[:, :3, :3]
+        # half the sum of the columns' vector products is the rotation vector to third order
+        w = 0.5 * np.cross(R, Rt, axis=1).sum(axis=2)
+        trace = np.einsum("mij,mij->m", R, Rt)
+        far = trace < 3.0 - 1e-8
+        if far.any():
+            w[far] = _rotation_vector(Rt[far] @ np.swapaxes(R[far], 1, 2))
+        parts.append(w)
+    else:
+        parts.append(target[:, : task.position] - T[:, : task.position, 3])
+        if len(task.sums):
+            wanted = target[:, task.position : task.position + len(task.sums)]
+            angle = wanted - q @ task.sums.T - task.offsets
+            parts.append(wrapped(angle))
+        if task.orientation == "axis":
+            z = T[:, :3, 2]
+            w = np.cross(z, target[:, 3:])
+            sine = np.linalg.norm(w, axis=1)
+            cosine = np.einsum("mi,mi->m", z, target[:, 3:])
+            angle = np.arctan2(sine, cosine)
+            w = np.where(sine[:, None] > 1e-12, w * (angle / np.maximum(sine, 1e-300))[:, None], w)
+            half = (sine <= 1e-12) & (cosine < 0)  # opposed: any axis across will do
+            w[half] = np.pi * T[half][:, :3, 0]
+            parts.append(w)
+    return np.concatenate(parts, axis=1)
+
+
+def task_jacobian(task: Task, J: Array) -> Array:
+    """Rows of the task: (M, 6, n) geometric Jacobians -> (M, rows, n), in the order of `residual`."""
+    parts = [J[:, : task.position, :]]
+    if len(task.sums):
+        parts.append(np.broadcast_to(task.sums, (len(J), *task.sums.shape)))
+    if task.orientation != "none":
+        parts.append(J[:, 3:, :])
+    return np.concatenate(parts, axis=1)
+
+
+def axis_projected(task: Task, Jt: Array, T: Array) -> Array:
+    """For tasks that prescribe an axis: take the turn about the tool's z axis out of the angular rows."""
+    if task.orientation != "axis":
+        return Jt
+    z = T[:, :3, 2]
+    out = Jt.copy()
+    out[:, -3:, :] -= z[:, :, None] * np.einsum("mi,min->mn", z, Jt[:, -3:, :])[:, None, :]
+    return out
+
+
+def _rotation_vector(R: Array) -> Array:
+    """Rotation vectors of rotation matrices (M, 3, 3), also near half a turn."""
+    w = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    s = np.linalg.norm(w, axis=1)
+    c = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+    angle = np.arctan2(s, c)
+    near_half = s < 1e-6
+    if near_half.any():
+        B = R[near_half] + np.eye(3)
+        k = np.argmax(np.einsum("mij,mij->mj", B, B), axis=1)
+        axis = B[np.arange(len(B)), :, k]
+        w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+        s = np.where(near_half, 1.0, s)
+    out: Array = w * (angle / np.maximum(s, 1e-300))[:, None]
+    return out
