@@ -10,7 +10,7 @@ from oracle import forward, screws
 
 import armkin
 from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.residuals import residual
+from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import read_targets
 
 ROBOTS = Path(__file__).parents[2] / "robots"

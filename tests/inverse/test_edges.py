@@ -213,7 +213,7 @@ def test_slides_far_longer_than_the_links(name: str) -> None:
         report = examine(c.arm, c.screw, c.task, q)
         assert not (report.lost & (report.solutions.status != Status.SINGULAR)).any()
         q = np.where(c.screw.prismatic, 100 * q, q)
-        assert not examine(c.arm, c.screw, c.task, q).solutions.complete
+        assert not examine(c.arm, c.screw, c.task, q).solutions.complete.all()
 
 
 @pytest.mark.parametrize(

@@ -192,7 +192,8 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     # From here on plain Python: numpy is slow at single numbers, and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     kept = [name for name in arm.joint_names if name not in held]
-    for i, (valid, status) in enumerate(zip(s.valid.tolist(), s.status.tolist(), strict=True)):
+    told = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
+    for i, (valid, status, sure) in enumerate(told):
         branches = [
             Branch(
                 q[i, b],
@@ -208,7 +209,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
             if valid[b]
         ]
         free = [name for name, is_free in zip(kept, s.free[i].tolist(), strict=True) if is_free]
-        yield Answer(armkin.Status(status).name.lower(), s.method, s.why, s.complete, free, branches, None)
+        yield Answer(armkin.Status(status).name.lower(), s.method, s.why, sure, free, branches, None)
 
 
 def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answer:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
@@ -35,14 +35,14 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             "general elimination",
             "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches",
             prepared.complete,
-            rows=lambda T: method.solve(prepared, T),
+            rows=lambda T: _six(prepared, T),
             ordered=False,
         )
     link, prismatic = _padded(arm)
     prepared = method.prepare(link, prismatic)
 
-    def rows(T: Array) -> tuple[Array, Bool]:
-        q, _ = method.solve(prepared, T)
+    def rows(T: Array) -> Rows:
+        q, _, settled = method.solve(prepared, T)
         n = arm.n
         with np.errstate(invalid="ignore"):
             hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
@@ -54,7 +54,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         missing = np.isnan(own[:, :, 0])
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
-        return np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > count
+        return Rows(
+            np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > count, settled & prepared.complete
+        )
 
     return Geometry(
         "general elimination",
@@ -63,6 +65,12 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         rows=rows,
         ordered=False,
     )
+
+
+def _six(prepared: method.Elimination, T: Array) -> Rows:
+    """Branches of six joints; complete where the elimination settled the pose and the arm has a regular pencil."""
+    q, doubt, settled = method.solve(prepared, T)
+    return Rows(q, doubt, settled & prepared.complete)
 
 
 def _padded(arm: Arm) -> tuple[Array, Bool]:

@@ -22,7 +22,7 @@ from armkin.forward import fk
 from armkin.inverse import general
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
-from armkin.inverse.closed.geometry import NEAR, Geometry
+from armkin.inverse.closed.geometry import NEAR, Geometry, Rows
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.fitting import PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
@@ -59,14 +59,14 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
 
-    def rows(target: Array) -> tuple[Array, Bool]:
+    def rows(target: Array) -> Rows:
         starts = range(0, max(len(target), 1), CHUNK)
         parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
         width = max(q.shape[1] for q, _ in parts)
         q = np.full((len(target), width, arm.n), np.nan)
         for k, (part, _) in zip(starts, parts, strict=True):
             q[k : k + len(part), : part.shape[1]] = part
-        return q, np.concatenate([doubt for _, doubt in parts])
+        return Rows(q, np.concatenate([doubt for _, doubt in parts]), np.zeros(len(target), bool))
 
     sizes = [2 if label else 1 for label in alike.labels]
     why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
@@ -125,7 +125,7 @@ def _solve(
         solver = elimination()
         assert solver is not None
         assert solver.rows is not None
-        others = [solver.rows(goals)[0]]
+        others = [solver.rows(goals).q]
     else:
         rings = (_around(arm, task, goals, size * off_here[few]) for size in RINGS)
         others = [source.rows(there)[0] for ring in rings for there in ring]

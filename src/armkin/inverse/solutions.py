@@ -35,8 +35,8 @@ class Solutions:
     `near`; rows past the last branch are nan. valid: (..., B) the row reaches the target to
     1e-9 of the arm's reach. within_limits: (..., B). branch: (..., B) index into `names`, -1
     past the last. status: (...) of `Status`. free: (..., n) joints that a singular target
-    leaves free. complete: every isolated real branch is guaranteed to be there (never of a
-    sliding arm's targets more than 20 reaches away).
+    leaves free. complete: (...) every isolated real branch of this target is guaranteed to be
+    there (never of a sliding arm's targets more than 20 reaches away).
     """
 
     arm: Arm
@@ -52,10 +52,10 @@ class Solutions:
     names: tuple[str, ...]
     method: str
     why: str
-    complete: bool
+    complete: NDArray[np.bool_]
 
     def __repr__(self) -> str:
-        batch, sure = self.status.shape, "complete" if self.complete else "not proved complete"
+        batch, sure = self.status.shape, "complete" if self.complete.all() else "not all proved complete"
         return f"<Solutions {batch} of {self.arm.name}, {self.task.name}: {self.valid.sum()} branches, {sure}>"
 
     @cached_property

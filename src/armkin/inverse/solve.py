@@ -46,6 +46,7 @@ class _Out(NamedTuple):
     branch: NDArray[np.int8]
     status: NDArray[np.int8]
     free: Bool
+    complete: Bool
 
     def part(self, rows: slice) -> _Out:
         return _Out(
@@ -55,6 +56,7 @@ class _Out(NamedTuple):
             self.branch[rows],
             self.status[rows],
             self.free[rows],
+            self.complete[rows],
         )
 
 
@@ -85,6 +87,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         out = _closed(arm, definition, geometry, target, each, one)
     else:
         out = _rows(arm, definition, geometry, target, each)
+    if arm.prismatic.any():
+        out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
         out.branch[...] = follow(arm, definition, out.q, target)
     names = branch_names(arm, definition, geometry, out.q.shape[1])
@@ -103,7 +107,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         names=names,
         method=geometry.name,
         why=geometry.why,
-        complete=geometry.complete and not (arm.prismatic.any() and (distance(arm, definition, target) > FAR).any()),
+        complete=out.complete.reshape(lead),
     )
 
 
@@ -115,6 +119,7 @@ def _empty(N: int, B: int, n: int) -> _Out:
         np.empty((N, B), np.int8),
         np.zeros(N, np.int8),
         np.zeros((N, n), bool),
+        np.ones(N, bool),
     )
 
 
@@ -220,13 +225,14 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
 def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
     """Solvers that return joint values row by row."""
     assert geometry.rows is not None
-    q, doubt = geometry.rows(target)
+    q, doubt, complete = geometry.rows(target)
     B = q.shape[1]
     out = _empty(len(target), B, arm.n)
     out.q[...], inside = nearest_row(arm, q, near[:, None, :])
     out.valid[...] = ~np.isnan(q).any(axis=2)
     out.within[...] = inside & out.valid
     out.branch[...] = np.where(out.valid, np.arange(B), -1)
+    out.complete[...] = complete
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
     _tidy(arm, task, out, target, near, np.flatnonzero(doubt), count < B)

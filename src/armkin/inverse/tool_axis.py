@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import pose
-from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse.closed.geometry import Geometry
+from armkin.formula.arrays import Array, Entry
+from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import from_links
@@ -41,11 +41,11 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
     solve_rows = inner.rows
     assert solve_rows is not None
 
-    def rows(goal: Array) -> tuple[Array, Bool]:
+    def rows(goal: Array) -> Rows:
         T = np.empty((len(goal), 4, 4))
         pose.write(_pose(list(goal.T)), T)
-        q, doubt = solve_rows(T)
-        return q[:, :, :5], doubt
+        found = solve_rows(T)
+        return found._replace(q=found.q[:, :, :5])
 
     return Geometry(
         inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered

@@ -115,18 +115,18 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     postures = np.concatenate([arm.home[None], near_home, anywhere])
     goal = targets_of(task, fk(arm, postures), postures)
     if geometry.rows is not None:
-        q, doubtful = geometry.rows(goal)
-        q = q[:, : geometry.branches]
-        return postures, q, ~np.isnan(q).any(axis=2) & ~doubtful[:, None]
+        found = geometry.rows(goal)
+        q = found.q[:, : geometry.branches]
+        return postures, q, ~np.isnan(q).any(axis=2) & ~found.doubt[:, None]
     assert geometry.pairs is not None
     entries = pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
-    found = geometry.pairs(entries, prefer)
-    values = np.broadcast_arrays(*found.values())
+    candidates = geometry.pairs(entries, prefer)
+    values = np.broadcast_arrays(*candidates.values())
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]
     missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(found.doubt, values[0].shape).reshape(B, -1).T
+    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(candidates.doubt, values[0].shape).reshape(B, -1).T
     return postures, q, valid
 
 

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from armkin.formula.arrays import Array, Entry
+from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.subproblems import Candidates, Prefer
 
 EXACT = 1e-12  # axes parallel [rad] or meeting [of the reach] to this count as exactly so
 NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.nearly_special`
+
+
+class Rows(NamedTuple):
+    """What a solver that works row by row returns for targets.
+
+    q: (N, B, n) branches [rad | mm], nan past a target's last one.  doubt: (N,) targets to be examined by
+    `armkin.inverse.singularities`.  complete: (N,) every isolated branch is there.
+    """
+
+    q: Array
+    doubt: Bool
+    complete: Bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,14 +32,15 @@ class Geometry:
     Closed forms set `pairs`: called with the target's entries (the columns of the targets,
     or a `Pose`) and the preferred motions of free joints, it returns `Candidates`. It is made of numpy's
     elementwise functions alone, so that `armkin.formula.trace` can record it. Others set `rows`: called with
-    targets (N, m) or (N, 4, 4) it returns q (N, B, n), nan past the last branch, and doubt.
+    targets (N, m) or (N, 4, 4) it returns `Rows`.  complete: whether the method guarantees every isolated branch;
+    for a single target `Rows.complete` may say no.
     """
 
     name: str
     why: str
     complete: bool
     pairs: Callable[[list[Entry], Prefer], Candidates] | None = None
-    rows: Callable[[Array], tuple[Array, NDArray[np.bool_]]] | None = None
+    rows: Callable[[Array], Rows] | None = None
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

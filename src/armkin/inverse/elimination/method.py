@@ -170,7 +170,15 @@ def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Arr
     return nearest, spurious
 
 
-def solve(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
+class Branches(NamedTuple):
+    """What `solve` returns; see there."""
+
+    q: Array
+    doubtful: Bool
+    settled: Bool
+
+
+def solve(elimination: Elimination, T: Array) -> Branches:
     """All isolated branches of many targets.
 
     Args:
@@ -182,26 +190,28 @@ def solve(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
         B is the largest number of branches, at most 16.
         doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
         answers that were merged across more than rounding, or with two roots that just touch or just miss.
+        settled: (N,), targets of which some pass showed none of the signs of (v): every isolated branch is listed.
     """
     count = T.shape[0]
     parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
-    q = np.full((count, max((part.shape[1] for part, _ in parts), default=0), 6), np.nan)
-    doubtful = np.zeros(count, dtype=np.bool_)
-    for number, (branches, doubt) in enumerate(parts):
-        rows = slice(number * BLOCK, number * BLOCK + len(doubt))
-        q[rows, : branches.shape[1]], doubtful[rows] = branches, doubt
-    return q, doubtful
+    q = np.full((count, max((part.q.shape[1] for part in parts), default=0), 6), np.nan)
+    doubtful, settled = np.zeros((2, count), dtype=np.bool_)
+    for number, part in enumerate(parts):
+        rows = slice(number * BLOCK, number * BLOCK + len(part.doubtful))
+        q[rows, : part.q.shape[1]], doubtful[rows], settled[rows] = part
+    return Branches(q, doubtful, settled)
 
 
-def _solve_block(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
+def _solve_block(elimination: Elimination, T: Array) -> Branches:
     """`solve` for as many targets as one should keep intermediate results of."""
     closed, count = elimination.loop, T.shape[0]
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
     goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
     if not elimination.plans:
         answers, touching = _slides(closed, goal)
+        settled = np.ones(count, dtype=np.bool_)
     else:
-        answers, touching = _passes(elimination, goal)
+        answers, touching, settled = _passes(elimination, goal)
     # A closest point stands in for answers only where there are none.
     exact = answers.residual < ACCEPTED
     answered = np.bincount(answers.pose[exact], minlength=count) > 0
@@ -209,11 +219,11 @@ def _solve_block(elimination: Elimination, T: Array) -> tuple[Array, Bool]:
     answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack(answers, count)
     q *= np.where(closed.prismatic, closed.length, 1.0)
-    return q, (weak | merged | touching) & finite
+    return Branches(q, (weak | merged | touching) & finite, settled)
 
 
-def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
-    """Answers of all passes, each over the poses that the last one left open; and touching pairs (N,)."""
+def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool, Bool]:
+    """Answers of all passes, each over the poses that the last one left open; touching pairs and settled poses (N,)."""
     found = []
     touching = np.zeros(goal.shape[0], dtype=np.bool_)
     open_poses = np.arange(goal.shape[0])
@@ -228,7 +238,9 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool]:
         open_poses = open_poses[still]
         if open_poses.size == 0:
             break
-    return concatenate(found) if found else _none(), touching
+    settled = np.ones(goal.shape[0], dtype=np.bool_)
+    settled[open_poses] = False
+    return concatenate(found) if found else _none(), touching, settled
 
 
 def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool]:
