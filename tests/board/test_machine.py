@@ -16,8 +16,8 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import StoppedError
-from armkin.board.ports import SimPort
 from armkin.board.sim.board import SimBoard
+from armkin.board.sim.port import SimPort
 from armkin.errors import LinkError, UsageError
 from armkin.hardware import BOARDS
 from armkin.model import build as arms

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli import COMMANDS
+from armkin.cli.commands import COMMANDS
 from command_line import ROOT, THREE_DOF, run
 
 ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))

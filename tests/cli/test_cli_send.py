@@ -305,7 +305,7 @@ def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pyte
         def close(self) -> None:
             pass
 
-    monkeypatch.setattr("armkin.board.ports._open_serial", lambda name, baud: Flood())
+    monkeypatch.setattr("armkin.board.ports.serial_port._open_serial", lambda name, baud: Flood())
     port = SerialPort("flood")
     assert len(port.read(0.1)) >= 1000
     port.close()

@@ -1,7 +1,7 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
-    __init__ (the table of commands, main) -> app (group, errors -> exit codes)
-    commands/fk, commands/ik, ...          -> options, numbers, batch, output, render
+    __init__ (main) -> app (group, errors -> exit codes) -> commands/__init__ (the table of commands)
+    commands/fk, commands/ik, ... -> options, numbers, batch, output, render
 
 A command is a function of the same name in a module of the same name, written for Typer:
 `armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its
@@ -12,24 +12,6 @@ import gc
 import os
 import sys
 from typing import NoReturn
-
-# Name, and the first sentence of the function's docstring (a test compares the two).
-COMMANDS = {
-    "fk": "Where the tool is for given joint values.",
-    "ik": "All joint values that reach a target.",
-    "pulses": "Motor pulses from home to a pose.",
-    "send": "Move the arm.",
-    "status": "Where the board says that the arm stands.",
-    "home": "Find the limit switches, and with them the position.",
-    "stop": "Stop the arm along its path.",
-    "grip": "Open or close the gripper.",
-    "jog": "Move one joint at a constant speed, for a short time.",
-    "ports": "Serial ports of this computer, Arduinos first.",
-    "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
-    "plot": "A picture of the arm.",
-    "info": "What a robot file says, checked.",
-    "schema": "JSON Schema of robot files, for editors.",
-}
 
 
 def main() -> NoReturn:

@@ -13,8 +13,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from armkin import errors
-from armkin.cli import COMMANDS, output
+from armkin.cli import output
 from armkin.cli.arguments import options_first
+from armkin.cli.commands import COMMANDS
 
 RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED, TERMINATED = 1, 2, 3, 4, 5, 130, 143
 

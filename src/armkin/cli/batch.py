@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 from armkin.cli import output
 from armkin.cli.numbers import LARGEST, numbers
 from armkin.cli.render import to_json
-from armkin.errors import FileError, UsageError
+from armkin.errors import FileError, NoSolutionError, UsageError
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -84,6 +84,20 @@ class Tally:
         if "best" in answer and answer["best"] is None:
             self.first_unsolved = self.first_unsolved or number
             self.unsolved += 1
+
+    def warn_of_limits(self) -> None:
+        """Say how many rows are outside the limits."""
+        if self.outside:
+            first = f"the first is row {self.first_outside}"
+            output.warn(f"{self.outside} of {self.rows} rows are outside the limits; {first}")
+
+    def refuse_unsolved(self) -> None:
+        """Raise NoSolutionError if rows have no best branch."""
+        if self.unsolved:
+            raise NoSolutionError(
+                f"{self.unsolved} of {self.rows} rows have no branch within limits; "
+                f"the first is row {self.first_unsolved}"
+            )
 
 
 def run_batch(

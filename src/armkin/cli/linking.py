@@ -75,7 +75,7 @@ def machine(
     """
     from armkin.board.firmware.machine import Machine
     from armkin.board.firmware.session import StoppedError
-    from armkin.board.ports import open_port
+    from armkin.board.opening import open_port
 
     with stoppable() as stop:
         link = open_port(port, board=configuration.board, baud=baud)

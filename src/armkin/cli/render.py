@@ -10,7 +10,6 @@ from armkin.errors import NoSolutionError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.cli.batch import Tally
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -130,21 +129,7 @@ def unsolved(arm: Arm, answer: dict[str, Any], refused: str | None = None) -> No
     return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
 
 
-def unsolved_rows(tally: Tally) -> NoSolutionError:
-    """How many rows of a batch have no best branch."""
-    return NoSolutionError(
-        f"{tally.unsolved} of {tally.rows} rows have no branch within limits; the first is row {tally.first_unsolved}"
-    )
-
-
 def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:
     """Say which joints of a pose are outside their limits."""
     if found:
         output.warn("; ".join(said(arm, violation) for violation in found))
-
-
-def warn_of_rows(tally: Tally) -> None:
-    """Say how many rows of a batch are outside the limits."""
-    if tally.outside:
-        first = f"the first is row {tally.first_outside}"
-        output.warn(f"{tally.outside} of {tally.rows} rows are outside the limits; {first}")

@@ -1,7 +1,7 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
     strict_yaml -> model (pydantic: keys, types, bounds) -> checks (rules between values)
-                -> messages (errors in the file's own words)
+                -> robot (RobotFile: the two together) -> messages (errors in the file's own words)
 
 This package imports pydantic and yaml, and is itself imported only when a robot file is read.
 """
@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from armkin.errors import FileError, RobotFileError
 from armkin.robot_file import strict_yaml
-from armkin.robot_file.model import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, RobotFile, Screw
+from armkin.robot_file.model import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, Screw
+from armkin.robot_file.robot import RobotFile
 
 __all__ = [
     "DH",

@@ -11,17 +11,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from armkin.hardware import BOARDS
+from armkin.robot_file.model import Triple, dot
 
 if TYPE_CHECKING:
-    from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotFile
-
-MAX_JOINTS = 12
-MAX_MOTORS = 24  # two on each joint
-MAX_POSES = 100
+    from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotKeys
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
-Triple = tuple[float, float, float]
 
 _STEPPER_KEYS = ("full_steps", "microsteps", "gear", "pulley", "lead")
 _SERVO_KEYS = ("travel", "pulse_us", "zero")
@@ -30,17 +26,7 @@ _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
 _ROUNDING = 1e-3
 
 
-def dot(a: Triple, b: Triple) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Triple, b: Triple) -> Triple:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def problems(robot: RobotFile) -> Iterator[Problem]:
+def problems(robot: RobotKeys) -> Iterator[Problem]:
     """All problems of a file whose keys and types are right."""
     if "\n" in robot.name or not robot.name.strip():
         yield ("name",), "must be one line of text"
@@ -61,7 +47,7 @@ def problems(robot: RobotFile) -> Iterator[Problem]:
     yield from _axes(robot)
 
 
-def _poses(robot: RobotFile) -> Iterator[Problem]:
+def _poses(robot: RobotKeys) -> Iterator[Problem]:
     """Named joint values: one a joint, within its limits."""
     n = len(robot.joints)
     for name, values in (robot.poses or {}).items():
@@ -206,7 +192,7 @@ def _servo_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
             return
 
 
-def _motors(robot: RobotFile) -> Iterator[Problem]:
+def _motors(robot: RobotKeys) -> Iterator[Problem]:
     for i, joint in enumerate(robot.joints):
         drive = joint.drive
         if drive is None:
@@ -236,7 +222,7 @@ def _motors(robot: RobotFile) -> Iterator[Problem]:
         yield from _gripper(robot)
 
 
-def _weights(motor: Motor, robot: RobotFile) -> Iterator[Problem]:
+def _weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
     types = {joint.name: joint.type for joint in robot.joints}
     for name, weight in motor.joints.items():
         if name not in types:
@@ -250,7 +236,7 @@ def _weights(motor: Motor, robot: RobotFile) -> Iterator[Problem]:
         yield (), "a prismatic joint's stepper needs lead, the mm per turn"
 
 
-def _determined(robot: RobotFile, motors: tuple[Motor, ...]) -> Iterator[Problem]:
+def _determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[Problem]:
     """The joints must follow from the motors: the weights' rank is the number of joints they name."""
     names = [joint.name for joint in robot.joints if any(joint.name in motor.joints for motor in motors)]
     rows = [[motor.joints.get(name, 0.0) for name in names] for motor in motors]
@@ -266,7 +252,7 @@ def _determined(robot: RobotFile, motors: tuple[Motor, ...]) -> Iterator[Problem
         ]
 
 
-def _gripper(robot: RobotFile) -> Iterator[Problem]:
+def _gripper(robot: RobotKeys) -> Iterator[Problem]:
     gripper = robot.gripper
     assert gripper is not None
     for path, message in _drive(gripper):
@@ -282,7 +268,7 @@ def _gripper(robot: RobotFile) -> Iterator[Problem]:
                 yield ("gripper", key), f"needs servo angle {angle:g}, outside the travel {low:g} to {high:g}"
 
 
-def _axes(robot: RobotFile) -> Iterator[Problem]:
+def _axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     drives: list[tuple[Path, Drive]] = [
         (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
@@ -308,7 +294,7 @@ def _axes(robot: RobotFile) -> Iterator[Problem]:
         yield from _board(robot, robot.board)
 
 
-def _board(robot: RobotFile, settings: Board) -> Iterator[Problem]:
+def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
     board = BOARDS[settings.kind]
     if not board.steppers:
         for key in ("driver", "enable"):

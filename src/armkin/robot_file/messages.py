@@ -15,7 +15,7 @@ Path = tuple[str | int, ...]
 
 # Which model the keys under a name belong to.
 _MODELS: dict[str, type[BaseModel]] = {
-    "": model.RobotFile,
+    "": model.RobotKeys,
     "joints": model.Joint,
     "dh": model.DH,
     "screw": model.Screw,
@@ -215,7 +215,7 @@ def _unknown_key(path: Path) -> str:
     for name, other in _MODELS.items():
         if key in other.model_fields and other is not owner and name:
             return f"unknown key here; it belongs in {_place(name)}"
-    if key in model.RobotFile.model_fields:
+    if key in model.RobotKeys.model_fields:
         return "unknown key here; it belongs at the top of the file"
     return f"unknown key; the keys here are {', '.join(owner.model_fields)}"
 
@@ -244,7 +244,7 @@ def _nearest(word: str, choices: list[str]) -> str | None:
 
 def _owner(path: Path) -> type[BaseModel]:
     names = [part for part in path[:-1] if isinstance(part, str)]
-    return _MODELS.get(names[-1] if names else "", model.RobotFile)
+    return _MODELS.get(names[-1] if names else "", model.RobotKeys)
 
 
 def _example(path: Path) -> str:

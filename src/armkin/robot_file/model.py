@@ -1,26 +1,22 @@
 """The robot file as pydantic sees it: every key, its unit, its bounds and its help text.
 
 Strict: no unknown keys, no text or booleans for numbers, finite numbers only; immutable. What needs
-several values to judge (limits against home, axes against the board) stands in ``checks``.
+several values to judge (limits against home, axes against the board) stands in ``checks``, and ``robot``
+puts the two together.
 Angles are degrees and lengths millimetres here; ``armkin.model.arm`` turns them into radians, once.
 """
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from armkin.robot_file import checks
+MAX_JOINTS = 12
+MAX_MOTORS = 24  # two on each joint
+MAX_POSES = 100
 
+Triple = tuple[float, float, float]
 Convention = Literal["standard", "modified", "screws"]
 JointType = Literal["revolute", "prismatic"]
 Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_axis", "pose"]
@@ -37,6 +33,16 @@ Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
 Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
 # An int and not a Literal, which would take `true` for 1; 0 is for `checks` to find.
 Sign = Annotated[int, Field(ge=-1, le=1, json_schema_extra={"enum": [1, -1]})]
+
+
+def dot(a: Triple, b: Triple) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Triple, b: Triple) -> Triple:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _ratio(value: Any) -> Any:
@@ -158,7 +164,7 @@ class Motor(Drive):
     joints: dict[str, Value] = Field(
         description="Weights: motor angle before its ratio = sum of weight x joint value.",
         min_length=1,
-        max_length=checks.MAX_JOINTS,
+        max_length=MAX_JOINTS,
     )
 
 
@@ -231,16 +237,16 @@ class Joint(_Model):
         length = math.hypot(*w)
         w = (w[0] / length, w[1] / length, w[2] / length)
         if v is None:
-            v = checks.cross(q or (0.0, 0.0, 0.0), w)
+            v = cross(q or (0.0, 0.0, 0.0), w)
         else:  # the screw as a whole is scaled: (w, v) is one six-vector
             v = (v[0] / length, v[1] / length, v[2] / length)
-            pitch = checks.dot(v, w)
+            pitch = dot(v, w)
             v = (v[0] - pitch * w[0], v[1] - pitch * w[1], v[2] - pitch * w[2])
         return w, v
 
 
-class RobotFile(_Model):
-    """A robot arm: geometry, limits and drives. Millimetres and degrees throughout."""
+class RobotKeys(_Model):
+    """A robot file's keys, before `robot.RobotFile` holds them to the rules between them."""
 
     name: Annotated[str, Field(min_length=1, max_length=80)] = Field(description="The arm's name, one line.")
     description: str = Field("", description="Free text.")
@@ -260,40 +266,21 @@ class RobotFile(_Model):
         None, description="Convention screws: the end frame in the base frame when all joints are 0."
     )
     joints: tuple[Joint, ...] = Field(
-        description="The joints, from the base outwards.", min_length=1, max_length=checks.MAX_JOINTS
+        description="The joints, from the base outwards.", min_length=1, max_length=MAX_JOINTS
     )
     motors: tuple[Motor, ...] | None = Field(
         None,
         description="Motors that are not one to one with joints, instead of the joints' drives.",
         min_length=1,
-        max_length=checks.MAX_MOTORS,
+        max_length=MAX_MOTORS,
     )
     gripper: Gripper | None = Field(None, description="A servo or stepper with `open` and `closed`.")
     board: Board | None = Field(None, description="The controller, for `armkin send`.")
     poses: dict[Name, tuple[Value, ...]] | None = Field(
         None,
         description="Named joint values in degrees or mm, as {park: [0, 90, -90]}; `home` is always one.",
-        max_length=checks.MAX_POSES,
+        max_length=MAX_POSES,
     )
-
-    _path: str = PrivateAttr("")
-    _sha256: str = PrivateAttr("")
-
-    @property
-    def path(self) -> str:
-        """The file as it was named when read; empty for a model made in memory."""
-        return self._path
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the file's bytes; empty for a model made in memory."""
-        return self._sha256
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if problems := list(checks.problems(self)):
-            raise PydanticCustomError("problems", "{text}", {"text": problems[0][1], "problems": problems})
-        return self
 
     def motor_list(self) -> tuple[Motor, ...]:
         """The motors, whether they are written as `motors` or as the joints' drives; () if there are none."""

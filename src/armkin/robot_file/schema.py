@@ -9,7 +9,8 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from armkin.robot_file.model import Pose, RobotFile
+from armkin.robot_file.model import Pose
+from armkin.robot_file.robot import RobotFile
 
 # The smallest useful file of each convention.
 EXAMPLES: list[dict[str, Any]] = [

@@ -38,7 +38,7 @@ def fk(
             [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
             lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
         )
-        render.warn_of_rows(tally)
+        tally.warn_of_limits()
         return
     [answer] = _answers(arm, one_row(inputs.joints(arm, q)), frames)
     with output.destination(out) as write:

@@ -86,8 +86,7 @@ def ik(
             ],
             lambda row, answer: _records(arm, row, answer),
         )
-        if tally.unsolved:
-            raise render.unsolved_rows(tally)
+        tally.refuse_unsolved()
         return
     values = one_row(inputs.target(what, target)).values
     goal = units.targets_in(what.labels, values)

@@ -54,7 +54,7 @@ def pulses(
             [*arm.joint_names, *motors, *actual, "x", "y", "z", "error_mm", "within_limits"],
             lambda _, a: [_record(a)],
         )
-        render.warn_of_rows(tally)
+        tally.warn_of_limits()
         return
     [answer] = _answers(arm, one_row(inputs.joints(arm, q)), origin, best)
     with output.destination(out) as write:

@@ -1,4 +1,4 @@
-"""Ports: a device, a COM port, any pyserial URL, or `sim`. The only module that imports serial.
+"""Serial ports: a device, a COM port, any pyserial URL. The only module that imports serial.
 
 A port is held exclusively, so that no two programs talk to one arm; who holds it can be found, so that
 `armkin stop` in another terminal stops the arm.
@@ -15,81 +15,13 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import IO, Any
 
+from armkin.board.ports.port import BAUD, SIM
 from armkin.errors import LinkError
-
-if TYPE_CHECKING:
-    from armkin.board.sim.board import SimBoard
-    from armkin.hardware import Board
-
-BAUD = 250_000
-SIM = "sim"
 
 _READ = 0.005  # [s] a read waits at most
 _MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
-
-
-class Port(Protocol):
-    """Bytes to and from a board, and the clock that its answers are timed with."""
-
-    name: str
-    simulated: bool
-    baud: int
-
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
-
-    def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds; empty if nothing does."""
-
-    def now(self) -> float:
-        """Seconds on the clock."""
-
-    def close(self) -> None:
-        """Give the port back. The board keeps its position, its motors stay on."""
-
-
-def open_port(name: str, *, board: Board, baud: int = BAUD) -> Port:
-    """Open a port by name: /dev/ttyACM0, COM3, socket://host:4000, sim.
-
-    board: what `sim` pretends to be. Raises LinkError with what to do.
-    """
-    if name == SIM:
-        from armkin.board.sim.board import SimBoard
-
-        return SimPort(SimBoard(board))
-    return SerialPort(name, baud)
-
-
-class SimPort:
-    """A simulated board in this process, in simulated time."""
-
-    simulated = True
-    baud = BAUD
-
-    def __init__(self, board: SimBoard, name: str = SIM) -> None:
-        self.name, self.board = name, board
-        self._now = 0.0
-
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
-        self.board.receive(data)
-
-    def read(self, timeout: float) -> bytes:
-        """What the board has said, or says within `timeout` seconds of its time."""
-        end = self._now + timeout
-        while not (data := self.board.take()) and self._now < end:
-            self.board.advance(0.001)
-            self._now += 0.001
-        return data
-
-    def now(self) -> float:
-        """Simulated seconds."""
-        return self._now
-
-    def close(self) -> None:
-        """Nothing to give back."""
 
 
 class SerialPort:
