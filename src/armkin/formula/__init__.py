@@ -1,6 +1,10 @@
 """Formulas written once: run on arrays, on plain numbers, or recorded as code.
 
-arrays.py  entries: arrays over the batch, or numbers known to be constant
-pose.py    transforms as twelve entries
-trace.py   a formula run once on symbols, its operations recorded and written as straight-line code
+arrays.py       entries: arrays over the batch, or numbers known to be constant
+pose.py         transforms as twelve entries
+recording.py    a formula run once on symbols, its operations kept as a list
+numpy_code.py   that list as numpy calls, for batches
+python_code.py  as plain Python, for one pose
+c_code.py       as C99
+trace.py        a formula with its numpy and its Python code
 """

@@ -1,0 +1,172 @@
+"""A recording as C99: one assignment a line, branch axes unrolled, equal values once.
+
+The lines are plain expressions without branches or memory, so that compilers turn a loop around them into
+vector instructions.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from armkin.formula.recording import BOOLEAN, Node, Recording, axes_of
+
+# Operations on single numbers; the functions in capitals are macros of the file that the lines go to.
+_C = {
+    "multiply": "{} * {}",
+    "add": "{} + {}",
+    "subtract": "{} - {}",
+    "divide": "{} / {}",
+    "absolute": "ARM_ABS({})",
+    "sqrt": "ARM_SQRT({})",
+    "cbrt": "ARM_CBRT({})",
+    "tan": "ARM_TAN({})",
+    "arctan2": "ARM_ATAN2({}, {})",
+    "rint": "ARM_RINT({})",
+    "sign": "({0} > 0) - ({0} < 0)",
+    "copysign": "ARM_COPYSIGN({}, {})",
+    "less": "{} < {}",
+    "less_equal": "{} <= {}",
+    "greater": "{} > {}",
+    "greater_equal": "{} >= {}",
+    "equal": "{} == {}",
+    "bitwise_or": "{} | {}",
+    "bitwise_and": "{} & {}",
+    "where": "{} ? {} : {}",
+    # where the first is not a number, so is the result
+    "maximum": "{1} > {0} ? {1} : {0}",
+    "minimum": "{1} < {0} ? {1} : {0}",
+}
+SMALLEST = 1e-30  # constants of a formula that stand for "next to nothing", in single precision
+
+
+class Value(NamedTuple):
+    """A number with its sign: `text` is a constant's digits or a variable's name."""
+
+    text: str
+    minus: bool = False
+    constant: float | None = None
+
+    def __str__(self) -> str:
+        return f"-{self.text}" if self.minus else self.text
+
+
+class Code(NamedTuple):
+    """The lines of a recording, and the expressions of its outputs, one a branch, in the order of `numpy.ndindex`."""
+
+    lines: list[str]
+    outputs: list[list[str]]
+
+
+def number(value: float, single: bool = False) -> str:
+    """A constant as C99: all digits that tell it from its neighbours.
+
+    >>> number(0.1), number(3.0), number(0.1, single=True)
+    ('0.1', '3.0', '0.1f')
+    """
+    if math.isinf(value) or math.isnan(value):
+        return f"{'-' if value < 0 else ''}ARM_INFINITY"
+    if not single:
+        return repr(float(value))
+    if value != 0.0 and abs(value) < SMALLEST:
+        value = math.copysign(SMALLEST, value)
+    text = str(np.float32(value))
+    return f"{text}f"
+
+
+class _Writer:
+    """Lines written so far; a value that is known already is not computed again."""
+
+    def __init__(self, single: bool) -> None:
+        self.single = single
+        self.lines: list[str] = []
+        self.known: dict[tuple[Any, ...], Value] = {}
+
+    def constant(self, value: float) -> Value:
+        """A number, its sign apart."""
+        value = float(value)
+        minus = math.copysign(1.0, value) < 0
+        return Value(number(abs(value), self.single), minus, abs(value))
+
+    def apply(self, op: str, args: list[Value]) -> Value:
+        """The value of an operation: no factors of one, signs moved outwards, equal operations once."""
+        if op == "negative":
+            return _flipped(args[0], True)
+        if all(x.constant is not None for x in args) and op in ("multiply", "add", "subtract"):
+            x, y = (-a.constant if a.minus else a.constant for a in args)  # type: ignore[operator]
+            assert x is not None
+            assert y is not None
+            return self.constant(x * y if op == "multiply" else x + y if op == "add" else x - y)
+        if op in ("multiply", "divide"):
+            a, b = args
+            minus = a.minus != b.minus
+            a, b = a._replace(minus=False), b._replace(minus=False)
+            if op == "multiply" and a.constant == 1.0:
+                return _flipped(b, minus)
+            if b.constant == 1.0:
+                return _flipped(a, minus)
+            if op == "multiply" and (a.constant == 0.0 or b.constant == 0.0):
+                return self.constant(0.0)
+            args = sorted((a, b)) if op == "multiply" else [a, b]
+            return _flipped(self.emit(op, args), minus)
+        if op in ("add", "subtract"):
+            a, b = args
+            b = _flipped(b, op == "subtract")
+            if a.constant == 0.0:
+                return b
+            if b.constant == 0.0:
+                return a
+            if a.minus == b.minus:
+                plain = sorted((a._replace(minus=False), b._replace(minus=False)))
+                return _flipped(self.emit("add", plain), a.minus)
+            plus, less = (b, a) if a.minus else (a, b)
+            return self.emit("subtract", [plus._replace(minus=False), less._replace(minus=False)])
+        if op == "power":
+            assert args[1].constant == 2.0, "only squares are recorded"
+            return self.apply("multiply", [args[0], args[0]])
+        if op == "absolute":
+            args = [args[0]._replace(minus=False)]
+        if op == "where" and args[1] == args[2]:
+            return args[1]
+        if op in ("maximum", "minimum") and args[0].constant is not None:
+            args = args[::-1]
+        return self.emit(op, args)
+
+    def emit(self, op: str, args: list[Value]) -> Value:
+        """A new variable for an operation, or the one that holds it."""
+        key = (op, *args)
+        if key not in self.known:
+            name = f"t{len(self.lines)}"
+            kind = "int" if op in BOOLEAN else "arm_real"
+            plain = [f"({x})" if x.minus and k else str(x) for k, x in enumerate(args)]
+            self.lines.append(f"const {kind} {name} = {_C[op].format(*plain)};")
+            self.known[key] = Value(name)
+        return self.known[key]
+
+
+def _flipped(x: Value, minus: bool) -> Value:
+    return x._replace(minus=x.minus != minus)
+
+
+def write(recording: Recording, inputs: list[str], single: bool = False) -> Code:
+    """The lines that compute a recording; inputs: the C expressions of its inputs; single: for 32-bit numbers."""
+    writer = _Writer(single)
+    values: dict[int, dict[tuple[int, ...], Value]] = {
+        id(node): {(): Value(text)} for node, text in zip(recording.inputs, inputs, strict=True)
+    }
+
+    def value(x: Any, index: tuple[int, ...]) -> Value:
+        axes = axes_of(x)
+        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
+        if isinstance(x, Node):
+            return values[id(x)][at]
+        return writer.constant(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
+
+    for node in recording.nodes:
+        values[id(node)] = {
+            index: writer.apply(node.op, [value(x, index) for x in node.args]) for index in np.ndindex(*node.axes)
+        }
+    outputs = [[str(value(x, index)) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
+    return Code(writer.lines, outputs)

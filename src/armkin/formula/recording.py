@@ -1,0 +1,134 @@
+"""Formulas recorded: a function is run once on symbols, and the operations that it asks for are kept as a list.
+
+The closed forms and the forward kinematics are written as ordinary functions of arrays.
+Called on arrays they spend much of their time in Python: one call for every product of two
+numbers of which one is a known zero. Called once on `Node` symbols they leave behind the
+list of what really has to be computed, equal operations once. `numpy_code`, `python_code` and
+`c_code` write that list as programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+BOOLEAN = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "equal"}
+
+
+class Node(np.lib.mixins.NDArrayOperatorsMixin):
+    """An array that is not there yet: what numpy is asked to do with it is recorded.
+
+    axes: lengths of the branch axes in front of the batch axis, () for a plain (N,) array.
+    """
+
+    def __init__(self, trace: Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...]) -> None:
+        self.trace, self.op, self.args, self.axes = trace, op, args, axes
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        if method != "__call__" or options:
+            raise TypeError(f"{ufunc.__name__}.{method} cannot be recorded")
+        return self.trace.simplify(ufunc.__name__, inputs)
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
+        if function is np.any:
+            return True  # what is not known yet may be true of some pose
+        if function is not np.where or len(inputs) != 3:
+            raise TypeError(f"{function.__name__} cannot be recorded")
+        return self.trace.record("where", inputs)
+
+
+class Trace:
+    """The operations recorded so far, equal ones once."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.known: dict[tuple[Any, ...], Node] = {}
+
+    def simplify(self, op: str, inputs: Sequence[Any]) -> Any:
+        """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards."""
+        if op == "negative":
+            x = inputs[0]
+            return x.args[0] if x.op == "negative" else self.record(op, inputs)
+        if op in ("multiply", "add", "subtract"):
+            a, b = inputs
+            minus_a, minus_b = _is_negative(a), _is_negative(b)
+            a, b = (a.args[0] if minus_a else a), (b.args[0] if minus_b else b)
+            if op == "multiply":
+                for x, y in ((a, b), (b, a)):
+                    if not isinstance(x, Node) and np.ndim(x) == 0 and abs(x) in (0.0, 1.0):
+                        if x == 0.0:
+                            return 0.0
+                        return self._signed(y, (x < 0) != (minus_a != minus_b))
+                return self._signed(self.record(op, (a, b)), minus_a != minus_b)
+            minus_b ^= op == "subtract"
+            if _is_zero(b):
+                return self._signed(a, minus_a)
+            if _is_zero(a):
+                return self._signed(b, minus_b)
+            if minus_a == minus_b:
+                return self._signed(self.record("add", (a, b)), minus_a)
+            return self.record("subtract", (b, a) if minus_a else (a, b))
+        return self.record(op, inputs)
+
+    def _signed(self, x: Any, minus: bool) -> Any:
+        return self.simplify("negative", (x,)) if minus and isinstance(x, Node) else -x if minus else x
+
+    def record(self, op: str, inputs: Sequence[Any]) -> Node:
+        key = (op, *(id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs))
+        if key not in self.known:
+            axes = np.broadcast_shapes(*(axes_of(x) for x in inputs))
+            self.known[key] = Node(self, op, tuple(inputs), axes)
+            self.nodes.append(self.known[key])
+        return self.known[key]
+
+
+def _is_negative(x: Any) -> bool:
+    return isinstance(x, Node) and x.op == "negative"
+
+
+def _is_zero(x: Any) -> bool:
+    return not isinstance(x, Node) and np.ndim(x) == 0 and x == 0.0
+
+
+def _constant_key(x: Any) -> tuple[Any, ...]:
+    return ("constant", np.shape(x), np.asarray(x).tobytes())
+
+
+def axes_of(x: Any) -> tuple[int, ...]:
+    """Lengths of the branch axes of a node, an array or a number."""
+    if isinstance(x, Node):
+        return x.axes
+    return np.shape(x)[:-1] if np.ndim(x) else ()
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A formula as a list of operations.
+
+    inputs: one `Node` each. outputs: a `Node`, an array or a number each. nodes: all operations that the
+    outputs depend on, arguments before results; inputs are not among them.
+    """
+
+    inputs: list[Node]
+    outputs: list[Any]
+    nodes: list[Node]
+
+
+def record(formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> Recording:
+    """Run a formula of a list of arrays once on that many symbols."""
+    trace = Trace()
+    symbols = [Node(trace, "input", (), ()) for _ in range(inputs)]
+    outputs = list(formula(list(symbols)))
+    return Recording(symbols, outputs, _needed(trace.nodes, outputs))
+
+
+def _needed(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
+    """The operations that the outputs depend on, in order."""
+    needed = {id(x) for x in outputs if isinstance(x, Node)}
+    for node in reversed(nodes):
+        if id(node) in needed:
+            needed |= {id(x) for x in node.args if isinstance(x, Node)}
+    return [node for node in nodes if id(node) in needed]
