@@ -2,10 +2,10 @@
 
 Every arm, whatever its convention, is one chain
 
-    T(q) = link[0] Z1(q1) link[1] Z2(q2) ... Zn(qn) link[n],   Z = Rz (revolute) or Tz (prismatic)
+    T(q) = link[0] Z1(r1 q1) link[1] Z2(r2 q2) ... Zn(rn qn) link[n],   Z = Rz (revolute) or Tz (prismatic)
 
 (Craig, Introduction to Robotics, eq. 3.6 with the constant factors of neighbouring rows
-merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws).
+merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws). The ratios r are 1 but for calibrated arms.
 """
 
 from __future__ import annotations
@@ -115,7 +115,14 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
 
 def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
     """The pose after a joint's motion."""
+    value = _turned(arm, joint, value)
     return pose.slide(P, value) if arm.prismatic[joint] else pose.rotate(P, *arrays.cos_sin(value))
+
+
+def _turned(arm: Arm, joint: int, value: Entry) -> Entry:
+    """The actual joint value for a commanded one."""
+    ratio = float(arm.ratio[joint])
+    return value if ratio == 1.0 else arrays.mul(ratio, value)
 
 
 def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
@@ -169,7 +176,9 @@ def _jacobian(arm: Arm, q: list[Entry]) -> list[Entry]:
     columns = []
     for i, (z, origin) in enumerate(axes):
         lever = arrays.combine(1.0, P[9:12], -1.0, origin)
-        columns.append([*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z])
+        column = [*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z]
+        ratio = float(arm.ratio[i])
+        columns.append(column if ratio == 1.0 else [arrays.mul(ratio, entry) for entry in column])
     return [column[row] for row in range(6) for column in columns]
 
 
@@ -183,9 +192,9 @@ def _point(arm: Arm, q: list[Entry]) -> list[Entry]:
     p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
     for i in reversed(range(arm.n)):
         if arm.prismatic[i]:
-            p = [p[0], p[1], arrays.add(p[2], q[i])]
+            p = [p[0], p[1], arrays.add(p[2], _turned(arm, i, q[i]))]
         else:
-            c, s = arrays.cos_sin(q[i])
+            c, s = arrays.cos_sin(_turned(arm, i, q[i]))
             x, y, z = p
             p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
         p = pose.apply(pose.constant(arm.link[i]), p)
@@ -196,11 +205,11 @@ def _single(arm: Arm, q: Array) -> Array:
     """The tool's pose for one set of joint values, by matrix products: shorter than any batch of one."""
     T = arm.link[0]
     for i in range(arm.n):
-        Z = np.eye(4)
+        Z, value = np.eye(4), arm.ratio[i] * q[i]
         if arm.prismatic[i]:
-            Z[2, 3] = q[i]
+            Z[2, 3] = value
         else:
-            c, s = (math.cos(q[i]), math.sin(q[i])) if math.isfinite(q[i]) else (math.nan, math.nan)
+            c, s = (math.cos(value), math.sin(value)) if math.isfinite(value) else (math.nan, math.nan)
             Z[0, 0], Z[0, 1], Z[1, 0], Z[1, 1] = c, -s, s, c
         T = T @ Z @ arm.link[i + 1]
     return np.asarray(T)

@@ -5,8 +5,8 @@ A motor's exact pulse is linear in the joints,
     x = motor_bias + motor_gain (q - home)
 
 with the bias 0 for steppers, whose pulses are counted from home, and the pulse width at home [us]
-for RC servos. Motors and joints need not be one to one (belts, differentials, two motors on one
-shoulder): the joints follow from the pulses through the pseudoinverse of the matrix.
+for RC servos, the count at home for bus servos. Motors and joints need not be one to one (belts,
+differentials, two motors on one shoulder): the joints follow from the pulses through the pseudoinverse of the matrix.
 """
 
 from __future__ import annotations
@@ -172,18 +172,21 @@ def motor_names(arm: Arm) -> list[str]:
 
 
 def pulse_units(arm: Arm) -> list[str]:
-    """``"step"`` or ``"us"`` for every motor."""
+    """``"step"``, ``"us"`` (RC servos) or ``"count"`` (bus servos) for every motor."""
     if arm.file is None:
         return ["step"] * len(arm.motor_gain)
-    return ["us" if motor.kind == "servo" else "step" for motor in arm.file.motor_list()]
+    units = {"stepper": "step", "servo": "us", "bus": "count"}
+    return [units[motor.kind] for motor in arm.file.motor_list()]
 
 
 def pulse_range(arm: Arm) -> Array:
-    """Lowest and highest pulse width of every servo: (motors, 2) [us]; steppers -inf, inf."""
+    """Lowest and highest pulse of every servo: (motors, 2) [us | count]; steppers -inf, inf."""
     allowed = np.tile([-np.inf, np.inf], (len(arm.motor_gain), 1))
     for k, motor in enumerate(arm.file.motor_list() if arm.file is not None else ()):
         if motor.kind == "servo" and motor.pulse_us is not None:
             allowed[k] = motor.pulse_us
+        elif motor.kind == "bus" and motor.counts is not None:
+            allowed[k] = 0, motor.counts - 1
     return allowed
 
 

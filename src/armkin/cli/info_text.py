@@ -28,6 +28,7 @@ def text(answer: dict[str, Any]) -> str:
         _poses(answer),
         _steppers(answer),
         _servos(answer),
+        _bus_servos(answer),
         _matrix(answer),
         _hardware(answer),
         _solver(answer),
@@ -154,6 +155,16 @@ def _servos(answer: dict[str, Any]) -> str:
                 ]
             )
     return table(rows, left=(0, 1, 6)) if len(rows) > 1 else ""
+
+
+def _bus_servos(answer: dict[str, Any]) -> str:
+    rows = [["bus servo", "id", "counts/turn", "zero/count", "counts/deg", ""]]
+    for motor in answer["motors"]:
+        if motor["kind"] == "bus":
+            figures = (short(motor["zero"]), short(motor["pulses_per_unit"]))
+            way = "inverted" if motor["invert"] else ""
+            rows.append([motor["name"], str(motor["id"]), str(motor["counts"]), *figures, way])
+    return table(rows, left=(0, 5)) if len(rows) > 1 else ""
 
 
 def _matrix(answer: dict[str, Any]) -> str:

@@ -16,6 +16,7 @@ from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.tasks.fitting import default_task, rank, task_for
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import actual
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -57,7 +58,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
 
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
     """Solver class of an arm, why it applies, and whether it guarantees all branches."""
-    geometry = solver(arm, task)[1]
+    geometry = solver(actual(arm), task)[1]
     return geometry.name, geometry.why, geometry.complete
 
 

@@ -7,6 +7,7 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `e
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,7 +25,9 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, distance, read_targets
+from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 
 if TYPE_CHECKING:
@@ -73,6 +76,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     >>> s.names[s.branch[s.best]], np.rad2deg(s.q[s.best]).round(4).tolist()
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
+    if (turned := actual(arm)) is not arm:
+        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near)))
     definition, geometry = solver(arm, task)
     target, lead = read_targets(definition, targets)
     close = arm.home if near is None else arrays.real(near, "near")
@@ -109,6 +114,18 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         why=geometry.why,
         complete=out.complete.reshape(lead),
     )
+
+
+def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
+    """Commanded values as actual ones; what has a wrong shape is left for `ik` to refuse."""
+    close = None if near is None else arrays.real(near, "near")
+    return close * arm.ratio if close is not None and close.shape[-1:] == (arm.n,) else close
+
+
+def _commanded(arm: Arm, found: Solutions) -> Solutions:
+    """Solutions in actual joint values as those in commanded ones."""
+    q, near = found.q / arm.ratio, found.near / arm.ratio
+    return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
 
 
 def _empty(N: int, B: int, n: int) -> _Out:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 class Arm:
     """An arm as arrays, read-only, lengths in mm and angles in rad.
 
-    The tool's pose is ``link[0] Z1(q1) link[1] ... Zn(qn) link[n]`` with Z = Rz or Tz:
-    signs, offsets, base and tool are inside `link`.
+    The tool's pose is ``link[0] Z1(r1 q1) link[1] ... Zn(rn qn) link[n]`` with Z = Rz or Tz and the
+    `ratio` r, 1 but for calibrated arms: signs, offsets, base and tool are inside `link`.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Arm:
     max_accel: Array  # (n,)
     dh_sign: Array  # (n,) DH angle = dh_sign * joint value + dh_theta
     dh_theta: Array  # (n,)
+    ratio: Array  # (n,) actual turn per commanded turn; joint values are commanded ones
     pitch_offset: float  # [rad]
     task: str | None  # as the file says; None: by structure
     motor_gain: Array  # (motors, n) pulses per rad | mm
@@ -63,6 +65,28 @@ class Arm:
         return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
 
 
+@lru_cache(maxsize=64)
+def actual(arm: Arm) -> Arm:
+    """The arm in actual joint values, ratio 1: limits, home and speeds are those of the actual motion.
+
+    An arm whose ratios are all 1 is returned as it is.
+    """
+    r = arm.ratio
+    if (r == 1.0).all():
+        return arm
+    return replace(
+        arm,
+        lower=_frozen(arm.lower * r),
+        upper=_frozen(arm.upper * r),
+        home=_frozen(arm.home * r),
+        pose_joints=_frozen(arm.pose_joints * r),
+        max_speed=_frozen(arm.max_speed * r),
+        max_accel=_frozen(arm.max_accel * r),
+        ratio=_frozen(np.ones(arm.n)),
+        motor_gain=_frozen(arm.motor_gain / r),
+    )
+
+
 def from_links(
     link: ArrayLike,
     prismatic: Sequence[bool],
@@ -77,6 +101,7 @@ def from_links(
     max_accel: ArrayLike | None = None,
     dh_sign: ArrayLike | None = None,
     dh_theta: ArrayLike | None = None,
+    ratio: ArrayLike | None = None,
     pitch_offset: float = 0.0,
     task: str | None = None,
     motor_gain: ArrayLike | None = None,
@@ -106,6 +131,7 @@ def from_links(
         max_accel=_frozen(np.full(n, math.nan) if max_accel is None else max_accel),
         dh_sign=_frozen(np.ones(n) if dh_sign is None else dh_sign),
         dh_theta=_frozen(np.zeros(n) if dh_theta is None else dh_theta),
+        ratio=_frozen(np.ones(n) if ratio is None else ratio),
         pitch_offset=pitch_offset,
         task=task,
         motor_gain=_frozen(gain),

@@ -60,6 +60,7 @@ def build(file: RobotFile) -> Arm:
         max_accel=np.array([math.nan if j.max_accel is None else j.max_accel for j in file.joints]) * unit,
         dh_sign=[float(j.sign) for j in file.joints],
         dh_theta=[0.0 if j.dh is None else math.radians(j.dh.theta) for j in file.joints],
+        ratio=[j.ratio for j in file.joints],
         pitch_offset=math.radians(file.pitch_offset),
         task=file.task,
         motor_gain=gain,
@@ -119,8 +120,9 @@ def _motors(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     """Pulses per rad | mm of every motor and joint, and the pulses at home (servos only).
 
     A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley,
-    counted from home; a servo's pulse width is linear in its joint over `travel`, and
-    `invert` mirrors it (for a stepper it is wiring: the level of DIR, not the count).
+    counted from home; a servo's pulse width is linear in its joint over `travel`, a bus
+    servo's count in its joint from `zero`, and `invert` mirrors both (for a stepper it is
+    wiring: the level of DIR, not the count).
     """
     index = {joint.name: i for i, joint in enumerate(file.joints)}
     home = [joint.home for joint in file.joints]
@@ -129,9 +131,11 @@ def _motors(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     bias = np.zeros(len(motors))
     for k, motor in enumerate(motors):
         servo = motor.travel if motor.kind == "servo" and motor.pulse_us is not None else None
-        turn = -1.0 if servo is not None and motor.invert else 1.0
+        turn = -1.0 if motor.kind != "stepper" and motor.invert else 1.0
         for name, weight in motor.joints.items():
             gain[k, index[name]] = turn * weight * motor.pulses_per_unit()
         if servo is not None and motor.pulse_us is not None:
             bias[k] = motor.pulse_us[0] + (motor.zero - servo[0]) * motor.pulses_per_unit() + gain[k] @ home
+        elif motor.kind == "bus":
+            bias[k] = motor.zero + gain[k] @ home
     return gain / unit, bias

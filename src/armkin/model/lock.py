@@ -39,14 +39,14 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     links, frame, kept = [arm.link[0]], [], []
     for i, name in enumerate(arm.joint_names):
         if name in held:
-            links[-1] = links[-1] @ _motion(bool(arm.prismatic[i]), held[name]) @ arm.link[i + 1]
+            links[-1] = links[-1] @ _motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i]) @ arm.link[i + 1]
         else:
             kept.append(i)
             frame.append(arm.frame[i])
             links.append(arm.link[i + 1])
     rest = {
         field: getattr(arm, field)[kept]
-        for field in ("prismatic", "lower", "upper", "home", "max_speed", "max_accel", "dh_sign", "dh_theta")
+        for field in ("prismatic", "lower", "upper", "home", "max_speed", "max_accel", "dh_sign", "dh_theta", "ratio")
     }
     return replace(
         arm,

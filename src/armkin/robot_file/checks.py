@@ -21,6 +21,8 @@ Problem = tuple[Path, str]
 
 _STEPPER_KEYS = ("full_steps", "microsteps", "gear", "pulley", "lead")
 _SERVO_KEYS = ("travel", "pulse_us", "zero")
+_BUS_KEYS = ("id", "counts", "zero")
+_KEYS = {"stepper": _STEPPER_KEYS, "servo": _SERVO_KEYS, "bus": _BUS_KEYS}
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
 # A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
 _ROUNDING = 1e-3
@@ -147,17 +149,25 @@ def _homing(joint: Joint) -> Iterator[Problem]:
         yield ("homing", "direction"), "must be 1 (switch at the upper end) or -1 (at the lower end), not 0"
     if joint.max_speed is not None and homing.speed > joint.max_speed:
         yield ("homing", "speed"), f"{homing.speed:g} is above the joint's max_speed {joint.max_speed:g}"
-    if joint.drive is not None and joint.drive.kind == "servo":
+    if joint.drive is not None and joint.drive.kind != "stepper":
         yield ("homing",), "a servo knows its angle and has no switch; remove homing"
 
 
 def _drive(drive: Drive) -> Iterator[Problem]:
     """A motor's own values, apart from the joints that it turns."""
     given = drive.model_fields_set
-    own, other = (_STEPPER_KEYS, _SERVO_KEYS) if drive.kind == "stepper" else (_SERVO_KEYS, _STEPPER_KEYS)
-    for key in (key for key in other if key in given):
-        message = f"a {drive.kind} has no {key}; it takes {', '.join(own)}"
-        yield (key,), message + ("; for a servo write kind: servo" if drive.kind == "stepper" else "")
+    own = _KEYS[drive.kind]
+    what = "bus servo" if drive.kind == "bus" else drive.kind
+    for key in (key for key in dict.fromkeys(sum(_KEYS.values(), ())) if key in given and key not in own):
+        message = f"a {what} has no {key}; it takes {', '.join(own)}"
+        kind, named = ("bus", "bus servo") if key in ("id", "counts") else ("servo", "servo")
+        yield (key,), message + (f"; for a {named} write kind: {kind}" if drive.kind == "stepper" else "")
+    if drive.kind == "bus":
+        if missing := [key for key in ("id", "counts") if getattr(drive, key) is None]:
+            yield (), f"a bus servo needs {' and '.join(missing)}, for example id: 1, counts: 4096, zero: 2048"
+        if drive.axis is not None:
+            yield ("axis",), "a bus servo has no axis; its place on the bus is id"
+        return
     if drive.kind == "stepper":
         missing = [key for key in ("full_steps", "microsteps") if getattr(drive, key) is None]
         if missing and not any(key in given for key in _SERVO_KEYS):
@@ -177,8 +187,25 @@ def _drive(drive: Drive) -> Iterator[Problem]:
             yield (key,), f"must go up, [{pair[1]:g}, {pair[0]:g}]; {hint}"
 
 
+def _bus_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
+    """A joint value beyond the one turn that a bus servo counts: 0 to counts - 1."""
+    if drive.counts is None:
+        return
+    turn = -1.0 if drive.invert else 1.0
+    at = "home" if joint.limits is None else "limits"
+    for value in joint.limits or (joint.home,):
+        count = drive.zero + turn * value * drive.counts / 360.0
+        if not -0.5 <= count < drive.counts - 0.5:
+            low, high = sorted(turn * (end - drive.zero) * 360.0 / drive.counts for end in (0, drive.counts - 1))
+            yield (at,), f"{value:g} needs count {count:.0f}; with zero {drive.zero:g} it takes {low:g} to {high:g}"
+            return
+
+
 def _servo_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
     """A joint value that the servo cannot take: its pulse would be outside pulse_us."""
+    if drive.kind == "bus":
+        yield from _bus_reach(drive, joint)
+        return
     if drive.kind != "servo" or drive.travel is None or drive.travel[0] >= drive.travel[1]:
         return
     turn = -1.0 if drive.invert else 1.0
@@ -202,7 +229,7 @@ def _motors(robot: RobotKeys) -> Iterator[Problem]:
         for path, message in _drive(drive):
             yield ("joints", i, "drive", *path), message
         if joint.type == "prismatic":
-            if drive.kind == "servo":
+            if drive.kind != "stepper":
                 hint = f"use motors: with joints: {{{joint.name}: degrees per mm}}"
                 yield ("joints", i, "drive"), f"a servo turns, and the joint is prismatic; {hint}"
             elif drive.lead is None:
@@ -277,7 +304,14 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
     if robot.gripper is not None:
         drives.append((("gripper",), robot.gripper))
     used: set[str] = set()
+    numbers: set[int] = set()
     for path, drive in drives:
+        if drive.kind == "bus" and robot.board is not None and robot.board.kind in BOARDS:
+            yield (*path, "kind"), f"{robot.board.kind} has no bus; leave board out, or name one that has"
+        if drive.id is not None:
+            if drive.id in numbers:
+                yield (*path, "id"), f"{drive.id} is used already; each servo has its own number on the bus"
+            numbers.add(drive.id)
         if drive.axis is None:
             continue
         if drive.axis in used:

@@ -116,9 +116,11 @@ class Screw(_Model):
 
 
 class Drive(_Model):
-    """One motor: a stepper with its chain to the joint, or an RC servo."""
+    """One motor: a stepper with its chain to the joint, an RC servo, or a servo on a serial bus."""
 
-    kind: Literal["stepper", "servo"] = Field("stepper", description="A stepper (default) or an RC servo.")
+    kind: Literal["stepper", "servo", "bus"] = Field(
+        "stepper", description="A stepper (default), an RC servo, or a bus servo with an absolute position."
+    )
     axis: Name | None = Field(
         None,
         description="The board's output: X, Y, Z, A (CNC shield); X, Y, Z, E0, E1 (RAMPS); S0... (servos).",
@@ -143,14 +145,22 @@ class Drive(_Model):
     pulse_us: tuple[Annotated[int, Field(ge=100, le=5000)], Annotated[int, Field(ge=100, le=5000)]] | None = Field(
         None, description="Servo: pulse widths in microseconds at the two ends of `travel`."
     )
-    zero: Angle = Field(0.0, description="Servo: its own angle in degrees where the joint value is 0.")
+    zero: Angle = Field(
+        0.0, description="Where the joint value is 0: an RC servo's own angle in degrees, a bus servo's count."
+    )
+    id: Annotated[int, Field(ge=0, le=253)] | None = Field(None, description="Bus servo: its number on the bus.")
+    counts: Annotated[int, Field(ge=16, le=1_000_000)] | None = Field(
+        None, description="Bus servo: counts per joint turn, 4096 for a Feetech STS3215 without gears."
+    )
 
     def pulses_per_turn(self) -> float:
         """A stepper's pulses per joint turn: full_steps x microsteps x gear x pulley."""
         return (self.full_steps or 0) * (self.microsteps or 0) * self.gear * self.pulley
 
     def pulses_per_unit(self) -> float:
-        """Pulses (or microseconds) per degree, or per mm if there is a lead; `invert` is not in it."""
+        """Pulses (microseconds, counts) per degree, or per mm if there is a lead; `invert` is not in it."""
+        if self.kind == "bus":
+            return (self.counts or 0) / 360.0
         if self.kind == "servo":
             (a0, a1), (p0, p1) = self.travel or (0.0, 1.0), self.pulse_us or (0, 0)
             return (p1 - p0) / (a1 - a0)
@@ -216,6 +226,9 @@ class Joint(_Model):
     dh: DH | None = Field(None, description="The DH row (conventions standard and modified).")
     screw: Screw | None = Field(None, description="The screw axis (convention screws).")
     sign: Sign = Field(1, description="1 or -1: the joint counts against the axis of its row or screw.")
+    ratio: Annotated[float, Field(ge=0.5, le=2.0)] = Field(
+        1.0, description="Actual turn (or mm) per commanded one, as calibration finds it; joint values are commanded."
+    )
     limits: tuple[Value, Value] | None = Field(None, description="[lower, upper] in degrees or mm. Absent: unlimited.")
     home: Value = Field(0.0, description="The pose from which pulses are counted, in degrees or mm.")
     max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")

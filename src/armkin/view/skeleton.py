@@ -40,7 +40,7 @@ def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
     values = as_joints(arm, q)
     T = arm.link[0]
     path, joints, axes, slides = [arm.base[:3, 3], T[:3, 3]], [], [], []
-    for i, value in enumerate(values):
+    for i, value in enumerate(values * arm.ratio):
         z, start = T[:3, 2], T[:3, 3]
         joints.append(start)
         axes.append(z)

@@ -71,7 +71,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
         entry["pulses_per_turn"] = motor.pulses_per_turn()
     else:
         for key in ("full_steps", "microsteps", "gear", "pulley", "lead"):
-            entry.pop(key, None)
+            entry.pop(key, None)  # a servo of either kind has none
     types = {joint.name: joint.type for joint in file.joints}
     sliding = all(types[name] == "prismatic" for name in motor.joints)
     per_unit = motor.pulses_per_unit()

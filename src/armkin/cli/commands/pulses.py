@@ -34,8 +34,8 @@ def pulses(
 ) -> None:
     """Motor pulses from home to a pose.
 
-    Whole steps counted from home, halves away from zero; for RC servos the pulse width. Also where these
-    pulses put the joints and the tip.
+    Whole steps counted from home, halves away from zero; for RC servos the pulse width, for bus servos
+    the count. Also where these pulses put the joints and the tip.
     """
     from armkin.motors import motor_names
 
@@ -61,7 +61,7 @@ def pulses(
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     render.warn_of_limits(arm, answer["violations"])
     for name in answer["outside_travel"]:
-        output.warn(f"the servo of {name} cannot turn that far: its pulses are outside pulse_us")
+        output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
 
 
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[dict[str, Any]]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array, Entry, wrapped
 from armkin.forward import one_pose
+from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
 
 def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
+    if (turned := actual(arm)) is not arm:
+        rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)
+        return rows / arm.ratio, legal
     out = q.copy()
     inside = np.ones(q.shape[:-1], bool)
     if not q.size:
@@ -85,6 +89,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
     """
     row = one_pose(arm, q, "q")
     close = one_pose(arm, arm.home if near is None else near, "near")
+    if (turned := actual(arm)) is not arm:
+        return turns(turned, row * arm.ratio, close * arm.ratio) / arm.ratio
     choices = []
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])

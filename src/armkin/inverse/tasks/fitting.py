@@ -102,7 +102,7 @@ def _planar(arm: Arm, name: str) -> Task | str:
         return "it has no joint that turns"
     # DH angles about the base's z axis: theta is the direction of the last link
     offset = float((turns * arm.dh_sign * arm.dh_theta).sum())
-    return _plain(arm, name, 2, turns, [offset])
+    return _plain(arm, name, 2, turns * arm.ratio, [offset])
 
 
 def _yaw(arm: Arm, name: str) -> Task | str:
@@ -115,7 +115,7 @@ def _yaw(arm: Arm, name: str) -> Task | str:
     if (turns[~arm.prismatic] == 0).any() or not lifts.any() or not turns.any():
         return "it needs joints that turn about the base's z axis and one that slides along it"
     T0 = fk(arm, np.zeros(arm.n))
-    return _plain(arm, name, 3, turns, [np.arctan2(T0[1, 0], T0[0, 0])])
+    return _plain(arm, name, 3, turns * arm.ratio, [np.arctan2(T0[1, 0], T0[0, 0])])
 
 
 def _pitch(arm: Arm, name: str) -> Task | str:
@@ -133,10 +133,10 @@ def _pitch(arm: Arm, name: str) -> Task | str:
     weights = parallel * arm.dh_sign[1]
     offset = float((weights * arm.dh_sign * arm.dh_theta).sum()) + arm.pitch_offset
     if name == "xyz_pitch":
-        return _plain(arm, name, 3, weights, [offset])
+        return _plain(arm, name, 3, weights * arm.ratio, [offset])
     roll = np.zeros(arm.n)
     roll[4] = arm.dh_sign[4]
-    return _plain(arm, name, 3, [weights, roll], [offset, arm.dh_theta[4]])
+    return _plain(arm, name, 3, [weights * arm.ratio, roll * arm.ratio], [offset, arm.dh_theta[4]])
 
 
 # Each gives the task for an arm, or says why it does not fit.
