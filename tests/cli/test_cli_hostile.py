@@ -50,7 +50,7 @@ CASES: dict[str, tuple[int, list[str], bytes]] = {
     "robot has an unknown key": (4, ["fk", "@/unknown.yaml", "1"], b""),
     "robot has joint limits reversed": (4, ["fk", "@/reversed.yaml", "1"], b""),
     "robot holds nan": (4, ["fk", "@/nan.yaml", "1"], b""),
-    "robot before its numbers": (1, ["fk", "1", "2", "3", DOF], b""),
+    "robot before its numbers": (2, ["fk", "1", "2", "3", DOF], b""),
     # joint values
     "no joint values": (2, ["fk", DOF], b""),
     "one joint value too few": (2, ["fk", DOF, "1", "2"], b""),

@@ -35,4 +35,5 @@ def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
 def _looks_like_number(word: str) -> bool:
     """Whether somebody who wrote this word meant a negative number: -5, -.5, -5x, -inf."""
     body = word[1:].lower()
-    return body[:1].isdigit() or (body[:1] == "." and body[1:2].isdigit()) or body in _NOT_NUMBERS
+    pi = body == "pi" or body.startswith(("pi/", "pi*"))  # no number here, and an error that says so
+    return body[:1].isdigit() or (body[:1] == "." and body[1:2].isdigit()) or body in _NOT_NUMBERS or pi

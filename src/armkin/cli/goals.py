@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from armkin.cli import inputs, piped, render
 from armkin.cli.batch import streamed_rows
-from armkin.cli.numbers import listed
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
 from armkin.model import units
 
@@ -34,6 +33,11 @@ def goals(
     import numpy as np
 
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
+    if target is not None and q and robot is not None and batch is None:
+        from armkin.inverse.tasks.task import task_for
+
+        arm = inputs.load(robot)
+        inputs.target_list(arm, task_for(arm, task), target, q)  # 390 80 300 wants commas
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
     if target is None and (branch is not None or task is not None):
@@ -47,7 +51,7 @@ def goals(
         from armkin.inverse.tasks.fitting import task_for
 
         what = task_for(arm, task)
-        values = listed(target, what.labels, f"--target (task {what.name})")
+        values = inputs.target_list(arm, what, target)
         goal = units.targets_in(what.labels, np.array([values]))
         return arm, Goals(None, [1], goal, what.name, branch)
     if batch == "-":

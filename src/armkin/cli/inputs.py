@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from armkin.cli.numbers import NOT_FINITE, listed, numbers
+from armkin.cli import unit_notes
+from armkin.cli.numbers import NOT_FINITE, is_number, listed, numbers
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -22,20 +24,30 @@ def load(robot: str) -> Arm:
 
     if not robot:
         raise UsageError("the robot file's name is empty; name a file, for example robots/three_dof.yaml")
-    return load(robot)
+    if is_number(robot) and not os.path.exists(robot):
+        raise UsageError(f"ROBOT comes first, then the numbers: '{robot}' is no robot file")
+    arm = load(robot)
+    unit_notes.robot_file(arm)
+    return arm
 
 
 def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     """One value for each joint [deg | mm], or the name of a pose."""
     if words is not None and len(words) == 1 and (named := _pose(arm, words[0], "")) is not None:
         return named
-    return numbers(words or (), arm.joint_names, arm.name)
+    values = numbers(words or (), arm.joint_names, arm.name)
+    unit_notes.joint_values(arm, values)
+    return values
 
 
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     """One value for each joint [deg | mm], comma-separated, or the name of a pose."""
     named = _pose(arm, text, f"{option}: ")
-    return listed(text, arm.joint_names, option) if named is None else named
+    if named is not None:
+        return named
+    values = listed(text, arm.joint_names, option)
+    unit_notes.joint_values(arm, values, f"{option}'s numbers")
+    return values
 
 
 def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
@@ -43,7 +55,7 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
     poses = units.poses_out(arm)
     if word in poses:
         return poses[word]
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", word) or word.lower() in NOT_FINITE:
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", word) or word.lower() in (*NOT_FINITE, "pi"):
         return None
     close = get_close_matches(word, poses, 1)
     hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(poses)}"
@@ -51,9 +63,21 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
     raise UsageError(f"{where}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
 
 
-def target(task: Task, words: Sequence[str] | None) -> list[float]:
+def target(arm: Arm, task: Task, words: Sequence[str] | None) -> list[float]:
     """One value for each of the target's numbers [mm, deg]."""
-    return numbers(words or (), task.labels, f"task {task.name}")
+    values = numbers(words or (), task.labels, f"task {task.name}")
+    unit_notes.target(arm, task.labels, values)
+    return values
+
+
+def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = None) -> list[float]:
+    """The same of `--target`, comma-separated; rest: numbers that stand behind it as words of their own."""
+    if rest and is_number(text) and all(map(is_number, rest)):
+        whole = ",".join([text, *rest])
+        raise UsageError(f"--target: separate the numbers with commas: --target {whole}")
+    values = listed(text, task.labels, f"--target (task {task.name})")
+    unit_notes.target(arm, task.labels, values)
+    return values
 
 
 def no_numbers(words: Sequence[str] | None) -> None:

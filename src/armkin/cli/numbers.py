@@ -9,6 +9,7 @@ from armkin.errors import UsageError
 LARGEST = 1e9
 NOT_FINITE = ("nan", "inf", "infinity")
 
+_PI = re.compile(r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
@@ -26,6 +27,11 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     if abs(value) > largest:
         raise UsageError(f"{name}: '{shown}' is too large; numbers here go up to {largest:g}")
     return value
+
+
+def is_number(text: str) -> bool:
+    """Whether a word is a number."""
+    return _NUMBER.fullmatch(text.strip()) is not None
 
 
 def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
@@ -49,6 +55,11 @@ def listed(text: str, names: Sequence[str], what: str) -> list[float]:
         raise UsageError(f"{what}: separate the numbers with commas: {','.join(text.split())}")
     if len(words) == len(names):
         names = [f"{what}: {name}" for name in names]
+    elif len(words) == 1:
+        example = ",".join([text.strip() or "0", *["0"] * (len(names) - 1)])
+        raise UsageError(
+            f"{what} takes {len(names)} numbers ({' '.join(names)}) with commas and no spaces, as {example}; got 1"
+        )
     return numbers(words, names, what)
 
 
@@ -69,11 +80,25 @@ def _why_not(plain: str, shown: str) -> str:
     for unit in ("mm", "degrees", "deg", "\u00b0"):
         if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
             return f"'{shown}': units are fixed (mm, degrees); write {plain[: -len(unit)].strip()}"
+    if (angle := of_pi(plain)) is not None:
+        return f"'{shown}': angles are degrees; write {angle:.10g}"
     if _NUMBER.fullmatch(plain.rstrip(",")):
         return f"'{shown}' ends with a comma; write {plain.rstrip(',')}"
     if plain.count(",") == 1 and _NUMBER.fullmatch(plain.replace(",", ".")):
         return f"'{shown}' is not a number; write {plain.replace(',', '.')} with a point"
     return f"'{shown}' is not a number"
+
+
+def of_pi(text: str) -> float | None:
+    """A multiple of pi in degrees; None for other text.
+
+    >>> of_pi("-pi/2"), of_pi("3pi/4"), of_pi("pie")
+    (-90.0, 135.0, None)
+    """
+    found = _PI.fullmatch(text.strip().lower())
+    if found is None or (found[3] is not None and int(found[3]) == 0):
+        return None
+    return float(f"{found[1]}1") * 180 * float(found[2] or 1) / float(found[3] or 1)
 
 
 def _separator_hint(words: Sequence[str], names: Sequence[str]) -> str:

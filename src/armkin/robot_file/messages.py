@@ -4,6 +4,7 @@ pydantic names types; the person who wrote the file needs the joint, the key and
 becomes ``(path, text)``; the reader adds the file and the line.
 """
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -181,6 +182,11 @@ def _not_a_number(kind: str, path: Path, value: Any) -> str:
     if not isinstance(value, str):
         return text
     bare = value.strip().lower()
+    if path[-1] in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", bare):
+        return (
+            f"{text}; leave the variable out: {path[-1]} is the constant part, and the joint's value is added "
+            "to theta (of a prismatic joint: to d)"
+        )
     for unit in ("mm", "deg", "degrees", "°", "us"):
         bare = bare.removesuffix(unit).strip()
     if bare != value.strip().lower():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
-from armkin.cli.numbers import number
+from armkin.cli.numbers import is_number, number
 from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration, Grip
     from armkin.board.firmware.machine import Machine
     from armkin.model.arm import Arm
+
+
+_WORD = {"open": "open", "closed": "closed", "close": "closed", "shut": "closed"}
 
 
 def grip(
@@ -89,6 +93,8 @@ def _count(gripper: Grip, text: str, what: str) -> int:
     named = {"open": gripper.open, "closed": gripper.closed}
     if text in named:
         return named[text]
+    if not is_number(text) and (close := get_close_matches(text.lower(), (*named, "close", "shut"), 1)):
+        raise UsageError(f"{what}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
     count = gripper.count(number(text, what))
     low, high = sorted(named.values())
     if not low <= count <= high:

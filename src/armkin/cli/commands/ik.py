@@ -88,7 +88,7 @@ def ik(
         )
         tally.refuse_unsolved()
         return
-    values = one_row(inputs.target(what, target)).values
+    values = one_row(inputs.target(arm, what, target)).values
     goal = units.targets_in(what.labels, values)
     [found] = solving.solve(request, goal)
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)

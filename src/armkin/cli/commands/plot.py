@@ -57,6 +57,8 @@ def plot(
     canvas.check(out)
     canvas.require()
     arm = inputs.load(robot)
+    if target is not None and q:
+        _no_words(arm, task, target, q)
     if sum((bool(q), target is not None, path is not None)) > 1:
         raise UsageError("joint values, --target and --path: give one of the three")
     if not (q or target or path):
@@ -80,6 +82,13 @@ def plot(
         render.warn_of_limits(arm, outside)
 
 
+def _no_words(arm: Arm, task: str | None, target: str, q: list[str]) -> None:
+    """`--target 390 80 300`: say that it wants commas, where that is what is wrong."""
+    from armkin.inverse.tasks.task import task_for
+
+    inputs.target_list(arm, task_for(arm, task), target, q)
+
+
 def _eye(text: str) -> tuple[float, float]:
     if text in _VIEWS:
         return _VIEWS[text]
@@ -98,7 +107,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)
-    values = listed(text, what.labels, "--target")
+    values = inputs.target_list(arm, what, text)
     request = solving.Request(arm=arm, task=what.name, held=solving.locks(arm, lock))
     [answer] = solving.solve(request, units.targets_in(what.labels, [values]))
     goal = render.labelled(what.labels, values, units.label_units(what.labels))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.numbers import whole
+from armkin.cli.numbers import is_number, whole
 from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
 
@@ -77,7 +77,7 @@ def workspace(
         canvas.require()
         measures += [shade] if shade in ("manipulability", "step_error") and shade not in measures else []
     count = None if samples is None else whole(samples, "--samples", 1, _MOST)
-    points = None if grid is None else [whole(word, "--grid", 1, _MOST) for word in grid.split(",")]
+    points = None if grid is None else _points(grid)
     each = points * arm.n if points and len(points) == 1 else points
     total = math.prod(each) if each else count or 100_000
     with output.progress("samples", total) as tick:
@@ -98,6 +98,14 @@ def workspace(
     answer = _answer(found)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
+
+
+def _points(grid: str) -> list[int]:
+    """`--grid 10` or `--grid 10,20,30`."""
+    words = grid.split(",")
+    if len(words) == 1 and (parts := grid.lower().replace("*", "x").split("x"))[1:] and all(map(is_number, parts)):
+        raise UsageError(f"--grid {grid}: separate the counts with commas: {','.join(part.strip() for part in parts)}")
+    return [whole(word, "--grid", 1, _MOST) for word in words]
 
 
 def _answer(found: Workspace) -> dict[str, Any]:

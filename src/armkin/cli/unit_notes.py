@@ -1,0 +1,61 @@
+"""Numbers that look like metres or radians: a note on stderr, never a refusal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from armkin.cli import output
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_METRES = 2.0  # mm: a target this near to the base, or an arm this short, was meant in metres
+_RADIANS = 3.2  # deg: a little more than pi
+_BIG = 50.0  # mm: the reach of an arm whose file is certainly in mm
+_TURNS = (math.pi / 2, math.pi)
+
+
+def robot_file(arm: Arm) -> None:
+    """Lengths that together make two millimetres, angles of 1.5708 degrees."""
+    file = arm.file
+    if file is None:
+        return
+    lengths = [abs(x) for joint in file.joints if joint.dh is not None for x in (joint.dh.a, joint.dh.d)]
+    lengths += [abs(x) for pose in (file.base, file.tool, file.zero_pose) if pose is not None for x in pose.xyz]
+    if 0 < sum(lengths) < _METRES:
+        output.note(
+            f"all lengths in {arm.path} together are {sum(lengths):.4g} mm; if they are metres, multiply them by 1000"
+        )
+    angles = [x for joint in file.joints if joint.dh is not None for x in (joint.dh.alpha, joint.dh.theta)]
+    angles += [x for pose in (file.base, file.tool, file.zero_pose) if pose is not None for x in pose.rpy]
+    for angle in angles:
+        if any(abs(abs(angle) - turn) < 1e-3 for turn in _TURNS):
+            output.note(
+                f"{arm.path} has an angle of {angle:g} degrees; if it is in radians, write {math.degrees(angle):.4g}"
+            )
+            return
+
+
+def joint_values(arm: Arm, values: Sequence[float], what: str = "joint values") -> None:
+    """Joint values that are all below pi, with digits after the point; what: where they stand."""
+    turning = [value for value, sliding in zip(values, arm.prismatic, strict=True) if not sliding]
+    if not turning or max(map(abs, turning)) > _RADIANS or not any(_has_digits(value) for value in turning):
+        return
+    output.note(f"{what} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
+
+
+def target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
+    """A position within 2 mm of the base's origin, asked of an arm of ordinary size."""
+    position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
+    if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG:
+        output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
+    angles = [v for v, unit in zip(values, units.label_units(labels), strict=True) if unit == "deg"]
+    if angles and any(map(_has_digits, angles)) and any(abs(abs(v) - turn) < 1e-3 for v in angles for turn in _TURNS):
+        output.note(f"angles are degrees, and these look like radians ({', '.join(f'{v:g}' for v in angles)})")
+
+
+def _has_digits(value: float) -> bool:
+    return value != round(value)
