@@ -34,7 +34,7 @@ def goals(
 
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
     if target is not None and q and robot is not None and batch is None:
-        from armkin.inverse.tasks.task import task_for
+        from armkin.inverse.tasks.fitting import task_for
 
         arm = inputs.load(robot)
         inputs.target_list(arm, task_for(arm, task), target, q)  # 390 80 300 wants commas

@@ -84,7 +84,7 @@ def plot(
 
 def _no_words(arm: Arm, task: str | None, target: str, q: list[str]) -> None:
     """`--target 390 80 300`: say that it wants commas, where that is what is wrong."""
-    from armkin.inverse.tasks.task import task_for
+    from armkin.inverse.tasks.fitting import task_for
 
     inputs.target_list(arm, task_for(arm, task), target, q)
 
