@@ -8,13 +8,39 @@
     ├── MissingExtraError  an optional package is not installed
     └── LinkError          the port, or the board behind it
 
-A message says what is wrong, where, what is allowed and what to do next, in one
-or two lines. Only the command line maps these classes to exit codes.
+A message says what is wrong, where and what is allowed, in one or two lines, in words that hold for a
+program, too; `fields` says the same in values. Only the command line maps these classes to exit codes and
+names its options as the next step (`armkin.cli.advice`).
 """
+
+from __future__ import annotations
+
+import re
+from typing import Any, Self
 
 
 class ArmkinError(Exception):
-    """Base of all errors that armkin raises on purpose."""
+    """Base of all errors that armkin raises on purpose.
+
+    fields: what the message is about, as values of JSON: joint, value, lower, upper, file, line, ...
+
+    >>> error = NoSolutionError("q2 = 130 deg is outside -20 to 120 deg", joint="q2", value=130.0)
+    >>> error.kind, error.fields
+    ('no_solution', {'joint': 'q2', 'value': 130.0})
+    """
+
+    def __init__(self, message: str = "", **fields: Any) -> None:
+        super().__init__(message)
+        self.fields = fields
+
+    @property
+    def kind(self) -> str:
+        """The class in one word, for programs in other languages: ``robot_file`` of RobotFileError."""
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(self).__name__.removesuffix("Error")).lower()
+
+    def within(self, place: str, **fields: Any) -> Self:
+        """The same error, said of a place: ``row 3: ...``."""
+        return type(self)(f"{place}: {self}", **{**self.fields, **fields})
 
 
 class FileError(ArmkinError):
@@ -27,7 +53,10 @@ class RobotFileError(ArmkinError):
     The message tells the first problem and where the others are; `problems` holds one line for each.
     """
 
-    problems: tuple[str, ...] = ()
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """All problems of the file."""
+        return tuple(self.fields.get("problems", ()))
 
 
 class UsageError(ArmkinError, ValueError):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def load(robot: str) -> Arm:
-    """The arm of a robot file."""
+    """The arm of a robot file, or of a shipped robot."""
     from armkin.model.build import load
 
     if not robot:

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="Robot file, for example robots/three_dof.yaml.")]
+Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="Robot file, or the name of a shipped robot: three_dof.")]
 Joints = Annotated[
     list[str] | None,
     typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm), or a pose's name: home, ..."),

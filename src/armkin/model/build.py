@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 
 
 def load(path: str | PathLike[str]) -> Arm:
-    """Read and validate a robot file.
+    """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
 
     Raises FileError if it cannot be read and RobotFileError if it is not valid.
+
+    >>> load("three_dof").joint_names
+    ('q1', 'q2', 'q3')
     """
     from armkin import robot_file
 

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from armkin.errors import FileError, RobotFileError
-from armkin.robot_file import strict_yaml
+from armkin.robot_file import catalogue, strict_yaml
 from armkin.robot_file.model import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, Screw
 from armkin.robot_file.robot import RobotFile
 
@@ -36,21 +36,21 @@ __all__ = [
 
 
 def read(path: str | os.PathLike[str]) -> RobotFile:
-    """Read and validate a robot file.
+    """Read and validate a robot file, given its path or the name of a shipped robot.
 
     Raises FileError if it cannot be read, RobotFileError (``file:line: what; what is allowed``) if it
     is not valid.
     """
     name = os.fspath(path)
     try:
-        with Path(name).open("rb") as file:
+        with Path(catalogue.locate(name)).open("rb") as file:
             # One byte more than is allowed: enough to know, also of /dev/zero.
             raw = file.read(strict_yaml.MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         is_folder = isinstance(error, IsADirectoryError)
         hint = "; name a file, for example robots/three_dof.yaml" if is_folder else ""
-        raise FileError(f"{name}: cannot read the robot file: {reason}{hint}") from None
+        raise FileError(f"{name}: cannot read the robot file: {reason}{hint}", file=name) from None
     return parse(raw, name)
 
 
@@ -113,9 +113,7 @@ def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
         lines = sorted({line for line, _ in problems[1:]})
         places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
         message = f"{told[0]}\n{len(told) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
-    error = RobotFileError(message)
-    error.problems = told
-    return error
+    return RobotFileError(message, problems=list(told))
 
 
 def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:
