@@ -28,7 +28,7 @@ MAY_IMPORT: dict[str, str] = {
     "inverse": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
     " inverse/branches",
     "motors": "errors formula model forward",
-    "motion": "errors formula model forward motors board/firmware",
+    "motion": "errors formula model forward motors",
     "reach": "errors files formula model forward motors",
     "view": "errors formula model forward",
     "plot": "errors files formula model forward view reach",

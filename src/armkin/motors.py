@@ -164,6 +164,16 @@ def resolution(arm: Arm) -> Array:
     return np.asarray(np.abs(joints_per_pulse(arm)).sum(axis=1))
 
 
+def motor_accel(arm: Arm) -> Array:
+    """Greatest acceleration of every motor: (motors,) [counts/s^2].
+
+    That of a motor which turns several joints suits the most delicate of them, whichever moves: so a hold,
+    of which the board knows motors only, is within the joints' max_accel.
+    """
+    each = np.abs(arm.motor_gain) * arm.max_accel
+    return np.asarray(np.where(each > 0, each, np.inf).min(axis=1))
+
+
 def motor_names(arm: Arm) -> list[str]:
     """Names of the motors, in the order of the pulses."""
     if arm.file is None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import StoppedError
@@ -22,7 +23,6 @@ from armkin.errors import LinkError, UsageError
 from armkin.hardware import BOARDS
 from armkin.model import build as arms
 from armkin.model.arm import Arm
-from armkin.motion.plan import plan as plan_moves
 from armkin.motors import joints, pulses
 from armkin.robot_file import parse
 
@@ -168,7 +168,7 @@ def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
     [
         (", driver: A4988", "", "has no driver"),
         ("axis: Y, ", "", "motor q2 has no axis"),
-        ("    max_accel: 120\n", "", "joint q1 has no max_accel"),
+        ("    max_accel: 120\n", "", "joints q1, q2, q3 have no max_accel"),
     ],
 )
 def test_what_is_missing_is_named(old: str, new: str, message: str) -> None:
@@ -203,7 +203,7 @@ def test_coupled_joints_move_together_to_exact_counts(wrist: Arm) -> None:
     one = machine(wrist)
     one.prepare()
     plan = plan_moves(wrist, one.counts(), np.deg2rad([[80, 40, 70], [0, -40, -50], [0, 0, 0]]))
-    assert np.all(plan.top_speed <= wrist.max_speed * (1 + 1e-9))
+    assert np.all(plan.trajectory.top_speed <= wrist.max_speed * (1 + 1e-9))
     one.run([plan])
     assert one.counts() == (0, 0, 0)
 

@@ -40,7 +40,7 @@ def test_the_first_command_just_works() -> None:
     assert "-10144" in done.out
     assert "5667" in done.out
     assert "starts with the arm in its home pose" in done.err
-    assert done.out.endswith("read back: as planned, 1.975 s\n")
+    assert done.out.endswith("read back: as planned, 1.917 s\n")
 
 
 def test_json_tells_plan_and_arrival() -> None:
@@ -52,7 +52,7 @@ def test_json_tells_plan_and_arrival() -> None:
     assert answer["start_joints"] == pytest.approx([0, 90, -90])
     assert answer["joints"] == pytest.approx([-30.009375, 4.998371, -4.995], abs=1e-6)
     assert answer["position"] == "known"
-    assert answer["duration_s"] == pytest.approx(1.975, abs=0.01)
+    assert answer["duration_s"] == pytest.approx(1.917, abs=0.002)
     assert answer["top_speed"] == pytest.approx([21.18, 60, 60], abs=0.01)
 
 
@@ -182,8 +182,8 @@ def test_nothing_to_send_and_a_terminal_as_input() -> None:
         ((THREE_DOF, *POSE, "--port", "sim", "--target", "1,2,3"), 2, "give one of them"),
         ((THREE_DOF, *POSE, "--port", "sim", "--branch", "left"), 2, "belong to --target"),
         ((THREE_DOF, *POSE, "--port", "sim", "--from", "0,0,0"), 2, "belongs to --dry-run"),
-        (("robots/planar_2dof.yaml", 10, 10, "--port", "sim"), 2, "has no max_speed"),
-        (("robots/puma560.yaml", 0, 0, 0, 0, 0, 0, "--port", "sim"), 2, "has no board"),
+        (("robots/planar_2dof.yaml", 10, 10, "--port", "sim"), 2, "joints q1, q2 have no max_speed"),
+        (("robots/puma560.yaml", 0, 0, 0, 0, 0, 0, "--port", "sim"), 2, "has no drives"),
     ],
 )
 def test_refusals(words: Sequence[object], code: int, message: str) -> None:
@@ -257,7 +257,7 @@ def test_grip() -> None:
     assert run("grip", THREE_DOF, 75, "--port", "sim", "--json").json["counts"] == 1333
     assert run("grip", THREE_DOF, 30, "--port", "sim").out == "gripper: 29.97 deg (833 us)\n"
     assert run("grip", THREE_DOF, 130, "--port", "sim").code == 2
-    assert "has no max_speed" in run("grip", "robots/planar_2dof.yaml", "open", "--port", "sim").err
+    assert "have no max_speed" in run("grip", "robots/planar_2dof.yaml", "open", "--port", "sim").err
 
 
 def test_jog() -> None:
@@ -503,3 +503,48 @@ def test_a_board_behind_a_socket() -> None:
         thread.join()
     assert done.code == 0, done.err
     assert board.net[:3] == done.json["pulses"] == [356, -1193, 667]
+
+
+# ---- planning needs no board
+
+
+def _movable() -> list[Path]:
+    """Shipped and test robots with drives and rates, whatever their board."""
+    found = []
+    for path in sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests" / "robots").glob("*.yaml")):
+        text = path.read_text()
+        if "full_steps" in text or "kind: servo" in text:
+            found.append(path)
+    return found
+
+
+@pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
+def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
+    import armkin
+    from armkin.board.firmware.configuration import missing
+
+    arm = armkin.load(path)
+    home = ",".join(str(x) for x in armkin.pulses(arm, arm.home))
+    assert home
+    values = [float(x) for x in (arm.home / [1.0 if slides else 0.0174532925199433 for slides in arm.prismatic])]
+    goal = [value + 1 if value < 50 else value - 1 for value in values]
+    for words in (("--dry-run",), ("--port", "sim")):
+        done = run("send", path, *goal, "--json", *words)
+        lacks = missing(arm, board=False)
+        if lacks:
+            assert done.code == 2
+            assert all(lack in done.err for lack in lacks)
+            assert "max_accel: ..." in done.err
+        else:
+            assert done.code == 0, done.err
+            assert done.json["joints"] == pytest.approx(goal, abs=0.2)
+
+
+def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    text = (ROOT / THREE_DOF).read_text()
+    mine.write_text(text[: text.index("board: {kind")].replace("    max_accel: 120\n", "", 1))
+    done = run("send", mine, *POSE, "--port", tmp_path / "none")
+    assert done.code == 2
+    for words in ("joint q1 has no max_accel", "it has no board", "max_accel: ...", "board: {kind: ..., driver: ...}"):
+        assert words in done.err

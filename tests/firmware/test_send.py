@@ -17,11 +17,11 @@ import pytest
 from emulator import EmulatedBoard
 
 from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import Flag
 from armkin.board.ports import SerialPort
 from armkin.model import build as arms
-from armkin.motion.plan import plan as plan_moves
 from command_line import ROOT, THREE_DOF, process, run
 
 POSE = (-30, 5, -5)

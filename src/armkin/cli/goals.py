@@ -14,11 +14,11 @@ from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.board.firmware.cutting import Cut
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.plan import Plan
 
-Planner = Callable[[Sequence[int], "Array"], "Plan"]  # counts to start from, joint values (w, n) [rad | mm]
+Planner = Callable[[Sequence[int], "Array"], "Cut"]  # counts to start from, joint values (w, n) [rad | mm]
 
 
 def goals(
@@ -116,7 +116,7 @@ class Stream:
             self._rows.put(error)
         self._rows.put(None)
 
-    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Plan | None]:
+    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Cut | None]:
         """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
         at, empty = list(start), True
         while True:

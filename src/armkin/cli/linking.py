@@ -29,6 +29,7 @@ AssumeHome = Annotated[
     ),
 ]
 BAUD = 250_000
+SIM = "sim"
 _AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
 
@@ -94,11 +95,11 @@ def machine(
             link.close()
 
 
-def configured(arm: Arm) -> Configuration:
-    """The arm's board and configuration."""
+def configured(arm: Arm, *, rehearsal: bool = False) -> Configuration:
+    """The arm's board and configuration; rehearsal: any board will do."""
     from armkin.board.firmware.configuration import configure
 
-    return configure(arm)
+    return configure(arm, rehearsal=rehearsal)
 
 
 def where(machine: Machine) -> dict[str, Any]:

@@ -1,143 +1,103 @@
-"""Coordinated moves: joint values in, lines of device segments out.
+"""Coordinated moves: joint values in, a trajectory of straight lines in joint space out.
 
-A move is a straight line in joint space, and so in the motors' counts, because motors are linear in
-joints: `armkin.board.firmware.segments` cuts it. What a move may not do is refused here, before anything moves: joints
-outside their limits, missing rates, rates that the board cannot make.
+What a move may not do is refused here, before anything moves: joints outside their limits, missing rates.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.board.firmware.segments import CLOCK, EASE, MIN_INTERVAL, Counts, Move, line, progress
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.forward import frames
 from armkin.model.limits import outside, said
-from armkin.motors import joints as joints_of
-from armkin.motors import motor_names, pulses
+from armkin.motion.profile import at_rest, trapezoid
+from armkin.motion.trajectory import Straight, Trajectory
+from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Moves through waypoints, at rest in each: what `armkin send` does, and `--dry-run` prints."""
+def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
+    """Moves from joint values through joint targets, stopping at each, all joints together.
 
-    arm: Arm
-    start: Counts  # (motors,)
-    moves: tuple[Move, ...]
-    clock: int = CLOCK
-
-    @property
-    def end(self) -> Counts:
-        """Counts at the end: (motors,)."""
-        return self.moves[-1].end if self.moves else self.start
-
-    @property
-    def duration(self) -> float:
-        """Seconds from the first tick to the last."""
-        return sum(move.cycles for move in self.moves) / self.clock
-
-    @property
-    def segments(self) -> int:
-        """Number of device segments."""
-        return sum(len(move.segments) for move in self.moves)
-
-    @property
-    def top_speed(self) -> Array:
-        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
-        spans = [np.abs(_span(self.arm, move)) * move.peak for move in self.moves]
-        return np.max(spans, axis=0) if spans else np.zeros(self.arm.n)
-
-    @property
-    def top_rate(self) -> Array:
-        """Greatest rate of every motor: (motors,) [counts/s]."""
-        rates = [np.abs(move.end - move.start) * move.peak for move in self.moves]
-        return np.max(rates, axis=0) if rates else np.zeros(len(self.start))
-
-    def trace(self, step: float = 0.01) -> Trace:
-        """The path in time, sampled every `step` seconds, with the end of every move."""
-        times, joints, begin = [np.zeros(1)], [joints_of(self.arm, self.start)[None]], 0.0
-        for move in self.moves:
-            seconds = move.cycles / self.clock
-            t = np.append(np.arange(step, seconds - step / 4, step), seconds)
-            done = progress(move, t * self.clock)
-            times.append(begin + t)
-            joints.append(joints_of(self.arm, move.start) + done[:, None] * _span(self.arm, move))
-            begin += seconds
-        q = np.concatenate(joints)
-        position = frames(self.arm, q)[..., :3, 3]
-        return Trace(np.concatenate(times), q, position)
-
-
-@dataclass(frozen=True)
-class Trace:
-    """A plan sampled in time."""
-
-    time: Array  # (T,) [s]
-    joints: Array  # (T, n) [rad | mm]
-    position: Array  # (T, n + 2, 3) [mm] base, every joint's frame, tool
-
-
-def plan(
-    arm: Arm,
-    start: ArrayLike,
-    targets: ArrayLike,
-    *,
-    speed: float = 1.0,
-    clock: int = CLOCK,
-    min_interval: int = MIN_INTERVAL,
-) -> Plan:
-    """Moves from counts through joint targets, stopping at each.
-
-    start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
-    Raises NoSolutionError for a target outside the limits, UsageError if max_speed, max_accel or a drive
-    is missing, or if the device cannot make steps that fast.
+    start: (n,); targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
+    Raises NoSolutionError for a target outside the limits, UsageError if max_speed or max_accel is missing.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
-    >>> p = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
-    >>> p.end.tolist(), round(p.duration, 2), np.rad2deg(p.top_speed).round().tolist()
-    ([-1067, -10144, 5667], 1.98, [21.0, 60.0, 60.0])
+    >>> p = plan(arm, arm.home, np.deg2rad([-30, 5, -5]))
+    >>> round(p.duration, 4), np.rad2deg(p.top_speed).round().tolist()
+    (1.9167, [21.0, 60.0, 60.0])
     """
     check_rates(arm)
     if not 0 < speed <= 1:
         raise UsageError(f"speed {100 * speed:g} % is not possible; it goes from above 0 to 100 percent")
-    at = np.asarray(start, dtype=np.int64)
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
-    moves = []
-    for goal in pulses(arm, goals):
-        moves.append(_joint_move(arm, at, goal, speed, clock, min_interval))
+    at = np.asarray(start, dtype=float)
+    stretches = []
+    for goal in goals:
+        stretches.append(straight(arm, at, goal, speed))
         at = goal
-    first = moves[0].start if moves else at
-    return Plan(arm, first, tuple(moves), clock)
+    return Trajectory(arm, np.asarray(start, dtype=float), tuple(stretches))
 
 
-def motor_accel(arm: Arm) -> Array:
-    """Greatest acceleration of every motor: (motors,) [counts/s^2].
+def straight(arm: Arm, start: Array, end: Array, speed: float = 1.0) -> Straight:
+    """The fastest straight line in joint space from rest to rest: (n,), (n,) [rad | mm].
 
-    That of a motor which turns several joints suits the most delicate of them, whichever moves: so a hold,
-    of which the board knows motors only, is within the joints' max_accel.
+    A motor that turns several joints keeps to `motor_accel`, so that a hold, of which a board knows motors
+    only, is within the joints' max_accel.
     """
-    each = np.abs(arm.motor_gain) * arm.max_accel
-    return np.asarray(np.where(each > 0, each, np.inf).min(axis=1))
+    change = np.abs(end - start)
+    moving = change > 1e-12
+    if not moving.any():
+        return Straight(start, end, at_rest(0.0))
+    top = float((arm.max_speed[moving] / change[moving]).min()) * speed
+    accel = float((arm.max_accel[moving] / change[moving]).min())
+    turned = np.abs(arm.motor_gain @ (end - start))
+    if turned.any():
+        accel = min(accel, float((motor_accel(arm)[turned > 0] / turned[turned > 0]).min()))
+    return Straight(start, end, trapezoid(1.0, top, accel))
+
+
+def missing_rates(arm: Arm) -> dict[str, list[str]]:
+    """Keys that motion needs and the robot file lacks: {"max_speed": [joint, ...], ...}."""
+    found = {
+        key: [name for name, value in zip(arm.joint_names, values, strict=True) if np.isnan(value)]
+        for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel))
+    }
+    return {key: names for key, names in found.items() if names}
+
+
+def rate_lines(arm: Arm) -> list[str]:
+    """What `missing_rates` finds, as lines of a robot file to add."""
+    unit = {name: "mm" if slides else "deg" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)}
+    lines = []
+    for key, names in missing_rates(arm).items():
+        for size in ("deg", "mm"):
+            these = [name for name in names if unit[name] == size]
+            if these:
+                per = "s" if key == "max_speed" else "s2"
+                lines.append(f"{key}: ...   # {size}/{per}, to joint{'s' * (len(these) > 1)} {', '.join(these)}")
+    return lines
 
 
 def check_rates(arm: Arm) -> None:
-    """Raise UsageError, naming the joint, if a max_speed or max_accel is missing."""
-    for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel)):
-        for name, value in zip(arm.joint_names, values, strict=True):
-            if math.isnan(value):
-                where = f" in {arm.path}" if arm.path else ""
-                raise UsageError(f"joint {name} has no {key}: motion needs one; add {key}: to it{where}")
+    """Raise UsageError, naming every joint, if a max_speed or max_accel is missing."""
+    absent = missing_rates(arm)
+    if absent:
+        said_of = [f"joint{'s' * (len(n) > 1)} {', '.join(n)} ha{'ve' if len(n) > 1 else 's'} no {key}"
+                   for key, n in absent.items()]  # fmt: skip
+        raise UsageError(f"{', '.join(said_of)}: motion needs one{_add(arm, rate_lines(arm))}")
+
+
+def _add(arm: Arm, lines: list[str]) -> str:
+    """The lines to add, said of the robot file."""
+    return "".join([f"; add to {arm.path or arm.name}:", *(f"\n  {line}" for line in lines)])
 
 
 def check_limits(arm: Arm, targets: Array) -> None:
@@ -152,32 +112,3 @@ def check_limits(arm: Arm, targets: Array) -> None:
     for row, joint in np.argwhere(outside(arm, targets)):
         which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
         raise NoSolutionError(f"{which}{said(arm, joint, targets[row, joint])}: nothing was moved")
-
-
-def _joint_move(arm: Arm, start: Counts, end: Counts, speed: float, clock: int, min_interval: int) -> Move:
-    change = np.abs(joints_of(arm, end) - joints_of(arm, start))
-    moving = change > 1e-12
-    if not moving.any():
-        return Move(start, end, (), 0, 0.0)
-    top = float((arm.max_speed[moving] / change[moving]).min()) * speed
-    accel = float((arm.max_accel[moving] / change[moving]).min())
-    accel = min(accel, float((motor_accel(arm) / np.maximum(np.abs(end - start), 1)).min()))
-    rates = np.abs(end - start) * min(top, math.sqrt(accel * EASE))
-    if rates.max() > clock / min_interval:
-        k = int(rates.argmax())
-        joint = int(np.argmax(np.abs(arm.motor_gain[k]) * change))
-        unit, word = (1.0, "mm/s") if arm.prismatic[joint] else (math.pi / 180, "deg/s")
-        fast = change[joint] * rates[k] / abs(end - start)[k] / unit
-        allowed = clock / min_interval
-        raise UsageError(
-            f"joint {arm.joint_names[joint]} at {fast:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
-            f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}\n"
-            f"lower its max_speed, or send with --speed {math.floor(100 * speed * allowed / rates[k])}"
-        )
-    brakes = motor_accel(arm)
-    return line(start.tolist(), end.tolist(), top, accel, brakes=brakes, clock=clock, min_interval=min_interval)
-
-
-def _span(arm: Arm, move: Move) -> Array:
-    """Change of every joint over a move: (n,)."""
-    return joints_of(arm, move.end) - joints_of(arm, move.start)

@@ -17,13 +17,13 @@ import numpy as np
 from armkin.board.firmware.protocol import AxisImage, Image, RowImage
 from armkin.errors import UsageError
 from armkin.hardware import BOARDS, DRIVERS, Board, Driver
-from armkin.motion.plan import check_rates, motor_accel
-from armkin.motors import pulse_range, pulses, resolution
+from armkin.motion.plan import missing_rates, rate_lines
+from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.robot_file import Gripper, Motor
+    from armkin.robot_file import Gripper, RobotFile
 
 _FAR = 2**30  # counts: an axis without a limit
 _SERVO_RANGE = (400, 2600)  # [us] that the boards can make
@@ -67,22 +67,31 @@ class Configuration:
         return any(i < len(self.board.steppers) for i in used)
 
 
-def configure(arm: Arm) -> Configuration:
+def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     """The configuration of an arm.
 
-    Raises UsageError, naming what is missing: `board`, its `driver`, a motor's `axis`, max_speed, ...
+    rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
+    axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
     file = arm.file
-    where = f" in {arm.path}" if arm.path else ""
-    if file is None or file.board is None:
-        names = ", ".join(BOARDS)
-        raise UsageError(f"{arm.name} has no board; add board: {{kind: ...}}{where} ({names})")
-    board = BOARDS[file.board.kind]
+    lacks = _without_rates(arm) + ([] if rehearsal else _without_board(arm))
+    if lacks or file is None:
+        said = ", ".join(words for words, _ in lacks) or "it has no robot file"
+        lines = [line for _, added in lacks for line in added]
+        raise UsageError(
+            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)])
+        )
+    made_up = rehearsal and bool(_without_board(arm))
     motors = file.motor_list()
-    resolution(arm)  # raises if a joint has no motor
-    check_rates(arm)
-    axes = tuple(_axis(board, motor, f"motor {motor.name}", where) for motor in motors)
-    grip = _grip(board, file.gripper, where) if file.gripper is not None else None
+    if made_up:
+        board = _rehearsal_board(file)
+        names = [*(motor.name for motor in motors), "gripper"]
+    else:
+        assert file.board is not None
+        board = BOARDS[file.board.kind]
+        names = [*(str(motor.axis) for motor in motors), str(file.gripper.axis) if file.gripper is not None else ""]
+    axes = tuple(board.axes.index(name) for name in names[:-1])
+    grip = _grip(board.axes.index(names[-1]), file.gripper) if file.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
     low, high = _limits(arm)
     home = pulses(arm, arm.home)
@@ -102,12 +111,12 @@ def configure(arm: Arm) -> Configuration:
         )
     if grip is not None and file.gripper is not None:
         images[grip.axis] = _grip_image(board, file.gripper, grip)
-    driver = _driver(arm, board, images, where)
+    driver = _driver(file)
     image = Image(
         tuple(images),
         _rows(arm, board, axes, low, high),
-        abort_closed=file.board.abort == "closed",
-        enable_high=file.board.enable == "high",
+        abort_closed=file.board is not None and file.board.abort == "closed",
+        enable_high=file.board is not None and file.board.enable == "high",
         step_high=driver.step_high,
         step_low=driver.step_low,
         dir_setup=driver.dir_setup,
@@ -117,11 +126,63 @@ def configure(arm: Arm) -> Configuration:
     return Configuration(board, image, axes, grip)
 
 
-def _axis(board: Board, motor: Motor | Gripper, what: str, where: str) -> int:
-    names = board.servos if motor.kind == "servo" else board.steppers
-    if motor.axis is None:
-        raise UsageError(f"{what} has no axis; add axis: to its drive{where} ({', '.join(names)})")
-    return board.axes.index(motor.axis)
+Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
+
+
+def missing(arm: Arm, *, board: bool = True) -> list[str]:
+    """What the robot file lacks before the arm can be moved, in words; board: on a board, not in simulation."""
+    return [words for words, _ in _without_rates(arm) + (_without_board(arm) if board else [])]
+
+
+def _without_rates(arm: Arm) -> list[Lack]:
+    """Missing drives and rates: what a plan needs."""
+    lacks: list[Lack] = []
+    try:
+        joints_per_pulse(arm)  # raises if a joint has no motor
+    except UsageError as error:
+        lacks.append((str(error), ["drive: {...}   # to every joint, or motors: (armkin schema shows the keys)"]))
+    absent = missing_rates(arm)
+    for key, names in absent.items():
+        lacks.append(
+            (f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}", [])
+        )
+    if absent:
+        lacks[-1] = (lacks[-1][0], rate_lines(arm))
+    return lacks
+
+
+def _without_board(arm: Arm) -> list[Lack]:
+    """Missing board, driver, axes: what a board needs."""
+    file = arm.file
+    if file is None:
+        return [(f"{arm.name} has no board: an arm without a robot file cannot be sent", [])]
+    if file.board is None:
+        drivers = ", ".join(DRIVERS)
+        add = f"board: {{kind: ..., driver: ...}}   # kinds: {', '.join(BOARDS)}; drivers: {drivers}"
+        return [("it has no board", [add])]
+    board, lacks = BOARDS[file.board.kind], []
+    steppers = False
+    for motor in [*file.motor_list(), *([] if file.gripper is None else [file.gripper])]:
+        steppers = steppers or motor.kind == "stepper"
+        if motor.axis is None:
+            what = "the gripper" if motor is file.gripper else f"motor {getattr(motor, 'name', '')}"
+            free = board.servos if motor.kind == "servo" else board.steppers
+            lacks.append((f"{what} has no axis", [f"axis: ...   # to the drive of {what} ({', '.join(free)})"]))
+    if steppers and file.board.driver is None:
+        why = "its board has no driver: it sets the pulse timing"
+        lacks.append((why, [f"driver: ...   # to board: ({', '.join(DRIVERS)})"]))
+    return lacks
+
+
+def _rehearsal_board(file: RobotFile) -> Board:
+    """A board that does not exist, with an axis for every motor and a switch for every joint's homing."""
+    motors = file.motor_list()
+    steppers = [motor.name for motor in motors if motor.kind == "stepper"]
+    servos = [motor.name for motor in motors if motor.kind == "servo"]
+    if file.gripper is not None:
+        (servos if file.gripper.kind == "servo" else steppers).append("gripper")
+    switches = dict.fromkeys(joint.homing.switch for joint in file.joints if joint.homing is not None)
+    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 1600, 80)
 
 
 def _limits(arm: Arm) -> tuple[list[int], list[int]]:
@@ -194,8 +255,8 @@ def _accel(accel: float) -> int:
     return max(1, min(math.ceil(accel - 1e-9), 2**24 - 1))
 
 
-def _grip(board: Board, gripper: Gripper, where: str) -> Grip:
-    axis = _axis(board, gripper, "the gripper", where)
+def _grip(axis: int, gripper: Gripper) -> Grip:
+    """The gripper on an axis."""
     per_unit, zero = gripper.pulses_per_unit(), 0.0
     if gripper.kind == "servo" and gripper.travel is not None and gripper.pulse_us is not None:
         zero = gripper.pulse_us[0] + (gripper.zero - gripper.travel[0]) * per_unit
@@ -225,18 +286,10 @@ def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
     return AxisImage(True, invert, low, high, grip.open, _rate(board, grip.top), _accel(grip.accel))
 
 
-def _driver(arm: Arm, board: Board, images: list[AxisImage], where: str) -> Driver:
-    assert arm.file is not None
-    assert arm.file.board is not None
-    name = arm.file.board.driver
-    if name is not None:
-        return DRIVERS[name]
-    if any(images[i].used for i in range(len(board.steppers))):
-        raise UsageError(
-            f"{arm.name}'s board has no driver: it sets the pulse timing; "
-            f"add driver: to board:{where} ({', '.join(DRIVERS)})"
-        )
-    return Driver(1, 1, 1, 1)
+def _driver(file: RobotFile) -> Driver:
+    """Pulse timing; without steppers, or on a made-up board, any will do."""
+    name = None if file.board is None else file.board.driver
+    return Driver(1, 1, 1, 1) if name is None else DRIVERS[name]
 
 
 def _meaning(arm: Arm, grip: Grip | None) -> int:

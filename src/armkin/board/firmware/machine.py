@@ -21,11 +21,11 @@ from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.cutting import Cut
     from armkin.board.firmware.segments import Counts, Move
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.plan import Plan
 
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
@@ -169,7 +169,7 @@ class Machine:
 
     # Moving
 
-    def run(self, plans: Iterable[Plan | None], progress: Progress = lambda done, total: None) -> Status:
+    def run(self, plans: Iterable[Cut | None], progress: Progress = lambda done, total: None) -> Status:
         """Carry out plans, one after another; None in between: nothing to do yet.
 
         Returns the status at the end, where the last plan ends, or raises LinkError.
@@ -184,7 +184,7 @@ class Machine:
                     yield None
                     continue
                 total += plan.duration
-                for move in plan.moves:
+                for move in plan.moves():
                     for batch in self._batches(move, self.configuration.axes, plan.clock):
                         begun += batch.seconds
                         yield batch
@@ -230,8 +230,7 @@ class Machine:
 
     def _batches(self, move: Move, axes: Sequence[int], clock: int) -> Iterator[_Batch]:
         """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
-        moving = [k for k in range(len(axes)) if move.start[k] != move.end[k]]
-        moving.sort(key=lambda k: axes[k])
+        moving = sorted(move.moving, key=lambda k: axes[k])
         at = [int(move.start[k]) for k in moving]
         room = self.info.frame - 4
         todo = [Segment(s.ticks, s.interval, s.add, tuple(s.steps[k] for k in moving)) for s in move.segments]

@@ -32,9 +32,6 @@ CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 400  # [cycles] between ticks
 
 _GROWTH = 1.12  # time at a ramp segment's end over time at its start, seen from standstill
-# Inside such a segment the interval is linear, and at its fast end the acceleration is
-# 4 g^2 / (1 + g)^2 times the mean: plan the mean that much lower.
-EASE = ((1 + _GROWTH) / (2 * _GROWTH)) ** 2
 _SHORTEST = (0.002, 0.02)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
 _AHEAD = 26  # segments that the board's queue surely holds (32, but for those under way)
 _CRUISE = 0.05  # [s] a cruise segment's time at least
@@ -48,9 +45,14 @@ class Move:
 
     start: Counts  # (motors,)
     end: Counts  # (motors,)
-    segments: tuple[Segment, ...]
+    segments: Sequence[Segment]
     cycles: int  # of the clock, all segments together
     peak: float  # [1/s] greatest speed, in lines per second
+
+    @property
+    def moving(self) -> list[int]:
+        """Motors that have a step on the way, whether or not they end where they start."""
+        return np.flatnonzero(np.any([s.steps for s in self.segments], axis=0)).tolist() if self.segments else []
 
     @property
     def leader(self) -> int:
@@ -80,7 +82,7 @@ def line(
     low, high = _SHORTEST
     shortest = min(max(low, math.sqrt(4 / (accel * n))), high)
     for coarse in (1, 2, 4, 8):
-        ramp = _Trapezoid(n, top * n, accel * n * EASE, shortest * coarse)
+        ramp = _Trapezoid(n, top * n, accel * n, shortest * coarse)
         segments, total = _cut(ramp, last - first, clock, min_interval)
         if brakes is None or _holds(segments, brakes, clock):
             break

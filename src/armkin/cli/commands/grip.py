@@ -41,7 +41,7 @@ def grip(
     from armkin.board.firmware.segments import line
 
     arm = inputs.load(robot)
-    configuration = linking.configured(arm)
+    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     gripper = _gripper(arm.name, configuration)
     target = _count(gripper, value, "VALUE")
     start = None if assume is None else _count(gripper, assume, "--assume")

@@ -28,7 +28,7 @@ def home(
     from armkin.board.firmware import homing
 
     arm = inputs.load(robot)
-    configuration = linking.configured(arm)
+    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     homing.searches(arm, configuration, joints or ())  # refuses before a port is opened
     with linking.machine(arm, configuration, port, baud) as machine:
         homing.home(machine, joints or (), lambda name: output.note(f"homing {name}"))

@@ -38,7 +38,7 @@ def jog(
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)
-    configuration = linking.configured(arm)
+    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")

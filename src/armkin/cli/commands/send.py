@@ -11,7 +11,7 @@ from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import Goals, Stream
 from armkin.cli.goals import goals as read_goals
-from armkin.cli.linking import AssumeHome, Baud
+from armkin.cli.linking import SIM, AssumeHome, Baud
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, TaskName
 from armkin.errors import UsageError
@@ -19,9 +19,9 @@ from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.cutting import Cut
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.plan import Plan
 
 
 def send(
@@ -76,7 +76,7 @@ def send(
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     arm, goals = read_goals(robot, q, target, branch, task, batch)
-    configuration = linking.configured(arm)
+    configuration = linking.configured(arm, rehearsal=dry_run or port == SIM)
     planner = _Planner(arm, configuration, fraction)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
@@ -93,7 +93,7 @@ def send(
         began = machine.counts()
         planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
-            source: Iterable[Plan | None] = goals.plans(planner.plan, began)
+            source: Iterable[Cut | None] = goals.plans(planner.plan, began)
             whole = None  # how many rows will come is not known
         else:
             source = plans = _all(planner, goals, began)  # every refusal before anything moves
@@ -114,7 +114,7 @@ class _Planner:
 
     def __init__(self, arm: Arm, configuration: Configuration, speed: float) -> None:
         self.arm, self.speed = arm, speed
-        self.done: list[Plan] = []
+        self.done: list[Cut] = []
         self.use(configuration.board.clock, configuration.board.min_interval)
 
     def use(self, clock: int, min_interval: int) -> None:
@@ -127,20 +127,20 @@ class _Planner:
 
         return list(armkin.pulses(self.arm, q).tolist())
 
-    def plan(self, start: Sequence[int], q: Array) -> Plan:
+    def plan(self, start: Sequence[int], q: Array) -> Cut:
         """A plan through joint values (w, n) [rad | mm]."""
-        from armkin.motion.plan import plan
+        from armkin.board.firmware.cutting import plan
 
         return plan(self.arm, start, q, speed=self.speed, clock=self.clock, min_interval=self.min_interval)
 
-    def noted(self, plans: Iterable[Plan | None]) -> Iterator[Plan | None]:
+    def noted(self, plans: Iterable[Cut | None]) -> Iterator[Cut | None]:
         """The same plans, remembered for the summary."""
         for plan in plans:
             if plan is not None:
                 self.done.append(plan)
             yield plan
 
-    def summary(self, plans: Sequence[Plan], start: Sequence[int] | None = None) -> dict[str, Any]:
+    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> dict[str, Any]:
         """JSON: what the plans come to."""
         import numpy as np
 
@@ -150,11 +150,11 @@ class _Planner:
         arm = self.arm
         first = list(start) if start is not None else plans[0].start.tolist()
         last = plans[-1].end.tolist() if plans else first
-        top = np.max([plan.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
+        top = np.max([plan.trajectory.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
         rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
         end = armkin.joints(arm, last)
         return {
-            "waypoints": sum(len(plan.moves) for plan in plans),
+            "waypoints": sum(len(plan.ends) for plan in plans),
             "start_joints": units.joints_out(arm, armkin.joints(arm, first)).tolist(),
             "joints": units.joints_out(arm, end).tolist(),
             "joint_units": units.names(arm),
@@ -171,7 +171,7 @@ class _Planner:
         }
 
 
-def _all(planner: _Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Plan]:
+def _all(planner: _Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Cut]:
     """All plans at once, from counts; a stream is read to its end."""
     import armkin
 
@@ -191,7 +191,7 @@ def _all(planner: _Planner, goals: Goals | Stream, start: Sequence[int]) -> list
     return [planner.plan(start, goals.resolve(planner.arm, near))]
 
 
-def _write_trace(arm: Arm, plans: Sequence[Plan], path: str | None) -> None:
+def _write_trace(arm: Arm, plans: Sequence[Cut], path: str | None) -> None:
     if path is None:
         return
     names = [*arm.joint_names, "tool"]
@@ -200,7 +200,7 @@ def _write_trace(arm: Arm, plans: Sequence[Plan], path: str | None) -> None:
     with output.destination(path) as write:
         write(csv_line(heading) + "\n")
         for i, plan in enumerate(plans):
-            trace = plan.trace()
+            trace = plan.trajectory.trace()
             first = 1 if i else 0  # a plan starts where the one before it ends
             rows = zip(
                 (trace.time + began).tolist()[first:],

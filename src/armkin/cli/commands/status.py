@@ -20,7 +20,9 @@ def status(robot: Robot, port: PortName, baud: Baud = linking.BAUD, json: Json =
     """
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
-    with linking.machine(arm, linking.configured(arm), port, baud, simulated=new) as machine:
+    with linking.machine(
+        arm, linking.configured(arm, rehearsal=port == linking.SIM), port, baud, simulated=new
+    ) as machine:
         found = _found(machine)
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else linking.where_text(arm, found) + _text(found))

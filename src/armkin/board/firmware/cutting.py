@@ -1,0 +1,151 @@
+"""A trajectory as a board with our firmware drives it: moves of exact segments, refused where it is too fast.
+
+Trajectory (joints, seconds)  --cut-->  Cut (counts, clock cycles)  --Machine.run-->  frames
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, line
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.motion.plan import check_limits, check_rates
+from armkin.motion.plan import plan as plan_joints
+from armkin.motion.trajectory import Straight
+from armkin.motors import joints as joints_of
+from armkin.motors import motor_accel, motor_names, pulses
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Stretch, Trajectory
+
+
+class RateError(UsageError):
+    """A motor is asked for more than the board makes; `share` is what the board makes of it."""
+
+    def __init__(self, message: str, share: float) -> None:
+        super().__init__(message)
+        self.share = share
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A trajectory on this board."""
+
+    trajectory: Trajectory
+    start: Counts  # (motors,)
+    ends: Counts  # (stretches, motors) where each stretch ends
+    top_rate: Array  # (motors,) [counts/s] greatest rate of every motor
+    clock: int
+    min_interval: int
+
+    @property
+    def end(self) -> Counts:
+        """Counts at the end: (motors,)."""
+        return np.asarray(self.ends[-1]) if len(self.ends) else self.start
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first tick to the last."""
+        return self.trajectory.duration
+
+    @cached_property
+    def segments(self) -> int:
+        """Number of device segments."""
+        return sum(sum(1 for _ in move.segments) for move in self.moves())
+
+    def moves(self) -> Iterator[Move]:
+        """The moves, one a stretch, made as they are asked for."""
+        at = self.start
+        for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
+            yield self._move(stretch, at, end)
+            at = end
+
+    def _move(self, stretch: Stretch, start: Counts, end: Counts) -> Move:
+        assert isinstance(stretch, Straight)
+        brakes = motor_accel(self.trajectory.arm)
+        return line(
+            start.tolist(),
+            end.tolist(),
+            stretch.law.peak,
+            stretch.law.accel,
+            brakes=brakes,
+            clock=self.clock,
+            min_interval=self.min_interval,
+        )
+
+
+def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> Cut:
+    """A trajectory that starts at counts `start` (motors,), for a board of this clock and shortest interval.
+
+    Raises RateError, naming joint and motor, if the board cannot make steps that fast.
+    """
+    arm, first = trajectory.arm, np.asarray(start, dtype=np.int64)
+    ends = [pulses(arm, stretch.end) for stretch in trajectory.stretches]
+    top = np.zeros(len(first))
+    at, allowed = first, clock / min_interval
+    for stretch, end in zip(trajectory.stretches, ends, strict=True):
+        rates = _rates(stretch, at, end)
+        if rates.max(initial=0.0) > allowed:
+            raise _too_fast(arm, stretch, rates, allowed)
+        top, at = np.maximum(top, rates), end
+    return Cut(trajectory, first, np.array(ends, dtype=np.int64).reshape(-1, len(first)), top, clock, min_interval)
+
+
+def plan(
+    arm: Arm,
+    start: ArrayLike,
+    targets: ArrayLike,
+    *,
+    speed: float = 1.0,
+    clock: int = CLOCK,
+    min_interval: int = MIN_INTERVAL,
+) -> Cut:
+    """Moves from counts through joint targets, stopping at each, where the motors' steps put them.
+
+    start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
+    Raises as `armkin.motion.plan.plan` and `cut` do.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> p = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
+    >>> p.end.tolist(), round(p.duration, 2)
+    ([-1067, -10144, 5667], 1.92)
+    """
+    check_rates(arm)
+    goals = np.atleast_2d(np.asarray(targets, dtype=float))
+    check_limits(arm, goals)
+    # What the motors make of the goals may be half a step outside the limits, which is within them to the board.
+    made = np.clip(joints_of(arm, pulses(arm, goals)), arm.lower, arm.upper)
+    trajectory = plan_joints(arm, joints_of(arm, np.asarray(start)), made, speed=speed)
+    try:
+        return cut(trajectory, start, clock=clock, min_interval=min_interval)
+    except RateError as error:
+        percent = math.floor(100 * speed * error.share)
+        raise RateError(f"{error}\nlower its max_speed, or send with --speed {percent}", error.share) from None
+
+
+def _rates(stretch: Stretch, start: Counts, end: Counts) -> Array:
+    """Greatest rate of every motor: (motors,) [counts/s]."""
+    assert isinstance(stretch, Straight)
+    return np.asarray(np.abs(end - start) * stretch.law.peak)
+
+
+def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateError:
+    k = int(rates.argmax())
+    top = stretch.top_speed
+    joint = int(np.argmax(np.abs(arm.motor_gain[k]) * top))
+    unit, word = (1.0, "mm/s") if arm.prismatic[joint] else (math.pi / 180, "deg/s")
+    return RateError(
+        f"joint {arm.joint_names[joint]} at {top[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
+        f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}",
+        allowed / float(rates[k]),
+    )

@@ -1,0 +1,71 @@
+"""Laws of one parameter from rest to rest: speed up, cruise, slow down.
+
+A profile is a list of phases of constant jerk: position, speed and acceleration at the start of each. It is
+exact, may be sampled anywhere, and knows nothing of what is moved.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula.arrays import Array
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Position over time in phases of constant jerk; lengths in whatever unit the parameter has."""
+
+    times: Array  # (k + 1,) [s] where the phases begin, and the end
+    states: Array  # (k, 3) position, speed, acceleration at the start of every phase
+    jerk: Array  # (k,)
+    length: float  # position at the end
+    accel: float  # greatest acceleration that is reached
+
+    @property
+    def duration(self) -> float:
+        """Seconds from rest to rest."""
+        return float(self.times[-1])
+
+    @property
+    def peak(self) -> float:
+        """Greatest speed that is reached."""
+        return float(self.states[:, 1].max(initial=0.0))
+
+    def at(self, t: ArrayLike, order: int = 0) -> Array:
+        """Position (order 0), speed (1), acceleration (2) or jerk (3) at times t: (...,) -> (...,)."""
+        when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        if not len(self.jerk):
+            return np.zeros_like(when)
+        k = np.clip(np.searchsorted(self.times, when, side="right") - 1, 0, len(self.jerk) - 1)
+        (x, v, a), j, h = self.states[k].T, self.jerk[k], when - self.times[k]
+        if order == 0:
+            return np.asarray(np.minimum(x + h * (v + h * (a / 2 + h * j / 6)), self.length)).T
+        return np.asarray((v + h * (a + h * j / 2), a + h * j, j)[order - 1]).T
+
+
+def trapezoid(length: float, speed: float, accel: float) -> Profile:
+    """The fastest way over `length` from rest to rest with bounded speed and acceleration.
+
+    >>> round(trapezoid(85, 60, 120).duration, 6), trapezoid(85, 60, 120).peak
+    (1.916667, 60.0)
+    >>> trapezoid(30, 60, 120).duration
+    1.0
+    """
+    if length <= 0:
+        return at_rest(0.0)
+    peak = min(speed, math.sqrt(accel * length))
+    ramp = peak / accel
+    way = peak * ramp / 2
+    cruise = max(length - 2 * way, 0.0) / peak
+    times = np.array([0.0, ramp, ramp + cruise, 2 * ramp + cruise])
+    states = np.array([[0.0, 0.0, accel], [way, peak, 0.0], [length - way, peak, -accel]])
+    return Profile(times, states, np.zeros(3), length, accel)
+
+
+def at_rest(seconds: float) -> Profile:
+    """A profile that stays where it is for so many seconds."""
+    return Profile(np.array([0.0, seconds]), np.zeros((1, 3)), np.zeros(1), 0.0, 0.0)

@@ -1,0 +1,147 @@
+"""A trajectory: joint values over time, made of stretches from rest to rest.
+
+It is said in joints and seconds and knows no board: counts, clock cycles and what a board can make belong to
+`armkin.board`, which cuts it up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula.arrays import Array
+from armkin.forward import frames
+from armkin.motion.profile import Profile
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Stretch(Protocol):
+    """Joint values over time from rest to rest."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+
+    @property
+    def start(self) -> Array:
+        """Joint values at the beginning: (n,) [rad | mm]."""
+
+    @property
+    def end(self) -> Array:
+        """Joint values at the end: (n,)."""
+
+    @property
+    def top_speed(self) -> Array:
+        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
+
+    def at(self, t: Array, order: int = 0) -> Array:
+        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A straight line in joint space: all joints follow one law."""
+
+    start: Array  # (n,) [rad | mm]
+    end: Array  # (n,)
+    law: Profile  # of the line's parameter, 0 to 1
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.law.duration
+
+    @property
+    def top_speed(self) -> Array:
+        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
+        return np.asarray(np.abs(self.end - self.start) * self.law.peak)
+
+    def at(self, t: Array, order: int = 0) -> Array:
+        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
+        along = self.law.at(t, order)[:, None] * (self.end - self.start)
+        return np.asarray(self.start + along if order == 0 else along)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A trajectory sampled in time."""
+
+    time: Array  # (T,) [s]
+    joints: Array  # (T, n) [rad | mm]
+    position: Array  # (T, n + 2, 3) [mm] base, every joint's frame, tool
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Stretches one after another; the arm is at rest between them."""
+
+    arm: Arm
+    start: Array  # (n,) [rad | mm]
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def end(self) -> Array:
+        """Joint values at the end: (n,)."""
+        return self.stretches[-1].end if self.stretches else self.start
+
+    @cached_property
+    def begins(self) -> Array:
+        """When every stretch begins, and the end: (stretches + 1,) [s]."""
+        return np.concatenate([[0.0], np.cumsum([stretch.duration for stretch in self.stretches])])
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.begins[-1])
+
+    @property
+    def top_speed(self) -> Array:
+        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
+        return np.max([s.top_speed for s in self.stretches], axis=0) if self.stretches else np.zeros(self.arm.n)
+
+    def q(self, t: ArrayLike) -> Array:
+        """Joint values at times t [s], those at the ends outside: (...,) -> (..., n) [rad | mm].
+
+        >>> import armkin, numpy as np
+        >>> from armkin.motion.plan import plan
+        >>> arm = armkin.load("robots/three_dof.yaml")
+        >>> p = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([60, 90, -90]))
+        >>> p.duration, np.rad2deg(p.q([0, 0.75, 1.5]))[:, 0].round(6).tolist()
+        (1.5, [0.0, 30.0, 60.0])
+        """
+        return self._at(t, 0)
+
+    def qd(self, t: ArrayLike) -> Array:
+        """Joint speeds at times t [s]: (...,) -> (..., n) [rad/s | mm/s]."""
+        return self._at(t, 1)
+
+    def qdd(self, t: ArrayLike) -> Array:
+        """Joint accelerations at times t [s]: (...,) -> (..., n) [rad/s2 | mm/s2]."""
+        return self._at(t, 2)
+
+    def trace(self, step: float = 0.01) -> Trace:
+        """The path in time, sampled every `step` seconds, with the end of every stretch."""
+        times, joints = [np.zeros(1)], [self.start[None]]
+        for stretch, began in zip(self.stretches, self.begins, strict=False):
+            t = np.append(np.arange(step, stretch.duration - step / 4, step), stretch.duration)
+            times.append(began + t)
+            joints.append(stretch.at(t))
+        q = np.concatenate(joints)
+        return Trace(np.concatenate(times), q, frames(self.arm, q)[..., :3, 3])
+
+    def _at(self, t: ArrayLike, order: int) -> Array:
+        when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        flat = when.ravel()
+        out = np.tile(self.start if order == 0 else np.zeros(self.arm.n), (len(flat), 1))
+        which = np.searchsorted(self.begins, flat, side="right") - 1
+        which = np.clip(which, 0, max(len(self.stretches) - 1, 0))
+        for k in np.unique(which) if self.stretches else ():
+            here = which == k
+            out[here] = self.stretches[k].at(flat[here] - self.begins[k], order)
+        return out.reshape(*when.shape, self.arm.n)

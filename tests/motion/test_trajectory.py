@@ -1,0 +1,60 @@
+"""Laws of trajectories: bounded, from rest to rest, the same however they are sampled; said without a board."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armkin.model import build as arms
+from armkin.model.arm import Arm
+from armkin.motion.plan import plan
+from armkin.motion.profile import trapezoid
+
+
+
+@pytest.fixture(scope="module")
+def three_dof() -> Arm:
+    return arms.load("robots/three_dof.yaml")
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(1e-3, 1e4), st.floats(1e-2, 1e3), st.floats(1e-2, 1e4))
+def test_a_trapezoid_is_bounded_and_ends_at_rest(length: float, speed: float, accel: float) -> None:
+    law = trapezoid(length, speed, accel)
+    t = np.linspace(0, law.duration, 500)
+    x, v, a = (law.at(t, order) for order in range(3))
+    assert x[0] == 0
+    assert x[-1] == pytest.approx(length)
+    assert np.all(np.diff(x) >= -1e-12 * length)
+    assert v.max() <= speed * (1 + 1e-12)
+    assert np.abs(a).max() <= accel * (1 + 1e-12)
+    assert v[-1] == pytest.approx(0, abs=1e-9 * speed)
+    # No law with these bounds is faster: it cruises, or it has no cruise and reaches sqrt(a l).
+    assert law.peak == pytest.approx(min(speed, np.sqrt(accel * length)))
+
+
+def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None:
+    goals = np.deg2rad([[-30, 5, -5], [20, 60, -60], [20, 60, -60], [0, 90, -90]])
+    one = plan(three_dof, three_dof.home, goals, speed=0.7)
+    t, h = np.linspace(0, one.duration, 4001)[1:-1], 1e-5
+    edges = np.concatenate([s.law.times + b for s, b in zip(one.stretches, one.begins, strict=False)])
+    clear = np.abs(t[:, None] - edges).min(axis=1) > 2 * h
+    assert np.allclose(one.qd(t)[clear], (one.q(t + h) - one.q(t - h))[clear] / (2 * h), atol=1e-7)
+    assert np.allclose(one.qdd(t)[clear], (one.qd(t + h) - one.qd(t - h))[clear] / (2 * h), atol=1e-6)
+    assert np.all(np.abs(one.qd(t)) <= 0.7 * three_dof.max_speed * (1 + 1e-12))
+    assert np.all(np.abs(one.qdd(t)) <= three_dof.max_accel * (1 + 1e-12))
+    assert one.q(one.begins) == pytest.approx(np.vstack([three_dof.home, goals]))
+    assert one.q([[-1.0, one.duration + 1]]) == pytest.approx(np.array([[three_dof.home, goals[-1]]]))
+    assert one.q(0.5).shape == (3,)
+
+
+def test_an_arm_without_drives_has_trajectories() -> None:
+    arm = arms.load("robots/three_dof.yaml")
+    bare = arms.from_links(
+        arm.link, arm.prismatic, limits=np.stack([arm.lower, arm.upper], 1), max_speed=arm.max_speed,
+        max_accel=arm.max_accel,
+    )  # fmt: skip
+    goal = np.deg2rad([60, 90, -90])
+    assert plan(bare, [0, np.pi / 2, -np.pi / 2], goal).duration == pytest.approx(1.5)
