@@ -181,7 +181,9 @@ def test_a_start_outside_the_limits_may_come_back(three_dof: Arm) -> None:
 
 def test_missing_rates_are_named() -> None:
     arm = arms.load("robots/planar_2dof.yaml")
-    with pytest.raises(UsageError, match=r"joints q1, q2 have no max_speed, .* add to robots/planar_2dof.yaml:\n  max_speed: \.\.\."):
+    with pytest.raises(
+        UsageError, match=r"joints q1, q2 have no max_speed, .* add to robots/planar_2dof.yaml:\n  max_speed: \.\.\."
+    ):
         plan_moves(arm, [1500, 1500], [0.1, 0.1])
 
 

@@ -182,7 +182,7 @@ def _rehearsal_board(file: RobotFile) -> Board:
     if file.gripper is not None:
         (servos if file.gripper.kind == "servo" else steppers).append("gripper")
     switches = dict.fromkeys(joint.homing.switch for joint in file.joints if joint.homing is not None)
-    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 1600, 80)
+    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 80)
 
 
 def _limits(arm: Arm) -> tuple[list[int], list[int]]:
