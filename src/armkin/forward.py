@@ -42,7 +42,7 @@ def fk(arm: Arm, q: ArrayLike) -> Array:
     values = as_joints(arm, q)
     if values.size == arm.n:
         return _single(arm, values.reshape(arm.n)).reshape(*values.shape[:-1], 4, 4)
-    return _batched(arm, values, (4, 4), _tip)
+    return _batched(arm, values, (4, 4), tip_formula)
 
 
 def position(arm: Arm, q: ArrayLike) -> Array:
@@ -75,7 +75,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Array:
     (Siciliano et al., Robotics, eq. 3.30).
     """
 
-    return _batched(arm, as_joints(arm, q), (6, arm.n), _jacobian)
+    return _batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
 
 
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
@@ -147,7 +147,7 @@ def as_joints(arm: Arm, q: ArrayLike) -> Array:
     return values
 
 
-def _tip(arm: Arm, q: list[Entry]) -> list[Entry]:
+def tip_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """The tool's pose, row by row: 16 entries."""
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
@@ -166,7 +166,7 @@ def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
     return out + _rows(P)
 
 
-def _jacobian(arm: Arm, q: list[Entry]) -> list[Entry]:
+def jacobian_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """The Jacobian, row by row: 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []

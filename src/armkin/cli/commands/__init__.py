@@ -15,5 +15,6 @@ COMMANDS = {
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "plot": "A picture of the arm.",
     "info": "What a robot file says, checked.",
+    "export": "The arm in other words: C99.",
     "schema": "JSON Schema of robot files, for editors.",
 }

@@ -1,0 +1,6 @@
+"""An arm as C99 that needs nothing but libm.
+
+program.py   the files: header, source, test program
+kernel.py    recorded formulas as functions of C
+parts/       what is the same for all arms, in C
+"""

@@ -1,0 +1,72 @@
+"""Golden values of a generated program: postures, their poses and branches, as armkin's Python says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.c_code import number
+from armkin.forward import fk
+from armkin.inverse.solve import ik
+from armkin.inverse.tasks.task import targets_of
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array, Bool
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+POSTURES = 8
+
+
+def golden_test(arm: Arm, task: Task, text: str, single: bool) -> str:
+    """The test program with its values filled in; fields that it shares with the other files stay as they are."""
+    q = _postures(arm, task, POSTURES)
+    T = fk(arm, q)
+    target = targets_of(task, T, q)
+    found = ik(arm, target, task.name)
+    rows = [(found.q[i, b], found.branch[i, b]) for i, b in np.argwhere(found.valid)]
+    fields = {
+        "postures": str(len(q)),
+        "golden_joints": _table(q, single),
+        "golden_poses": _table(T.reshape(len(q), 16), single),
+        "golden_targets": _table(target.reshape(len(q), -1), single),
+        "golden_counts": ", ".join(map(str, found.valid.sum(axis=1))),
+        "golden_branches": _table(np.array([values for values, _ in rows]), single),
+        "golden_indices": ", ".join(str(index) for _, index in rows),
+        "rows": str(len(rows)),
+        "home": ", ".join(number(float(v), single) for v in arm.home),
+        # millimetres of a pose or a slide, and everything else
+        "length": number((1e-5 if single else 1e-10) * arm.reach, single),
+        "angle": number(2e-3 if single else 1e-7, single),
+    }
+    for name, value in fields.items():
+        text = text.replace(f"@{name}@", value)
+    return text
+
+
+def _postures(arm: Arm, task: Task, count: int) -> Array:
+    """Random postures within limits whose branches all stand clear of singularities."""
+    rng = np.random.default_rng(20)
+    turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
+    low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
+    high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
+    q = rng.uniform(low, high, (50 * count, arm.n))
+    found = ik(arm, targets_of(task, fk(arm, q), q), task.name)
+    return q[_clear(arm, task, found.q, found.valid)][:count]
+
+
+def _clear(arm: Arm, task: Task, q: Array, valid: Bool) -> Bool:
+    """Rows (N,) whose branches (N, B, n) have a Jacobian that is far from losing rank."""
+    from armkin.inverse.numeric.newton import null_space
+
+    N, B, n = q.shape
+    flat = np.nan_to_num(q).reshape(-1, n)
+    target = targets_of(task, fk(arm, flat), flat)
+    sigma = null_space(arm, task, flat, target)[0].reshape(N, B)
+    return np.asarray((valid & (sigma > 0.02) | ~valid).all(axis=1) & valid.any(axis=1))
+
+
+def _table(values: Array, single: bool) -> str:
+    rows = ["{" + ", ".join(number(float(v), single) for v in row) + "}" for row in values]
+    return ",\n    ".join(rows)

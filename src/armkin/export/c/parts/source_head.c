@@ -1,0 +1,9 @@
+/* @about@ */
+#include "@stem@.h"
+
+#include <math.h>
+
+#define ARM_LANES 1
+#define ARM_INLINE static
+#define ARM_RESTRICT restrict
+

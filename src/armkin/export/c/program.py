@@ -1,0 +1,152 @@
+"""The files of an arm in C99: a header, the source, and a test program with golden values."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from armkin import __version__
+from armkin.errors import UsageError
+from armkin.export.c import kernel
+from armkin.export.c.golden import golden_test
+from armkin.formula.arrays import Array
+from armkin.formula.c_code import number
+from armkin.inverse.branches.names import branch_names
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.task import LARGEST
+
+if TYPE_CHECKING:
+    from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+PARTS = Path(__file__).parent / "parts"
+# What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
+# rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
+_DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 1e-6, "LARGEST": LARGEST}
+_SINGLE = {"ACCEPTED": 1e-10, "SOLUTION": 1e-9, "NEARBY": 1e-6, "SAME": 1e-3, "ROTATION": 1e-3, "LARGEST": 1e9}
+
+
+class Program(NamedTuple):
+    """Texts of the header, the source and the test program."""
+
+    header: str
+    source: str
+    test: str
+
+
+def program(arm: Arm, file: str, task_name: str | None = None, single: bool = False) -> Program:
+    """An arm as C99; file: the source's name, such as ``arm.c``; single: 32-bit numbers.
+
+    Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
+    """
+    task, geometry = solver(arm, task_name)
+    solve, branches = candidates(arm, task, geometry, single)
+    names = branch_names(arm, task, geometry, branches)
+    stem = Path(file).stem
+    prefix = identifier(arm.name)
+    fields = {
+        "about": _about(arm, task, geometry, single),
+        "guard": f"ARMKIN_{prefix.upper()}_H",
+        "stem": stem,
+        "real": "float" if single else "double",
+        "joints": str(arm.n),
+        "branches": str(branches),
+        "target": str(target_size(task)),
+        "target_is": _target_is(task),
+        "joints_are": ", ".join(
+            f"{name} [{'mm' if slides else 'rad'}]" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)
+        ),
+        "names": ",\n    ".join(f'"{name}"' for name in names),
+        "lower": _numbers(arm.lower, single),
+        "upper": _numbers(arm.upper, single),
+        "slides": ", ".join(str(int(p)) for p in arm.prismatic),
+    }
+    parts = [
+        part("source_head"),
+        part("numbers_float" if single else "numbers_double"),
+        settings(task, single),
+        kernel.forward_kinematics(arm, single),
+        kernel.jacobian(arm, single),
+        solve,
+        part("copies"),
+        part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
+        part("ik"),
+        part("source_tail"),
+    ]
+    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single))
+    return Program(*(_named(_filled(text, fields), prefix) for text in texts))
+
+
+def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
+    """The function `arm_candidates` of an arm's class, and how many branches it has.
+
+    Raises UsageError if the class has no form in C.
+    """
+    if geometry.pairs is not None:
+        return kernel.candidates(arm, task, geometry, single, prefer)
+    raise UsageError(
+        f"{arm.name}: its class ({geometry.name}) has no form in C yet; the task {task.name} is solved in Python alone"
+    )
+
+
+def settings(task: Task, single: bool = False) -> str:
+    """The constants that the fixed parts read."""
+    values = _SINGLE if single else _DOUBLE
+    lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
+    return "\n".join([*lines, f"#define ARM_GOAL {kernel.goal_size(task)}", ""])
+
+
+def target_size(task: Task) -> int:
+    """Numbers of a target as people give it."""
+    return 16 if task.orientation == "full" else len(task.labels)
+
+
+def part(name: str) -> str:
+    """A part in C that is the same for all arms, with @names@ to be filled in."""
+    return (PARTS / f"{name}.c").read_text(encoding="utf-8")
+
+
+def identifier(name: str) -> str:
+    """A robot's name as a C identifier.
+
+    >>> identifier("RA02 (5 axes)"), identifier("6dof")
+    ('ra02_5_axes', 'arm_6dof')
+    """
+    text = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "arm"
+    return text if text[0].isalpha() else f"arm_{text}"
+
+
+def _filled(text: str, fields: dict[str, str]) -> str:
+    return re.sub(r"@(\w+)@", lambda match: fields[match[1]], text)
+
+
+def _named(text: str, prefix: str) -> str:
+    """Public names begin with the robot's, so that two arms fit into one program."""
+    text = re.sub(r"\barm_(fk|jacobian|ik|best|names|real|solution)\b", rf"{prefix}_\1", text)
+    return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
+
+
+def _numbers(values: Array, single: bool) -> str:
+    return ", ".join(number(float(v), single) for v in values)
+
+
+def _about(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
+    said = geometry.why.replace("*/", "* /")
+    name, path = (text.replace("*/", "* /").replace("\n", " ") for text in (arm.name, arm.path))
+    lines = [
+        f"{name}: kinematics in C99, {'single' if single else 'double'} precision. Generated, do not edit.",
+        f"By armkin {__version__} from {path or 'an arm made in Python'}, sha256 {arm.sha256 or 'unknown'}.",
+        f"Task {task.name}; {geometry.name}: {said}.",
+        "Lengths in mm, angles in rad. No allocation, no global state; needs libm alone.",
+    ]
+    return "\n   ".join(lines)
+
+
+def _target_is(task: Task) -> str:
+    if task.orientation == "full":
+        return "the tool's pose, a 4 x 4 matrix row by row"
+    return " ".join(task.labels) + (
+        " (direction of the tool's z axis, any length)" if task.orientation == "axis" else ""
+    )

@@ -1,0 +1,89 @@
+"""`armkin export --c`: what is generated compiles everywhere without a warning, and says what Python says."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import armkin
+from armkin.export.c.program import identifier, program
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
+SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+CLOSED = ["three_dof", "puma560", "ur5e", "labvolt_5150", "cobra600", "stanford", "planar_3dof", "ra02"]
+
+
+def written(folder: Path, robot: str, single: bool = False) -> Path:
+    """The generated files of a shipped robot; the path of the source."""
+    texts = program(armkin.load(ROBOTS / f"{robot}.yaml"), f"{robot}.c", None, single)
+    (folder / f"{robot}.c").write_text(texts.source)
+    (folder / f"{robot}.h").write_text(texts.header)
+    (folder / f"{robot}_test.c").write_text(texts.test)
+    return folder / f"{robot}.c"
+
+
+def run(*command: str | Path, folder: Path) -> str:
+    done = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    assert not done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("robot", CLOSED)
+def test_the_test_program_passes_under_the_sanitizers(robot: str, tmp_path: Path) -> None:
+    source = written(tmp_path, robot)
+    run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "puma560", "ur5e", "labvolt_5150"])
+def test_single_precision_passes_its_test_program_too(robot: str, tmp_path: Path) -> None:
+    source = written(tmp_path, robot, single=True)
+    run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+
+
+def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:
+    source = written(tmp_path, "three_dof")
+    source.write_text(source.read_text().replace("170.0", "171.0"))
+    run("gcc", *WARNINGS, source, "three_dof_test.c", "-lm", "-o", "test", folder=tmp_path)
+    done = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 8
+    assert "not what armkin says" in done.stdout
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "ur5e"])
+@pytest.mark.parametrize(
+    "compiler",
+    [
+        ["clang"],
+        ["clang", "-x", "c++", "-fsyntax-only"],
+        ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard"],
+        ["avr-gcc", "-mmcu=atmega328p"],
+    ],
+    ids=lambda words: " ".join(words[:3]),
+)
+def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path: Path) -> None:
+    assert shutil.which(compiler[0]), f"{compiler[0]} is not installed: see the README's line of system packages"
+    single = "gcc" in compiler[0]
+    source = written(tmp_path, robot, single)
+    if "c++" in compiler:  # a header for programs in C++
+        use = f"{identifier(robot)}_real q[{identifier(robot).upper()}_JOINTS], T[16];"
+        use += f"int main() {{ {identifier(robot)}_fk(q, T); return 0; }}"
+        (tmp_path / "use.cpp").write_text(f'#include "{robot}.h"\n{use}\n')
+        run(*compiler, "-Wall", "-Wextra", "-Werror", "use.cpp", folder=tmp_path)
+        return
+    # on an AVR double has 32 bits, and its libm functions of float are those of double
+    warnings = [flag for flag in WARNINGS if compiler[0] != "avr-gcc" or flag != "-Wdouble-promotion"]
+    run(*compiler, *warnings, "-Os", "-c", source, "-o", "arm.o", folder=tmp_path)
+
+
+def test_the_files_say_what_they_were_made_from() -> None:
+    arm = armkin.load(ROBOTS / "puma560.yaml")
+    for text in program(arm, "puma.c"):
+        for said in (arm.name, arm.sha256, f"armkin {armkin.__version__}", "Task pose; spherical wrist"):
+            assert said in text
