@@ -165,6 +165,7 @@ int main(int argc, char **argv) {
     struct sigaction act = {.sa_handler = on_signal};
     sigaction(SIGINT, &act, NULL);
     sigaction(SIGTERM, &act, NULL);
+    sigaction(SIGHUP, &act, NULL);  // a closed terminal: the link must go, its device may become another's
     signal(SIGPIPE, SIG_IGN);
     if (from_stdin)
         printf("{\"board\": \"%s\", \"port\": \"%s\"}\n", b->name, port_path());

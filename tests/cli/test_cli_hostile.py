@@ -26,7 +26,6 @@ DIGITS = "9" * 400
 # name: exit code, words ("@" is a fresh folder), standard input
 CASES: dict[str, tuple[int, list[str], bytes]] = {
     # the shell
-    "no command": (2, [], b""),
     "unknown command": (2, ["fq"], b""),
     "mistyped command": (2, ["puls", DOF], b""),
     "command in capitals": (2, ["FK", DOF, "1", "2", "3"], b""),

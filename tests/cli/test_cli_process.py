@@ -31,7 +31,7 @@ def test_head_has_seen_enough(tmp_path: Path) -> None:
         assert p.stderr is not None
         assert p.stdout.readline().startswith(b"q1,q2,q3,x,y,z")
         p.stdout.close()
-        assert p.wait(30) == 1
+        assert p.wait(30) == 0
         assert p.stderr.read() == b""
 
 
@@ -120,3 +120,43 @@ def test_an_ascii_terminal_can_show_everything() -> None:
     env = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     assert process("info", THREE_DOF, env=env).code == 0
     assert process("fk", "\u00e9\udcff.yaml", 1, env=env).code == 1
+
+
+@pytest.mark.parametrize("words", [[], ["help"], ["--help"], ["help", "fk"], ["info", THREE_DOF]])
+def test_nobody_reads(words: list[str]) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        result = process(*words, stdout=write, stderr=subprocess.PIPE, capture_output=False)
+    finally:
+        os.close(write)
+    assert (result.code, result.err) == (0, "")
+
+
+def test_bare_and_help_print_the_help() -> None:
+    for words in ([], ["help"]):
+        assert process(*words) == process("--help")
+    assert process("help", "fk") == process("fk", "--help")
+    assert process("help").code == 0
+    assert "Commands:" in process().out
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_a_terminal_of_any_encoding(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    text = (ROOT / THREE_DOF).read_text().replace("name: three_dof", "name: Ωmega → 3")
+    path.write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+    for words in (["info", path], ["fk", path, 0, 0, 0], ["--help"]):
+        result = process(*words, env=environment)
+        assert (result.code, result.err) == (0, "")
+    name = process("fk", path, 0, 0, 0, "--json", env=environment).json["robot"]
+    assert name == "Ωmega → 3"
+
+
+def test_out_dash_is_standard_output(tmp_path: Path) -> None:
+    for words in (["fk", "1", "2", "3", "--json"], ["pulses", "1", "2", "3"], ["info"]):
+        words.insert(1, str(ROOT / THREE_DOF))
+        assert process(*words, "--out", "-", cwd=tmp_path) == process(*words, cwd=tmp_path)
+    assert process("schema", "-o", "-", cwd=tmp_path).out.startswith("{")
+    assert not list(tmp_path.iterdir())

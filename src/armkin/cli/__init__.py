@@ -9,6 +9,7 @@ neighbours at its top, so that ``armkin --help`` stays cheap.
 """
 
 import gc
+import io
 import os
 import sys
 from typing import NoReturn
@@ -20,6 +21,9 @@ def main() -> NoReturn:
     gc.set_threshold(100_000, 50, 100)
     # Threads take longer to start than matrices of this size could gain by them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # of a terminal in ASCII or cp1252
     try:
         from armkin.cli.app import run
 

@@ -4,7 +4,8 @@ import errno
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib import import_module
 from typing import Annotated, Any
@@ -29,6 +30,10 @@ EXIT_CODES: dict[type[errors.ArmkinError], int] = {
 }
 
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+class _ClosedPipe(Exception):  # noqa: N818 - no error
+    """Who reads standard output has seen enough. (Typer would end the process with 1 for the OSError.)"""
 
 
 class Command(TyperCommand):
@@ -72,6 +77,16 @@ class Commands(TyperGroup):
         for name, text in COMMANDS.items():
             self.add_command(TyperCommand(name, help=text, rich_markup_mode=None))
 
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        """Read the words before the command; --help and --version end here."""
+        with _closed_pipes():
+            return super().make_context(*args, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that the words name."""
+        with _closed_pipes():
+            return super().invoke(ctx)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
         name = args[0]
@@ -101,21 +116,20 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(invoke_without_command=True)
+@app.callback(no_args_is_help=False)
 def armkin(
-    ctx: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Robot arms from a YAML table to real motion. Millimetres and degrees throughout."""
-    if ctx.invoked_subcommand is None:
-        raise errors.UsageError("a command is missing; armkin --help lists them")
 
 
 def run(arguments: list[str]) -> int:
     """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
     before = signal.signal(signal.SIGTERM, _terminate)
+    if arguments[:1] in ([], ["help"]):  # armkin help fk
+        arguments = [*arguments[1:2], "--help"]
     try:
         code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
         # What a failed command has printed stays printed: the rows of a batch before the malformed one.
@@ -130,6 +144,8 @@ def _exit_code(command: Callable[[], Any]) -> int:
     except errors.ArmkinError as error:
         output.error(str(error))
         return next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
+    except _ClosedPipe:
+        return _enough()
     except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED
     except SystemExit as stop:
@@ -155,15 +171,41 @@ def _terminate(signum: int, frame: object) -> None:
 
 def _os_error(error: OSError) -> int:
     """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
-    if error.errno != errno.EPIPE:  # `| head` has seen enough: nothing to complain about
-        where = error.filename if error.filename is not None else "standard output"
-        output.error(f"{where}: {error.strerror or error}")
+    if _is_closed_pipe(error):
+        return _enough()
+    where = error.filename if error.filename is not None else "standard output"
+    output.error(f"{where}: {error.strerror or error}")
+    _drop_stdout()
+    return RUNTIME
+
+
+def _is_closed_pipe(error: OSError) -> bool:
+    return error.errno == errno.EPIPE or (os.name == "nt" and error.errno == errno.EINVAL)
+
+
+@contextmanager
+def _closed_pipes() -> Iterator[None]:
+    """Keep a closed pipe from Typer, which would end the process with exit code 1."""
+    try:
+        yield
+    except OSError as error:
+        if _is_closed_pipe(error):
+            raise _ClosedPipe from None
+        raise
+
+
+def _enough() -> int:
+    """`| head` has seen enough: that is no failure."""
+    _drop_stdout()
+    return 0
+
+
+def _drop_stdout() -> None:
+    """What is still buffered goes nowhere, or the interpreter complains about it when it ends."""
     try:
         _flush()
     except (OSError, ValueError):
-        # What is still buffered goes nowhere, or the interpreter complains about it when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return RUNTIME
 
 
 def _unexpected(error: Exception) -> int:

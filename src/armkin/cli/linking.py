@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import output, render
+from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -18,8 +19,16 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 PortName = Annotated[
-    str,
-    typer.Option("--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."),
+    str | None,
+    typer.Option(
+        "--port",
+        "-p",
+        metavar="PORT",
+        envvar="ARMKIN_PORT",
+        show_envvar=False,
+        help="Device, COM port, pyserial URL, or sim: a board in this process. "
+        "[default: ARMKIN_PORT, else the only board that answers]",
+    ),
 ]
 Baud = Annotated[int, typer.Option("--baud", metavar="N", help="The firmware's rate.")]
 AssumeHome = Annotated[
@@ -31,6 +40,25 @@ AssumeHome = Annotated[
 BAUD = 250_000
 SIM = "sim"
 _AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
+
+
+def port_name(given: str | None, configuration: Configuration | None, baud: int) -> str:
+    """The port given (or ARMKIN_PORT), else the only one where a board answers as the robot file's kind."""
+    if given is not None:
+        return given
+    from armkin.board.firmware.finding import answering
+
+    kind = "a board" if configuration is None else f"an {configuration.board.kind}"
+    with stoppable() as stop:
+        found = answering(None if configuration is None else configuration.board.number, baud, stop)
+    if len(found) == 1:
+        output.note(f"using {found[0]}, the only port where {kind} answers")
+        return found[0]
+    where = f"{len(found)} boards answer ({', '.join(found)})" if found else f"no port where {kind} answers was found"
+    raise UsageError(
+        f"--port is missing, and {where}\n"
+        "armkin ports lists them, ARMKIN_PORT names one for every command; sim is a board in this process"
+    )
 
 
 class Stop:
@@ -68,7 +96,7 @@ def stoppable() -> Iterator[Stop]:
 
 @contextmanager
 def machine(
-    arm: Arm, configuration: Configuration, port: str, baud: int, *, simulated: str = _AT_HOME
+    arm: Arm, configuration: Configuration, port: str | None, baud: int, *, simulated: str = _AT_HOME
 ) -> Iterator[Machine]:
     """The arm on the board behind a port, given back at the end; a signal stops the arm first.
 
@@ -78,6 +106,7 @@ def machine(
     from armkin.board.firmware.session import StoppedError
     from armkin.board.opening import open_port
 
+    port = port_name(port, configuration, baud)
     with stoppable() as stop:
         link = open_port(port, board=configuration.board, baud=baud)
         try:

@@ -21,7 +21,7 @@ Batch = Annotated[
 ]
 Out = Annotated[
     str | None,
-    typer.Option("--out", metavar="FILE", help="Write to a file, which appears whole or not at all."),
+    typer.Option("--out", "-o", metavar="FILE|-", help="Write to a file, which appears whole or not at all."),
 ]
 Target = Annotated[
     list[str] | None,

@@ -13,10 +13,10 @@ Write = Callable[[str], object]
 
 @contextmanager
 def destination(path: str | None) -> Iterator[Write]:
-    """The function that writes a command's data: to stdout, or to a file that appears whole or not at all."""
+    """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all."""
     if path == "":
         raise UsageError("--out needs the name of a file")
-    if path is not None:
+    if path is not None and path != "-":
         from armkin.files import whole
 
         with whole(path) as file:

@@ -25,7 +25,7 @@ _WORD = {"open": "open", "closed": "closed", "close": "closed", "shut": "closed"
 def grip(
     robot: Robot,
     value: Annotated[str, typer.Argument(metavar="open|closed|VALUE", help="In the gripper drive's degrees (mm).")],
-    port: PortName,
+    port: PortName = None,
     assume: Annotated[
         str | None,
         typer.Option(
@@ -66,7 +66,12 @@ def grip(
     if at != target:
         there, wanted = _said(arm, gripper, at), _said(arm, gripper, target)
         raise LinkError(f"the gripper stands at {there} instead of {wanted}: please report this as a bug")
-    found: dict[str, Any] = {**render.head(arm), "port": port, "gripper": gripper.value(at), "counts": at}
+    found: dict[str, Any] = {
+        **render.head(arm),
+        "port": machine.session.port.name,
+        "gripper": gripper.value(at),
+        "counts": at,
+    }
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
 

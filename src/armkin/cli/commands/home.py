@@ -13,7 +13,7 @@ from armkin.cli.options import Json, Robot
 
 def home(
     robot: Robot,
-    port: PortName,
+    port: PortName = None,
     joints: Annotated[
         list[str] | None, typer.Argument(metavar="[JOINT...]", help="These joints only. [default: all]")
     ] = None,
@@ -35,7 +35,7 @@ def home(
         found = linking.where(machine)
     with output.destination(None) as write:
         write(
-            render.to_json({**render.head(arm), "port": port, **found}) + "\n"
+            render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"
             if json
             else linking.where_text(arm, found)
         )

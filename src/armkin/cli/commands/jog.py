@@ -25,7 +25,7 @@ def jog(
     robot: Robot,
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="The joint's name.")],
     speed: Annotated[str, typer.Argument(metavar="SPEED", help="In deg/s (prismatic joints: mm/s), signed.")],
-    port: PortName,
+    port: PortName = None,
     seconds: Annotated[str, typer.Option("--seconds", metavar="S", help="How long; Ctrl-C ends it earlier.")] = "0.5",
     baud: Baud = linking.BAUD,
     json: Json = False,
@@ -56,7 +56,7 @@ def jog(
         found = linking.where(machine)
     with output.destination(None) as write:
         write(
-            render.to_json({**render.head(arm), "port": port, **found}) + "\n"
+            render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"
             if json
             else linking.where_text(arm, found)
         )

@@ -11,7 +11,7 @@ from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import Goals, Stream
 from armkin.cli.goals import goals as read_goals
-from armkin.cli.linking import SIM, AssumeHome, Baud
+from armkin.cli.linking import SIM, AssumeHome, Baud, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, TaskName
 from armkin.errors import UsageError
@@ -29,10 +29,7 @@ def send(
         str | None, typer.Argument(metavar="[ROBOT]", help="Robot file; a piped answer names its own.")
     ] = None,
     q: Joints = None,
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT", help="Device, COM port, pyserial URL, or sim: a board in this process."),
-    ] = None,
+    port: PortName = None,
     target: Annotated[
         str | None,
         typer.Option("--target", metavar="X,Y,Z", help="Solve for a target, and take the branch nearest to the arm."),
@@ -71,8 +68,6 @@ def send(
         raise UsageError(f"--speed: '{speed}' must be above 0 and at most 100 percent")
     if start is not None and not dry_run:
         raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
-    if port is None and not dry_run:
-        raise UsageError("--port is missing: armkin ports lists them; sim is a board in this process")
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     arm, goals = read_goals(robot, q, target, branch, task, batch)
@@ -86,7 +81,6 @@ def send(
             found = planner.summary(plans)
             write(render.to_json({**render.head(arm), "dry_run": True, **found}) + "\n" if json else _text(arm, found))
         return
-    assert port is not None
     with linking.machine(arm, configuration, port, baud) as machine:
         if machine.prepare(assume_home=assume_home) and assume_home:
             output.note("the board takes the arm to stand in its home pose")
@@ -102,7 +96,7 @@ def send(
         with output.progress("ms of motion", whole) as tick:
             machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
         planned = planner.summary(planner.done, began)
-        found = {**planned, "port": port, **linking.where(machine)}
+        found = {**planned, "port": machine.session.port.name, **linking.where(machine)}
     with output.destination(None) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:

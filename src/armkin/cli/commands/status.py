@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine
 
 
-def status(robot: Robot, port: PortName, baud: Baud = linking.BAUD, json: Json = False) -> None:
+def status(robot: Robot, port: PortName = None, baud: Baud = linking.BAUD, json: Json = False) -> None:
     """Where the board says that the arm stands.
 
     Moves nothing and changes nothing. (Opening its port resets an Uno the first time: an arm that stood

@@ -9,7 +9,7 @@ from armkin.errors import LinkError, UsageError
 _PATIENCE = 15.0  # [s] for an arm to come to rest
 
 
-def stop(port: PortName, baud: Baud = linking.BAUD) -> None:
+def stop(port: PortName = None, baud: Baud = linking.BAUD) -> None:
     """Stop the arm along its path.
 
     Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
@@ -17,6 +17,7 @@ def stop(port: PortName, baud: Baud = linking.BAUD) -> None:
     """
     from armkin.board.ports import SIM, SerialPort, holder
 
+    port = _port(port, baud)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
     process = holder(port)
@@ -35,6 +36,18 @@ def stop(port: PortName, baud: Baud = linking.BAUD) -> None:
         finally:
             link.close()
     output.note("the arm stands")
+
+
+def _port(given: str | None, baud: int) -> str:
+    """The port given, the only one that armkin holds, or the only one where a board answers."""
+    from armkin.board.firmware.finding import likely
+    from armkin.board.ports import holder
+
+    if given is None:
+        held = [name for name in likely() if holder(name) is not None]
+        if len(held) == 1:
+            return held[0]
+    return linking.port_name(given, None, baud)
 
 
 def _end(process: int, port: str) -> None:

@@ -1,0 +1,37 @@
+"""The boards that are plugged in and answer: what a command without --port speaks to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from armkin.board.firmware.session import Session
+from armkin.board.ports import BAUD, SerialPort, list_ports
+from armkin.errors import LinkError
+
+
+def answering(number: int | None = None, baud: int = BAUD, stop: Callable[[], bool] = lambda: False) -> list[str]:
+    """Names of the ports behind which a board with armkin's firmware answers.
+
+    number: the board's as INFO says it; None: any. Only ports that look like an Arduino are opened (which
+    resets most of them: an arm that stands still keeps its position), and none that another program holds.
+    """
+    return [name for name in likely() if _answers(name, number, baud, stop)]
+
+
+def likely() -> Iterable[str]:
+    """Names of the ports that look like an Arduino."""
+    return [port.device for port in list_ports() if port.board]
+
+
+def _answers(name: str, number: int | None, baud: int, stop: Callable[[], bool]) -> bool:
+    try:
+        link = SerialPort(name, baud)
+    except LinkError:
+        return False
+    try:
+        info = Session(link, stop).open()
+    except LinkError:
+        return False
+    finally:
+        link.close()
+    return number is None or info.board == number
