@@ -39,6 +39,8 @@ MAY_IMPORT: dict[str, str] = {
     "board/firmware": "errors hardware formula model motors motion board/ports robot_file",
     "board/sim": "errors hardware board/ports board/firmware",
     "board": "errors hardware board/ports board/firmware board/sim",
+    "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
+    " motion reach view board board/ports board/firmware",
 }
 PENDING = {("motion", "board/firmware")}  # goes when a plan is a trajectory
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them

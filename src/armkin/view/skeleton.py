@@ -1,4 +1,8 @@
-"""An arm's pose as lines and points."""
+"""An arm from its axes: rigid bodies that do not depend on the pose, and a pose's lines and points.
+
+Body 0 stands on the base. Body i is drawn in the frame after joint i, whose z is the joint's axis: it leads
+along that axis to the foot of the common normal with the next axis and across it, as real arms are built.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,16 @@ from armkin.model.rotation import rotation_about
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+_ALIKE = 0.05  # sine of the angle between two axes, below which their common normal says little
+
+
+@dataclass(frozen=True)
+class Shape:
+    """An arm's bodies; lengths in mm."""
+
+    bodies: tuple[Array, ...]  # n + 1 of (P, 3): corners of body i in the frame after joint i; body 0 in the world's
+    at: Array  # (n,) where on its own axis each joint sits
 
 
 @dataclass(frozen=True)
@@ -31,29 +45,58 @@ class Skeleton:
         return np.asarray(self.path[-1])
 
 
-def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
-    """The lines of a pose q (n,) [rad | mm].
+def shape(arm: Arm) -> Shape:
+    """The bodies of an arm.
 
-    A link leads first along its joint's axis (d of a DH row) and then straight to the next joint
-    (a of the row), as real arms are built.
+    >>> import armkin
+    >>> [body.round(6).tolist() for body in shape(armkin.load("robots/yaw_two_link.yaml")).bodies][1:]
+    [[[0.0, 0.0, 0.0], [0.0, 0.0, 100.0]], [[0.0, 0.0, 0.0], [150.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [120.0, 0.0, 0.0]]]
     """
-    values = as_joints(arm, q)
+    bodies = [np.array([arm.base[:3, 3], arm.link[0][:3, 3]])]
+    at = np.zeros(arm.n)
+    for i in range(arm.n):
+        link = arm.link[i + 1]
+        foot, meets = (link[2, 3], 0.0) if i + 1 == arm.n else _feet(link)
+        across = link[:3, 3] + meets * link[:3, 2]
+        bodies.append(np.array([[0.0, 0.0, at[i]], [0.0, 0.0, foot], across]))
+        if i + 1 < arm.n:
+            at[i + 1] = meets
+    return Shape(tuple(bodies), at)
+
+
+def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
+    """The lines of a pose q (n,) [rad | mm]."""
+    values, form = as_joints(arm, q), shape(arm)
     T = arm.link[0]
-    path, joints, axes, slides = [arm.base[:3, 3], T[:3, 3]], [], [], []
+    path, joints, axes, slides = [*form.bodies[0]], [], [], []
     for i, value in enumerate(values * arm.ratio):
-        z, start = T[:3, 2], T[:3, 3]
-        joints.append(start)
+        z = T[:3, 2]
+        joint = T[:3, 3] + form.at[i] * z
+        joints.append(joint)
         axes.append(z)
         move = np.eye(4)
         if arm.prismatic[i]:
             move[2, 3] = value
-            path.append(start + value * z)
-            slides.append(np.array([start, path[-1]]))
+            slides.append(np.array([joint, joint + value * z]))
         else:
             move[:3, :3] = rotation_about(2, value)
         T = T @ move
-        path.append(T[:3, 3] + arm.link[i + 1][2, 3] * z)
+        path.extend(form.bodies[i + 1] @ T[:3, :3].T + T[:3, 3])
         T = T @ arm.link[i + 1]
-        path.append(T[:3, 3])
     keep = [0] + [k for k in range(1, len(path)) if np.linalg.norm(path[k] - path[k - 1]) > 1e-9 * arm.reach]
     return Skeleton(np.array(path)[keep], np.array(joints), np.array(axes), slides)
+
+
+def _feet(link: Array) -> tuple[float, float]:
+    """Where the common normal of two joints' axes stands on the one and on the other [mm from their frames].
+
+    The axes are the z axes of the frames before and after `link`. Of nearly parallel axes the frames' own
+    origins are taken, which a DH row puts on one common normal.
+    """
+    z, p = link[:3, 2], link[:3, 3]
+    across = 1.0 - z[2] ** 2  # squared sine of the angle between the axes
+    if across < _ALIKE**2:
+        return float(link[2, 3]), 0.0
+    # |a e3 - p - b z| is least where both derivatives vanish: a - b z3 = p3, a z3 - b = p z.
+    along = float(p @ z)
+    return float((p[2] - z[2] * along) / across), float((z[2] * p[2] - along) / across)

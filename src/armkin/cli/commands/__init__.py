@@ -14,6 +14,7 @@ COMMANDS = {
     "ports": "Serial ports of this computer, Arduinos first.",
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "plot": "A picture of the arm.",
+    "teach": "A page in the browser: see the arm, choose a branch.",
     "info": "What a robot file says, checked.",
     "export": "The arm in other words: C99.",
     "schema": "JSON Schema of robot files, for editors.",

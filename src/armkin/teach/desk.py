@@ -1,0 +1,93 @@
+"""One arm and its pages: every action by its name."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from armkin.errors import UsageError
+from armkin.model import units
+from armkin.teach import guard
+from armkin.teach.guard import RefusedError
+from armkin.teach.look import Question, look
+from armkin.teach.scene import scene
+from armkin.teach.tabs import Tab, Tabs
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Fields = Mapping[str, Any]
+Action = Callable[[Tab, Fields], dict[str, Any]]
+
+
+class Desk:
+    """What the pages of one run share: the arm, the pose they show, who holds control."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm = arm
+        self.tabs = Tabs()
+        self._solving = threading.Lock()  # one question at a time: two cores are not many
+        self._shown: dict[str, Any] = {}
+        # Name -> what it does, for the page in control; and what every page may do.
+        self.actions: dict[str, Action] = {"look": self._look}
+        self.free: dict[str, Action] = {"take": self._take, "stop": self._stop}
+
+    def act(self, name: str, tab_id: str, fields: Fields) -> dict[str, Any]:
+        """Carry out an action for a page. Raises RefusedError, or an ArmkinError that says what is wrong."""
+        if name == "open":
+            return self._open()
+        if name == "stop":
+            return self.free["stop"](Tab(), fields)  # whoever holds the key may stop the arm
+        tab = self.tabs.find(tab_id)
+        if name in self.free:
+            return self.free[name](tab, fields)
+        if name not in self.actions:
+            raise RefusedError(404, f"there is no action {name[:40]!r}")
+        self.tabs.check_control(tab)
+        return self.actions[name](tab, fields)
+
+    def _open(self) -> dict[str, Any]:
+        tab = self.tabs.open()
+        if not self._shown:
+            drawn = scene(self.arm)
+            held = (drawn["lock"],) if drawn["lock"] else ()
+            self._shown = look(self.arm, Question(self.arm.home, held=held))
+        return {"tab": tab.id, "scene": scene(self.arm), "look": self._shown}
+
+    def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Where a pose or a target is, with all branches; the other pages see it, too."""
+        arm = self.arm
+        q = units.joints_in(arm, guard.numbers(fields, "q", arm.n))
+        held = fields.get("held", [])
+        if not isinstance(held, list) or any(name not in arm.joint_names for name in held):
+            raise UsageError("held: expected names of joints")
+        target = fields.get("target")
+        if target is not None:
+            count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
+            target = guard.numbers(fields, "target", count)
+        question = Question(
+            q,
+            target,
+            tuple(name for name in arm.joint_names if name in held),
+            guard.text(fields, "branch") if fields.get("branch") is not None else "",
+            guard.flag(fields, "best"),
+            guard.flag(fields, "nearest"),
+            self.stands(),
+        )
+        with self._solving:
+            answer = look(arm, question)
+        self._shown = answer
+        self.tabs.tell("look", answer, but=tab)
+        return answer
+
+    def stands(self) -> tuple[int, ...] | None:
+        """Pulses where the arm stands; None if nothing is known of it."""
+        return None
+
+    def _take(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        self.tabs.take(tab)
+        return {}
+
+    def _stop(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        return {}

@@ -1,0 +1,139 @@
+"""Who may ask for what: a page of another origin, a rebound name or a program without the key moves nothing."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import math
+import secrets
+from collections.abc import Mapping
+from typing import Any
+
+from armkin.errors import UsageError
+
+KEY, TAB = "X-Armkin-Key", "X-Armkin-Tab"
+LARGEST = 256 * 1024  # bytes of a body: a path file of ten thousand moves
+
+
+class RefusedError(Exception):
+    """A request that is answered with an HTTP status and a sentence, and does nothing."""
+
+    def __init__(self, status: int, why: str) -> None:
+        super().__init__(why)
+        self.status = status
+
+
+class Guard:
+    """One run's key, and the names under which the page is served."""
+
+    def __init__(self, port: int) -> None:
+        self.key = secrets.token_urlsafe(24)
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._origins = {f"http://{host}" for host in self._hosts}
+
+    def check_read(self, headers: Mapping[str, str]) -> None:
+        """A GET: the Host must be ours (a rebound name is not), and no other origin may ask."""
+        if headers.get("Host", "").lower() not in self._hosts:
+            raise RefusedError(403, "this server answers to 127.0.0.1 and localhost only")
+        if headers.get("Origin", next(iter(self._origins))).lower() not in self._origins:
+            raise RefusedError(403, "another origin may not ask")
+        # A form or an image of another site sends no Origin; browsers say this instead.
+        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
+            raise RefusedError(403, "another site may not ask")
+
+    def check_action(self, headers: Mapping[str, str]) -> None:
+        """A POST: as a GET, with our Origin, this run's key and JSON."""
+        self.check_read(headers)
+        if "Origin" not in headers:
+            raise RefusedError(403, "an action needs the page's Origin")
+        if not hmac.compare_digest(headers.get(KEY, "").encode("latin-1", "replace"), self.key.encode()):
+            raise RefusedError(403, "an action needs this run's key: open the address that armkin teach printed")
+        if headers.get("Content-Type", "").split(";")[0].strip().lower() != "application/json":
+            raise RefusedError(415, "actions are application/json")
+
+
+def length(headers: Mapping[str, str]) -> int:
+    """Bytes of a body, known beforehand and bounded."""
+    text = headers.get("Content-Length", "")
+    if "Transfer-Encoding" in headers or not (text.isascii() and text.isdigit() and len(text) < 12):
+        raise RefusedError(411, "a body needs its Content-Length")
+    if int(text) > LARGEST:
+        raise RefusedError(413, f"a body may have {LARGEST} bytes")
+    return int(text)
+
+
+def body(data: bytes) -> dict[str, Any]:
+    """A body as a JSON object without NaN or Infinity."""
+    try:
+        found = json.loads(data.decode("utf-8"), parse_constant=_no_constant, parse_float=_finite)
+    except (ValueError, RecursionError):
+        raise RefusedError(400, "the body is no JSON, or has a number that is not finite") from None
+    if not isinstance(found, dict):
+        raise RefusedError(400, "the body must be a JSON object")
+    return found
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(name)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+# Fields of a body: what is not as it must be is a UsageError that names the field.
+
+
+def numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
+    """A list of so many finite numbers."""
+    found = fields.get(name)
+    if not isinstance(found, list) or len(found) != count:
+        raise UsageError(f"{name}: expected {count} numbers")
+    return [_number(value, name) for value in found]
+
+
+def number(fields: Mapping[str, Any], name: str, low: float, high: float) -> float:
+    """A number from low to high."""
+    value = _number(fields.get(name), name)
+    if not low <= value <= high:
+        raise UsageError(f"{name}: {value:g} is outside {low:g} to {high:g}")
+    return value
+
+
+def whole(fields: Mapping[str, Any], name: str, below: int) -> int:
+    """An index: 0 up to below."""
+    value = fields.get(name)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < below:
+        raise UsageError(f"{name}: expected a whole number from 0 to {below - 1}")
+    return value
+
+
+def text(fields: Mapping[str, Any], name: str, longest: int = 200) -> str:
+    """A string of bounded length."""
+    value = fields.get(name)
+    if not isinstance(value, str) or len(value) > longest:
+        raise UsageError(f"{name}: expected text of at most {longest} characters")
+    return value
+
+
+def flag(fields: Mapping[str, Any], name: str) -> bool:
+    """True or false; false if it is not there."""
+    value = fields.get(name, False)
+    if not isinstance(value, bool):
+        raise UsageError(f"{name}: expected true or false")
+    return value
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise UsageError(f"{name}: expected a number")
+    try:
+        found = float(value)
+    except OverflowError:
+        raise UsageError(f"{name}: the number is too large") from None
+    if not abs(found) <= 1e9:
+        raise UsageError(f"{name}: {found:g} is too large; at most 1e9 from 0")
+    return found

@@ -1,0 +1,100 @@
+"""What the page must know of an arm to draw it and to label its inputs; lengths in mm, angles in degrees."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.inverse.tasks.fitting import task_for
+from armkin.model import units
+from armkin.motors import joints_per_pulse, motor_names, pulse_units
+from armkin.view.skeleton import shape
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def scene(arm: Arm) -> dict[str, Any]:
+    """The arm: links and bodies (see `armkin.view.skeleton.shape`), joints, motors."""
+    form = shape(arm)
+    limits = [[_finite(end) for end in pair] for pair in units.limits_out(arm)]
+    return {
+        "robot": arm.name,
+        "robot_file": arm.path,
+        "description": "" if arm.file is None else (arm.file.description or ""),
+        "reach": arm.reach,
+        "base": arm.base.tolist(),
+        "links": arm.link.tolist(),
+        "bodies": [body.tolist() for body in form.bodies],
+        "joints": [
+            {
+                "name": name,
+                "unit": unit,
+                "lower": low,
+                "upper": high,
+                "home": home,
+                "prismatic": bool(sliding),
+                "ratio": float(ratio),
+                "at": float(at),
+                "max_speed": _finite(speed),
+            }
+            for name, unit, (low, high), home, sliding, ratio, at, speed in zip(
+                arm.joint_names,
+                units.names(arm),
+                limits,
+                units.home_out(arm),
+                arm.prismatic,
+                arm.ratio,
+                form.at,
+                units.joints_out(arm, arm.max_speed).tolist(),
+                strict=True,
+            )
+        ],
+        "poses": units.poses_out(arm),
+        **_motors(arm),
+        "gripper": _gripper(arm),
+        "lock": first_lock(arm),
+        "locks": arm.n > 6 or first_lock(arm) is not None,
+    }
+
+
+def first_lock(arm: Arm) -> str | None:
+    """The joint that is held when the page opens: one of seven, the third, or none."""
+    try:
+        task_for(arm)
+    except UsageError:
+        return arm.joint_names[(arm.n - 1) // 2 - 1] if arm.n > 6 else None
+    return arm.joint_names[2] if arm.n == 7 else None
+
+
+def _motors(arm: Arm) -> dict[str, Any]:
+    try:
+        joints_per_pulse(arm)
+    except UsageError as error:
+        return {"motors": None, "no_motors": str(error)}
+    named = zip(motor_names(arm), pulse_units(arm), strict=True)
+    return {"motors": [{"name": name, "unit": unit} for name, unit in named], "no_motors": ""}
+
+
+def _gripper(arm: Arm) -> dict[str, Any] | None:
+    file = None if arm.file is None else arm.file.gripper
+    if file is None:
+        return None
+    # It continues the last straight piece of the arm, which is not always along the tool's z axis.
+    corners = shape(arm).bodies[-1]
+    pieces = [d for d in np.diff(corners, axis=0) if np.linalg.norm(d) > 1e-6 * arm.reach]
+    way = pieces[-1] if pieces else np.array([0.0, 0.0, 1.0])
+    inside = arm.link[-1][:3, :3].T @ way
+    return {
+        "open": file.open,
+        "closed": file.closed,
+        "unit": "deg" if file.lead is None else "mm",
+        "along": (inside / np.linalg.norm(inside)).tolist(),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """A number for JSON, which has neither infinity nor nan."""
+    return float(value) if abs(value) < float("inf") else None

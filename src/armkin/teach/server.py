@@ -1,0 +1,222 @@
+"""HTTP on 127.0.0.1: the page's files, a stream of events, actions.
+
+Each answer is written in one go: headers and body apart, with Nagle's algorithm and delayed acknowledgements,
+would take 40 ms.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import select
+import socket
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import cache
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+from armkin.errors import ArmkinError, LinkError
+from armkin.teach import guard
+from armkin.teach.desk import Desk
+from armkin.teach.guard import Guard, RefusedError
+
+STATIC = Path(__file__).parent / "static"
+_KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_STRANGERS = 100  # connections that have not shown the key; beyond, the oldest one is closed
+_LOOK = 0.1  # [s] between two looks at whether a page is still there
+_SILENT = 15.0  # [s] after which an event stream says something, so that dead lines are noticed
+
+
+class Server(ThreadingHTTPServer):
+    """One arm's page."""
+
+    daemon_threads = True
+    request_queue_size = 128
+
+    def __init__(self, desk: Desk, port: int = 0) -> None:
+        super().__init__(("127.0.0.1", port), _Handler)
+        self.desk = desk
+        self.guard = Guard(self.server_address[1])
+        self._strangers: OrderedDict[int, socket.socket] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser; the key is in the fragment, which browsers do not send."""
+        return f"http://127.0.0.1:{self.server_address[1]}/#{self.guard.key}"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a new connection; of too many that have shown no key, close the oldest."""
+        with self._lock:
+            self._strangers[id(request)] = request
+            while len(self._strangers) > _STRANGERS:
+                _, oldest = self._strangers.popitem(last=False)
+                _shut(oldest)
+        super().process_request(request, client_address)
+
+    def known(self, request: Any) -> None:
+        """A connection has shown the key: it is not closed for others."""
+        with self._lock:
+            self._strangers.pop(id(request), None)
+
+    def shutdown_request(self, request: Any) -> None:
+        """A connection ends."""
+        self.known(request)
+        super().shutdown_request(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A connection that breaks is nothing to print: `_Handler` answers what goes wrong in an action."""
+
+
+def _shut(connection: socket.socket) -> None:
+    try:
+        connection.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        return  # it is gone already
+
+
+@cache
+def files() -> dict[str, tuple[str, bytes]]:
+    """Path -> kind and bytes of every file that is served; there are no others."""
+    found = {}
+    for path in sorted(STATIC.rglob("*")):
+        if path.suffix in _KINDS:
+            found["/" + path.relative_to(STATIC).as_posix()] = (_KINDS[path.suffix], path.read_bytes())
+    return found
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    wbufsize = -1  # one write an answer
+    timeout = 60.0
+    server: Server
+
+    def do_GET(self) -> None:
+        """A file, or the stream of events."""
+        self._guarded(self._get)
+
+    def do_POST(self) -> None:
+        """An action."""
+        self._guarded(self._post)
+
+    def _guarded(self, serve: Callable[[], None]) -> None:
+        try:
+            serve()
+        except RefusedError as error:
+            self.close_connection = True  # its body may still be on the way
+            self._json(error.status, {"error": str(error), "kind": "Refused"})
+        except OSError:
+            self.close_connection = True
+
+    def _get(self) -> None:
+        self.server.guard.check_read(_headers(self))
+        path, _, query = self.path.partition("?")
+        if path == "/events":
+            self._events(query)
+            return
+        kind, data = files().get("/index.html" if path == "/" else path, ("", b""))
+        if not kind:
+            raise RefusedError(404, "there is no such file")
+        nonce = secrets.token_urlsafe(16)
+        self._answer(200, kind, data.replace(b"{{nonce}}", nonce.encode()) if kind == "text/html" else data, nonce)
+
+    def _post(self) -> None:
+        headers = _headers(self)
+        self.server.guard.check_action(headers)
+        self.server.known(self.connection)
+        if not self.path.startswith("/api/"):
+            raise RefusedError(404, "there is no such action")
+        fields = guard.body(self.rfile.read(guard.length(headers)))
+        try:
+            answer = self.server.desk.act(self.path.removeprefix("/api/"), headers.get(guard.TAB, ""), fields)
+        except ArmkinError as error:
+            status = 502 if isinstance(error, LinkError) else 422
+            self._json(status, {"error": str(error), "kind": type(error).__name__.removesuffix("Error")})
+        except RefusedError:
+            raise
+        except Exception as error:
+            self._json(500, {"error": f"internal error: {error!r}: this is a bug in armkin", "kind": "Internal"})
+        else:
+            self._json(200, answer)
+
+    def _events(self, query: str) -> None:
+        """Tell a page what happens, until it is closed: its connection ends, which is looked at all the time."""
+        tab = self.server.desk.tabs.find(query.removeprefix("tab="))
+        self.server.desk.tabs.enter(tab)
+        self.server.known(self.connection)
+        self.close_connection = True
+        try:
+            self._head(200, "text/event-stream", "")
+            self.end_headers()
+            self.wfile.write(b"retry: 1000\n\n")
+            self.wfile.flush()
+            silent = 0.0
+            while not self._gone():
+                news = tab.hear(_LOOK)
+                silent = 0.0 if news else silent + _LOOK
+                for topic, data in news.items():
+                    text = json.dumps(data, allow_nan=False)
+                    self.wfile.write(f"event: {topic}\ndata: {text}\n\n".encode())
+                if silent >= _SILENT:
+                    self.wfile.write(b":\n\n")
+                    silent = 0.0
+                self.wfile.flush()
+        finally:
+            self.server.desk.tabs.leave(tab)
+
+    def _gone(self) -> bool:
+        ready, _, _ = select.select([self.connection], [], [], 0)
+        return bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
+
+    def _json(self, status: int, value: Any) -> None:
+        self._answer(status, "application/json", json.dumps(value, allow_nan=False).encode(), "")
+
+    def _answer(self, status: int, kind: str, data: bytes, nonce: str) -> None:
+        self._head(status, kind, nonce)
+        self.send_header("Content-Length", str(len(data)))
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(data)
+
+    def _head(self, status: int, kind: str, nonce: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind if kind == "text/event-stream" else f"{kind}; charset=utf-8")
+        self.send_header("Content-Security-Policy", _policy(nonce))
+        self.send_header("X-Frame-Options", "DENY")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("Cross-Origin-Opener-Policy", "same-origin")
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.send_header("Cache-Control", "no-store")
+
+    def version_string(self) -> str:
+        """What the Server header says."""
+        return "armkin"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not printed."""
+
+
+def _headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
+    """Headers by their canonical names; one that is there twice is refused."""
+    found: dict[str, str] = {}
+    for name, value in handler.headers.items():
+        key = name.title()
+        if key in found and key in ("Host", "Origin", "Content-Length", guard.KEY):
+            raise RefusedError(400, f"{key} is there twice")
+        found[key] = value
+    return found
+
+
+def _policy(nonce: str) -> str:
+    """What the page may load: our own files, and scripts with this answer's nonce."""
+    scripts = f"'nonce-{nonce}'" if nonce else "'none'"
+    return (
+        f"default-src 'none'; script-src {scripts}; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )

@@ -1,0 +1,149 @@
+// @ts-check
+/** An arm as solid bodies: tubes along its skeleton, drums around its joints, rails for its slides. */
+import {
+  BoxGeometry, CapsuleGeometry, CylinderGeometry, Group, Matrix4, Mesh, Quaternion, SphereGeometry, Vector3,
+} from "three";
+import { frames, same } from "./chain.js";
+
+/** @typedef {import("./types.js").Arm} Arm */
+/** @typedef {{geometry: import("three").BufferGeometry, drum: boolean}} Part */
+
+/**
+ * The parts of every body, in its own frame; shared by the solid arm and its ghosts.
+ * @param {Arm} arm
+ */
+export class Shapes {
+  /** @param {Arm} arm */
+  constructor(arm) {
+    this.arm = arm;
+    const n = arm.joints.length;
+    /** @param {number} i */
+    this.radius = (i) => arm.reach * (0.042 - (0.022 * i) / Math.max(n, 1));
+    /** @type {Part[][]} */
+    this.bodies = arm.bodies.map((corners, i) => this.tubes(corners, this.radius(i)));
+    /** @type {(Part|null)[]} a slide's rail, in the frame before its motion */
+    this.rails = arm.joints.map(() => null);
+    arm.joints.forEach((joint, i) => this.joint(joint, i));
+    const tool = this.gripper();
+    this.bodies[n].push(...tool);
+  }
+
+  /**
+   * @param {number[][]} corners
+   * @param {number} r
+   * @returns {Part[]}
+   */
+  tubes(corners, r) {
+    const parts = [];
+    for (let k = 1; k < corners.length; k++) {
+      const a = new Vector3(...corners[k - 1]);
+      const way = new Vector3(...corners[k]).sub(a);
+      const length = way.length();
+      if (length < 1e-6 * this.arm.reach) continue;
+      const tube = new CapsuleGeometry(r, length, 4, 14);
+      parts.push({ geometry: along(tube, a.addScaledVector(way, 0.5), way), drum: false });
+    }
+    if (!parts.length) {
+      const ball = new SphereGeometry(r, 14, 10);
+      ball.translate(corners[0][0], corners[0][1], corners[0][2]);
+      parts.push({ geometry: ball, drum: false });
+    }
+    return parts;
+  }
+
+  /** @param {import("./types.js").Joint} joint @param {number} i */
+  joint(joint, i) {
+    const r = this.radius(i);
+    const centre = new Vector3(0, 0, joint.at);
+    const z = new Vector3(0, 0, 1);
+    if (!joint.prismatic) {
+      const drum = new CylinderGeometry(1.45 * r, 1.45 * r, 2.9 * r, 24);
+      this.bodies[i + 1].push({ geometry: along(drum, centre, z), drum: true });
+      return;
+    }
+    const low = joint.lower ?? -0.25 * this.arm.reach;
+    const high = joint.upper ?? 0.25 * this.arm.reach;
+    const rail = new BoxGeometry(0.8 * r, Math.max(high - low, r), 0.8 * r);
+    this.rails[i] = { geometry: along(rail, new Vector3(0, 0, joint.at + (low + high) / 2), z), drum: false };
+    const box = new BoxGeometry(2.4 * r, 2.6 * r, 2.4 * r);
+    this.bodies[i + 1].push({ geometry: along(box, centre, z), drum: true });
+  }
+
+  /** Two fingers that continue the last piece of the arm. @returns {Part[]} */
+  gripper() {
+    if (!this.arm.gripper) return [];
+    const n = this.arm.joints.length;
+    const r = this.radius(n);
+    const tool = new Matrix4().set(.../** @type {any} */ (this.arm.links[n].flat()));
+    const way = new Vector3(...this.arm.gripper.along);
+    return [-1, 1].map((side) => {
+      const finger = new BoxGeometry(0.5 * r, 3.2 * r, 0.9 * r);
+      finger.translate(0.8 * side * r, -0.9 * r, 0);
+      return { geometry: along(finger, new Vector3(), way).applyMatrix4(tool), drum: true };
+    });
+  }
+}
+
+/** Lay a geometry's y axis along a direction, its middle on a point. */
+function along(/** @type {any} */ geometry, /** @type {Vector3} */ middle, /** @type {Vector3} */ way) {
+  const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 1, 0), way.clone().normalize());
+  geometry.applyQuaternion(turn);
+  geometry.translate(middle.x, middle.y, middle.z);
+  return geometry;
+}
+
+/** One arm in the scene: the solid one, or a ghost. */
+export class Figure {
+  /**
+   * @param {Shapes} shapes
+   * @param {import("three").Material} tube
+   * @param {import("three").Material} drum
+   * @param {boolean} shadows
+   */
+  constructor(shapes, tube, drum, shadows) {
+    this.shapes = shapes;
+    this.group = new Group();
+    /** @param {Part[]} parts */
+    const body = (parts) => {
+      const group = new Group();
+      group.matrixAutoUpdate = false;
+      for (const part of parts) {
+        const mesh = new Mesh(part.geometry, part.drum ? drum : tube);
+        mesh.castShadow = shadows;
+        mesh.receiveShadow = shadows;
+        group.add(mesh);
+      }
+      this.group.add(group);
+      return group;
+    };
+    this.bodies = shapes.bodies.map(body);
+    this.rails = shapes.rails.map((rail) => (rail ? body([rail]) : null));
+    /** @type {import("./chain.js").Matrix[]} */
+    this.at = [];
+  }
+
+  /**
+   * Take a pose; what coincides with `solid` is hidden.
+   * @param {number[]} q
+   * @param {Figure} [solid]
+   */
+  pose(q, solid) {
+    const { before, after, tool } = frames(this.shapes.arm, q);
+    this.at = after;
+    this.tool = tool;
+    const put = (/** @type {Group} */ group, /** @type {number[]} */ T) => {
+      group.matrix.set(.../** @type {any} */ (T));
+      group.matrixWorldNeedsUpdate = true;
+    };
+    after.forEach((T, i) => {
+      put(this.bodies[i + 1], T);
+      this.bodies[i + 1].visible = !solid || !same(T, solid.at[i], this.shapes.arm.reach);
+      const rail = this.rails[i];
+      if (rail) {
+        put(rail, before[i]);
+        rail.visible = !solid;
+      }
+    });
+    if (solid) this.bodies[0].visible = false;
+  }
+}

@@ -1,0 +1,65 @@
+// @ts-check
+/** Small helpers around the document. */
+
+/**
+ * The element of that id.
+ * @template {HTMLElement} [T=HTMLElement]
+ * @param {string} id
+ * @returns {T}
+ */
+export function get(id) {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`there is no #${id}`);
+  return /** @type {T} */ (found);
+}
+
+/**
+ * A new element.
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {Object<string, string>} [attributes]
+ * @param {...(Node|string)} children
+ * @returns {HTMLElementTagNameMap[K]}
+ */
+export function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+/**
+ * A number as the command line prints it: fixed decimals, never -0.0000.
+ * @param {number} value
+ * @param {number} [digits]
+ */
+export function fixed(value, digits = 4) {
+  const text = value.toFixed(digits);
+  return /^-[0.]*$/.test(text) ? text.slice(1) : text;
+}
+
+/** A signed whole number. @param {number} value */
+export const signed = (value) => (value > 0 ? `+${value}` : String(value));
+
+/**
+ * Set a number box, unless somebody types in it.
+ * @param {HTMLInputElement} box
+ * @param {number} value
+ */
+export function show(box, value) {
+  if (document.activeElement !== box || !box.dataset.typing) box.value = fixed(value);
+}
+
+/**
+ * Hear of a number that was typed: while it is typed, and when it is done.
+ * @param {HTMLInputElement} box
+ * @param {(value: number) => void} hear
+ */
+export function typed(box, hear) {
+  box.addEventListener("input", () => {
+    box.dataset.typing = "yes";
+    if (box.value !== "" && Number.isFinite(box.valueAsNumber)) hear(box.valueAsNumber);
+  });
+  box.addEventListener("change", () => delete box.dataset.typing);
+  box.addEventListener("blur", () => delete box.dataset.typing);
+}

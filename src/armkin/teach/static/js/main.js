@@ -1,0 +1,179 @@
+// @ts-check
+/** The page: one pose, shown by all of its parts. */
+import { get } from "./dom.js";
+import { Joints } from "./joints.js";
+import { keys } from "./keys.js";
+import { Motors } from "./motors.js";
+import { act, enter, Latest } from "./server.js";
+import { Tip } from "./tip.js";
+
+/** @typedef {import("./types.js").Look} Look */
+
+const NUDGE = 5; // [mm] of an arrow key
+
+class Page {
+  /** @param {import("./types.js").Arm} arm @param {Look} look */
+  constructor(arm, look) {
+    this.arm = arm;
+    this.look = look;
+    this.q = look.q;
+    this.branch = "";
+    this.joints = new Joints(arm, (q) => this.turn(q), () => this.ask({}));
+    this.tip = new Tip((target) => this.aim(target), (branch) => this.choose(branch), (q) => this.turn(q));
+    this.motors = new Motors(arm, () => this.ask({}));
+    /** @type {import("./view.js").View | null} */
+    this.view = null;
+    this.asking = new Latest((fields) => this.answer(fields));
+    get("robot").textContent = arm.robot;
+    document.title = `${arm.robot} - armkin teach`;
+  }
+
+  /** Turn the joints. @param {number[]} q */
+  turn(q) {
+    this.q = q;
+    this.joints.show(q);
+    this.view?.pose(q);
+    this.ask({});
+  }
+
+  /** Aim the tip. @param {number[]} target @param {boolean} [dragging] */
+  aim(target, dragging = false) {
+    this.ask({ target, branch: this.branch, nearest: !dragging });
+  }
+
+  /** @param {import("./types.js").Branch} branch */
+  choose(branch) {
+    this.branch = branch.name;
+    this.turn([...branch.joints]);
+  }
+
+  /** @param {object} fields */
+  ask(fields) {
+    this.asking.push({ ...fields, held: [...this.joints.held], best: this.motors.best.checked });
+  }
+
+  /** @param {any} fields */
+  async answer(fields) {
+    try {
+      const look = /** @type {Look} */ (await act("look", { q: this.q, ...fields }));
+      const turned = !fields.target && this.asking.next !== null;
+      if (!turned) this.show(look, fields.target !== undefined);
+      trouble("");
+    } catch (error) {
+      trouble(/** @type {Error} */ (error).message);
+    }
+  }
+
+  /** @param {Look} look @param {boolean} [aimed] whether the pose follows a target */
+  show(look, aimed = false) {
+    this.look = look;
+    this.q = look.q;
+    if (!aimed || look.chosen !== null) this.branch = look.branches[look.chosen ?? -1]?.name ?? this.branch;
+    this.joints.show(look.q);
+    this.joints.say(look.outside);
+    this.tip.show(look);
+    this.motors.show(look);
+    if (!this.view) return;
+    this.view.pose(look.q);
+    this.view.haunt(this.tip.ghosts());
+    const flat = look.task === "xy" || look.task === "xy_theta";
+    const { position_mm: tip, rpy_deg } = look.tip;
+    const target = look.target ?? tip;
+    this.view.gizmo.show(look.task !== null, flat);
+    get("turn").hidden = look.task !== "pose";
+    this.view.gizmo.put(flat ? [target[0], target[1], tip[2]] : target, look.task === "pose" ? target.slice(3) : rpy_deg);
+  }
+
+  /** Move the target from where it is. @param {number[]} way [steps] */
+  nudge(way) {
+    if (!this.tip.target.length || !this.look.task) return;
+    const flat = this.look.task.startsWith("xy") && !this.look.task.startsWith("xyz");
+    const target = this.tip.target.map((value, i) => (i < (flat ? 2 : 3) ? value + NUDGE * way[i] : value));
+    this.tip.target = target;
+    this.aim(target);
+  }
+
+  /** Draw in 3-D, where the browser can. */
+  async draw() {
+    const canvas = /** @type {HTMLCanvasElement} */ (get("canvas"));
+    const { View } = await import("./view.js");
+    try {
+      this.view = new View(canvas, this.arm);
+    } catch {
+      canvas.hidden = true;
+      get("flat").hidden = false;
+      get("views").hidden = true;
+      return;
+    }
+    const view = this.view;
+    get("legend").textContent = `a square is ${view.step} mm`;
+    view.gizmo.moved = (position, rpy) => {
+      const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);
+      const flat = this.look.task === "xy" || this.look.task === "xy_theta";
+      const target = flat ? [...position.slice(0, 2), ...(this.look.target ?? []).slice(2)] : [...position, ...rest];
+      this.aim(target, true);
+    };
+    view.gizmo.dropped = () => this.aim(this.tip.target);
+    for (const button of document.querySelectorAll("[data-view]")) {
+      button.addEventListener("click", () => view.look(/** @type {HTMLElement} */ (button).dataset.view ?? ""));
+    }
+    const turn = get("turn");
+    turn.addEventListener("click", () => {
+      const on = turn.getAttribute("aria-pressed") !== "true";
+      turn.setAttribute("aria-pressed", String(on));
+      view.gizmo.mode(on ? "rotate" : "translate");
+    });
+    view.size();
+    view.pose(this.q);
+    view.look("space");
+    this.show(this.look);
+  }
+}
+
+/** @param {string} text what went wrong, or nothing */
+export function trouble(text) {
+  get("trouble").textContent = text;
+}
+
+function theme(/** @type {string} */ name, /** @type {Page} */ page) {
+  document.documentElement.dataset.theme = name;
+  get("theme").textContent = name === "dark" ? "Light" : "Dark";
+  page.view?.theme();
+}
+
+async function start() {
+  /** @type {Page | undefined} */
+  let page;
+  /** @param {{holder: string, pages: number}} news */
+  const control = ({ holder, pages }) => {
+    const mine = holder === "yours";
+    get("control").textContent = mine ? (pages > 1 ? `in control, ${pages - 1} watching` : "") : holder === "another"
+      ? "watching: another page holds control" : "nobody holds control";
+    get("take").hidden = mine;
+    get("panels").inert = !mine;
+    get("canvas").inert = !mine;
+  };
+  const opened = await enter(
+    { control, look: (look) => page?.show(look) },
+    (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : ""),
+  );
+  page = new Page(opened.scene, opened.look);
+  const one = page;
+  theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light", one);
+  get("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark", one));
+  get("take").addEventListener("click", () => act("take").catch((error) => trouble(error.message)));
+  const stop = () => act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`));
+  get("stop").addEventListener("click", stop);
+  /** @type {Object<string, () => void>} */
+  const actions = {};
+  for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);
+  keys(actions, (way) => one.nudge(way), stop);
+  one.show(opened.look);
+  await one.draw();
+  document.documentElement.dataset.ready = "yes";
+}
+
+start().catch((error) => {
+  trouble(error.message);
+  console.error(error);
+});

@@ -1,0 +1,152 @@
+// @ts-check
+/** The tip's target as the arm's task asks for it, what was found, and the branches to choose from. */
+import { fixed, get, make, show, typed } from "./dom.js";
+
+/** Okabe and Ito's colours, as in the pictures of `armkin plot`; told apart also by the colour-blind. */
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
+
+/** @param {number} k @returns {string} */
+const colour = (k) => COLOURS[k] ?? `hsl(${(k * 137) % 360} 60% 50%)`;
+
+export class Tip {
+  /**
+   * @param {(target: number[]) => void} aimed
+   * @param {(branch: import("./types.js").Branch) => void} chose
+   * @param {(joints: number[]) => void} went
+   */
+  constructor(aimed, chose, went) {
+    this.aimed = aimed;
+    this.chose = chose;
+    /** @type {HTMLInputElement[]} */
+    this.boxes = [];
+    this.labels = "";
+    /** @type {number[]} */
+    this.target = [];
+    /** @type {{branch: import("./types.js").Branch, colour: string, chosen: boolean}[]} */
+    this.rows = [];
+    /** @type {number[]} */
+    this.nearest = [];
+    get("target").addEventListener("submit", (event) => event.preventDefault());
+    get("nearest").addEventListener("click", () => went(this.nearest));
+  }
+
+  /** @param {import("./types.js").Look} look */
+  show(look) {
+    get("target").hidden = look.task === null;
+    if (look.task === null) {
+      get("answer").textContent = look.why ?? "";
+      get("branches").replaceChildren();
+      this.rows = [];
+      return;
+    }
+    const { labels = [], units = [], target = [], names = [], chosen = null } = look;
+    if (labels.join() !== this.labels) this.build(labels, units);
+    this.target = target;
+    target.forEach((value, i) => show(this.boxes[i], value));
+    this.rows = look.branches.map((branch, k) => ({
+      branch, colour: colour(names.indexOf(branch.name)), chosen: k === chosen,
+    }));
+    // The order of the names, not of the motion: a key chooses the same branch all the time.
+    this.rows.sort((a, b) => names.indexOf(a.branch.name) - names.indexOf(b.branch.name));
+    this.say(look);
+    this.list();
+  }
+
+  /** @param {string[]} labels @param {string[]} units */
+  build(labels, units) {
+    this.labels = labels.join();
+    this.boxes = labels.map(() => make("input", { type: "number", step: "any" }));
+    get("target").replaceChildren(
+      ...labels.map((name, i) => {
+        typed(this.boxes[i], (value) => this.aim(i, value));
+        this.boxes[i].addEventListener("keydown", (event) => {
+          const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+          if (!way) return;
+          event.preventDefault();
+          this.aim(i, this.target[i] + way * (units[i] === "" ? 0.01 : 1));
+        });
+        const said = units[i] ? `${name} / ${units[i]}` : name;
+        return make("label", {}, make("span", {}, said), this.boxes[i]);
+      }),
+    );
+  }
+
+  /** @param {number} i @param {number} value */
+  aim(i, value) {
+    const target = [...this.target];
+    target[i] = value;
+    this.target = target;
+    this.aimed(target);
+  }
+
+  /** @param {import("./types.js").Look} look */
+  say(look) {
+    const legal = look.branches.filter((branch) => branch.within_limits).length;
+    const count = look.branches.length;
+    let text = `${look.status}: ${count} branch${count === 1 ? "" : "es"}, ${legal} within limits`;
+    if (look.free?.length) text += `; free: ${look.free.join(", ")}`;
+    if (!look.complete) text += "; there may be more";
+    const near = look.closest;
+    this.nearest = near?.joints ?? [];
+    if (near) {
+      text += `. The nearest pose within limits is ${fixed(near.distance_mm)} mm away`;
+      if (near.angle_deg > 1e-6) text += `, turned by ${fixed(near.angle_deg)} deg`;
+      text += " (grey).";
+    }
+    get("answer").textContent = text;
+    get("answer").className = legal ? "" : "bad";
+    get("nearest").hidden = !near;
+  }
+
+  list() {
+    const focused = document.activeElement?.closest("#branches") ? document.activeElement.id : "";
+    const any = this.rows.some((row) => row.chosen);
+    get("branches").replaceChildren(
+      ...this.rows.map(({ branch, colour, chosen }, k) => {
+        const dot = make("span", { class: "dot" });
+        dot.style.background = colour;
+        const note = branch.outside.length ? `outside: ${branch.outside.map((words) => words.split(" ")[0]).join(", ")}` : "";
+        const button = make(
+          "button",
+          {
+            type: "button", role: "radio", id: `branch-${k}`, "aria-checked": String(chosen),
+            tabindex: chosen || (!any && k === 0) ? "0" : "-1", title: branch.outside.join("\n"),
+          },
+          dot,
+          branch.name || "branch",
+          make("span", { class: "note" }, note),
+        );
+        if (k < 8) button.append(make("kbd", { "aria-hidden": "true" }, String(k + 1)));
+        button.addEventListener("click", () => this.chose(branch));
+        button.addEventListener("keydown", (event) => this.step(event, k));
+        return button;
+      }),
+    );
+    if (focused) document.getElementById(focused)?.focus();
+  }
+
+  /** Arrow keys go through the radio group. @param {KeyboardEvent} event @param {number} k */
+  step(event, k) {
+    const way = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const next = (k + way + this.rows.length) % this.rows.length;
+    get(`branch-${next}`).focus();
+    this.choose(next);
+  }
+
+  /** @param {number} k */
+  choose(k) {
+    if (this.rows[k]) this.chose(this.rows[k].branch);
+  }
+
+  /** What is drawn besides the solid arm. */
+  ghosts() {
+    const found = this.rows
+      .filter((row) => !row.chosen)
+      .map(({ branch, colour }) => ({ joints: branch.joints, colour, faint: !branch.within_limits }));
+    if (this.nearest.length) found.push({ joints: this.nearest, colour: "#808890", faint: false });
+    return found;
+  }
+}

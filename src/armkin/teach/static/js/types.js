@@ -1,0 +1,20 @@
+// @ts-check
+/**
+ * What the server sends; lengths in mm, angles in degrees.
+ *
+ * @typedef {{name: string, unit: string, lower: number|null, upper: number|null, home: number,
+ *   prismatic: boolean, ratio: number, at: number, max_speed: number|null}} Joint
+ * @typedef {{open: number, closed: number, unit: string, along: number[]}} Gripper
+ * @typedef {{robot: string, robot_file: string, description: string, reach: number, base: number[][],
+ *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
+ *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
+ *   lock: string|null, locks: boolean}} Arm
+ * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], motion: number}} Branch
+ * @typedef {{pulses: number[], moves: number[], from: string, error_mm: number, best: boolean,
+ *   outside_travel: string[]}} Motors
+ * @typedef {{q: number[], outside: string[], tip: {position_mm: number[], rpy_deg: number[]},
+ *   motors: Motors|null, task: string|null, why?: string, labels?: string[], units?: string[], target?: number[],
+ *   status: string|null, complete?: boolean, free?: string[], branches: Branch[], names?: string[],
+ *   chosen?: number|null, closest?: {joints: number[], distance_mm: number, angle_deg: number}|null}} Look
+ */
+export {};

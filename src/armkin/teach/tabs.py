@@ -1,0 +1,116 @@
+"""The open pages: one holds control, the others watch; each hears the newest of every topic."""
+
+from __future__ import annotations
+
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from armkin.teach.guard import RefusedError
+
+MOST = 4  # a browser has six connections to a server: each page keeps one, and STOP must find one free
+_FORGET = 20.0  # [s] until a page that has never listened is forgotten
+
+
+class Tab:
+    """One open page."""
+
+    def __init__(self) -> None:
+        self.id = secrets.token_urlsafe(16)
+        self.born = time.monotonic()
+        self.listening = False
+        self._news: dict[str, Any] = {}
+        self._ready = threading.Condition()
+
+    def tell(self, topic: str, data: Any) -> None:
+        """Have the page hear something; what it has not heard of the topic yet is replaced."""
+        with self._ready:
+            self._news[topic] = data
+            self._ready.notify()
+
+    def hear(self, timeout: float) -> dict[str, Any]:
+        """What is new, by topic; empty after `timeout` seconds."""
+        with self._ready:
+            if not self._news:
+                self._ready.wait(timeout)
+            news, self._news = self._news, {}
+            return news
+
+
+class Tabs:
+    """All open pages; `left` is called when the page that holds control goes."""
+
+    def __init__(self, left: Callable[[], None] = lambda: None) -> None:
+        self._lock = threading.RLock()
+        self._tabs: dict[str, Tab] = {}
+        self._control = ""
+        self._left = left
+
+    def open(self) -> Tab:
+        """A new page. Raises RefusedError if there are too many."""
+        with self._lock:
+            now = time.monotonic()
+            for tab in [t for t in self._tabs.values() if not t.listening and now - t.born > _FORGET]:
+                del self._tabs[tab.id]
+            if sum(tab.listening for tab in self._tabs.values()) >= MOST:
+                raise RefusedError(429, f"the page is open {MOST} times already: close one of them")
+            if len(self._tabs) >= 10 * MOST:
+                raise RefusedError(429, "too many pages are being opened: try again in a minute")
+            tab = Tab()
+            self._tabs[tab.id] = tab
+            return tab
+
+    def find(self, name: str) -> Tab:
+        """The page of that id; RefusedError if there is none."""
+        with self._lock:
+            tab = self._tabs.get(name)
+        if tab is None:
+            raise RefusedError(410, "this page is not known any more: reload it")
+        return tab
+
+    def enter(self, tab: Tab) -> None:
+        """A page begins to listen; it holds control if nobody does."""
+        with self._lock:
+            if tab.listening or tab.id not in self._tabs:
+                raise RefusedError(410, "this page is not known any more: reload it")
+            tab.listening = True
+            if not self._control:
+                self._control = tab.id
+            self._announce()
+
+    def leave(self, tab: Tab) -> None:
+        """A page is closed."""
+        with self._lock:
+            held = self._control == tab.id
+            self._tabs.pop(tab.id, None)
+            if held:
+                self._control = ""
+            self._announce()
+        if held:
+            self._left()
+
+    def take(self, tab: Tab) -> None:
+        """A page takes control, on purpose."""
+        with self._lock:
+            self._control = tab.id
+            self._announce()
+
+    def check_control(self, tab: Tab) -> None:
+        """Raise RefusedError unless the page holds control."""
+        with self._lock:
+            if self._control != tab.id:
+                raise RefusedError(409, "another page holds control: take control first")
+
+    def tell(self, topic: str, data: Any, but: Tab | None = None) -> None:
+        """Have all pages hear something, `but` one."""
+        with self._lock:
+            for tab in self._tabs.values():
+                if tab is not but:
+                    tab.tell(topic, data)
+
+    def _announce(self) -> None:
+        for tab in self._tabs.values():
+            state = "yours" if self._control == tab.id else "another" if self._control else "nobody"
+            tab.tell("control", {"holder": state, "pages": len([t for t in self._tabs.values() if t.listening])})

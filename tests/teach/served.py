@@ -1,0 +1,101 @@
+"""A page's server in this process, and requests to it as a browser or an attacker would make them."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import armkin
+from armkin.teach.desk import Desk
+from armkin.teach.server import Server
+from command_line import ROOT
+
+
+@contextmanager
+def serving(desk: Desk) -> Iterator[Server]:
+    """The server of a desk, in a thread of its own."""
+    server = Server(desk)
+    thread = threading.Thread(target=lambda: server.serve_forever(poll_interval=0.05))
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+@contextmanager
+def served(robot: str = "three_dof") -> Iterator[Server]:
+    """The server of a robot of the project."""
+    with serving(Desk(armkin.load(str(ROOT / f"robots/{robot}.yaml")))) as server:
+        yield server
+
+
+def port(server: Server) -> int:
+    return int(server.server_address[1])
+
+
+def ask(
+    server: Server, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None
+) -> tuple[int, dict[str, str], bytes]:
+    """One request; status, headers, body."""
+    connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=10)
+    try:
+        connection.request(method, path, body, headers or {})
+        answer = connection.getresponse()
+        return answer.status, {name.title(): value for name, value in answer.getheaders()}, answer.read()
+    finally:
+        connection.close()
+
+
+def good(server: Server, tab: str = "") -> dict[str, str]:
+    """Headers as the page sends them."""
+    return {
+        "Origin": f"http://127.0.0.1:{port(server)}",
+        "Content-Type": "application/json",
+        "X-Armkin-Key": server.guard.key,
+        "X-Armkin-Tab": tab,
+    }
+
+
+def act(server: Server, name: str, fields: dict[str, Any] | None = None, tab: str = "") -> tuple[int, Any]:
+    """An action as the page carries it out: status and answer."""
+    status, _, data = ask(server, "POST", f"/api/{name}", json.dumps(fields or {}).encode(), good(server, tab))
+    return status, json.loads(data)
+
+
+class Page:
+    """An open page without a browser: it listens, and acts."""
+
+    def __init__(self, server: Server) -> None:
+        self.server = server
+        status, self.opened = act(server, "open")
+        assert status == 200, self.opened
+        self.id = self.opened["tab"]
+        self._connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=10)
+        self._connection.request("GET", f"/events?tab={self.id}")
+        self._events = self._connection.getresponse()
+        assert self._events.status == 200
+
+    def act(self, name: str, **fields: Any) -> tuple[int, Any]:
+        return act(self.server, name, fields, self.id)
+
+    def hear(self, topic: str) -> Any:
+        """The next news of a topic."""
+        current = ""
+        while True:
+            line = self._events.readline().decode().rstrip("\n")
+            if line.startswith("event: "):
+                current = line[7:]
+            elif line.startswith("data: ") and current == topic:
+                return json.loads(line[6:])
+
+    def close(self) -> None:
+        """As a browser closes a page: the connection ends."""
+        self._events.close()
+        self._connection.close()

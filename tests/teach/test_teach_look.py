@@ -1,0 +1,117 @@
+"""What the page is told of a pose or a target is what the command line says, to the last digit."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+import armkin
+from armkin.model import units
+from armkin.teach.look import Question, look
+from armkin.teach.scene import first_lock, scene
+from command_line import ROOT, run
+
+ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))
+
+
+def arm(name: str) -> armkin.Arm:
+    return armkin.load(str(ROOT / f"robots/{name}.yaml"))
+
+
+def asked(name: str, q: list[float], **more: Any) -> dict[str, Any]:
+    one = arm(name)
+    return look(one, Question(units.joints_in(one, q), **more))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_robot_has_a_scene_and_a_first_picture(robot: str) -> None:
+    one = arm(robot)
+    held = first_lock(one)
+    drawn = scene(one)
+    answer = look(one, Question(one.home, held=() if held is None else (held,)))
+    json.dumps([drawn, answer], allow_nan=False)
+    assert len(drawn["bodies"]) == one.n + 1
+    assert answer["q"] == pytest.approx(units.home_out(one), abs=1e-9)
+    if answer["task"] is None:
+        assert answer["why"]
+    else:
+        assert answer["branches"]
+
+
+@pytest.mark.parametrize(
+    ("robot", "target"),
+    [
+        ("three_dof", [390, 80, 300]),
+        ("three_dof", [600, 0, 170]),
+        ("three_dof", [2000, 0, 0]),
+        ("ur5e", [300, 200, 400, 10, 20, 30]),
+        ("cobra600", [400, 200, 300, 30]),
+    ],
+)
+def test_branches_are_those_of_ik(robot: str, target: list[float]) -> None:
+    file = f"robots/{robot}.yaml"
+    said = run("ik", file, *target, "--all-branches", "--json").json
+    answer = asked(robot, units.home_out(arm(robot)), target=target)
+    assert answer["status"] == said["status"]
+    assert answer["complete"] == said["complete"]
+    assert [(b["name"], b["joints"], b["within_limits"]) for b in answer["branches"]] == [
+        (b["name"], b["joints"], b["within_limits"]) for b in said["branches"]
+    ]
+    if said["best"] is None:
+        assert answer["closest"]["distance_mm"] == said["closest"]["distance_mm"]
+        assert answer["closest"]["joints"] == said["closest"]["joints"]
+    else:
+        assert answer["q"] == said["branches"][said["best"]]["joints"]
+
+
+@pytest.mark.parametrize("best", [False, True])
+def test_pulses_and_tip_are_those_of_the_command_line(best: bool) -> None:
+    pose = [-30, 5, -5]
+    said = run("pulses", "robots/three_dof.yaml", *pose, "--json", *(["--best"] if best else [])).json
+    where = run("fk", "robots/three_dof.yaml", *pose, "--json").json
+    answer = asked("three_dof", pose, best=best)
+    assert answer["motors"]["pulses"] == said["pulses"]
+    assert answer["motors"]["moves"] == said["moves"]
+    assert answer["motors"]["error_mm"] == said["error_mm"]
+    assert answer["tip"] == {"position_mm": where["position_mm"], "rpy_deg": where["rpy_deg"]}
+
+
+def test_a_pose_is_on_one_of_its_branches() -> None:
+    answer = asked("three_dof", [20, 30, 40])
+    assert answer["branches"][answer["chosen"]]["joints"] == pytest.approx([20, 30, 40])
+    assert answer["outside"] == []
+
+
+def test_what_is_outside_is_said_in_words() -> None:
+    answer = asked("three_dof", [0, 130, 0])
+    assert answer["outside"] == ["q2 = 130 deg is outside -20 to 120 deg"]
+
+
+def test_a_branch_is_kept_while_the_target_moves() -> None:
+    answer = asked("three_dof", [0, 90, -90], target=[390, 80, 300], branch="left, elbow down")
+    assert answer["branches"][answer["chosen"]]["name"] == "left, elbow down"
+
+
+def test_seven_joints_need_one_that_is_held() -> None:
+    home = units.home_out(arm("panda"))
+    free = asked("panda", home)
+    assert free["task"] is None
+    assert "panda" in free["why"]
+    held = asked("panda", home, held=("J3",))
+    assert len(held["branches"]) == 8
+    assert all(branch["joints"][2] == pytest.approx(home[2]) for branch in held["branches"])
+    assert scene(arm("panda"))["lock"] == "J3"
+
+
+def test_free_joints_of_a_self_motion_are_named() -> None:
+    answer = asked("puma560", [0, 0, 0, 20, 0, 30])
+    assert answer["status"] == "singular"
+    assert answer["free"] == ["J4", "J6"] or len(answer["free"]) == 2
+
+
+def test_moves_start_where_the_arm_stands() -> None:
+    answer = asked("three_dof", [-30, 5, -5], stands=(-1000, 0, 0))
+    assert answer["motors"]["moves"] == [-67, -10144, 5667]
+    assert answer["motors"]["from"] == "arm"
