@@ -4,9 +4,14 @@
     ├── FileError          a file that cannot be read or written
     ├── RobotFileError     a robot file that is not valid
     ├── UsageError         an argument that does not fit the arm or the command
+    │   ├── RedundantArmError   more joints than the task has constraints
+    │   └── NoHomingError       joints without a limit switch
     ├── NoSolutionError    no pose reaches the target, or none within the limits
     ├── MissingExtraError  an optional package is not installed
     └── LinkError          the port, or the board behind it
+        ├── PortInUseError      another armkin has the port
+        ├── PositionLostError   nobody knows where the arm stands
+        └── PositionKnownError  the arm stands elsewhere than somebody vouches for
 
 A message says what is wrong, where and what is allowed, in one or two lines, in words that hold for a
 program, too; `fields` says the same in values. Only the command line maps these classes to exit codes and
@@ -22,15 +27,17 @@ from typing import Any, Self
 class ArmkinError(Exception):
     """Base of all errors that armkin raises on purpose.
 
-    fields: what the message is about, as values of JSON: joint, value, lower, upper, file, line, ...
+    fields: what the message is about, as values of JSON in mm and degrees: joint, value, lower, upper, file, ...
 
     >>> error = NoSolutionError("q2 = 130 deg is outside -20 to 120 deg", joint="q2", value=130.0)
     >>> error.kind, error.fields
     ('no_solution', {'joint': 'q2', 'value': 130.0})
     """
 
-    def __init__(self, message: str = "", **fields: Any) -> None:
-        super().__init__(message)
+    def __init__(self, message: str = "", *, advice: str = "", **fields: Any) -> None:
+        super().__init__(f"{message}: {advice}" if advice else message)
+        self.message = message
+        self.advice = advice  # the next step in Python; the command line has its own words for it
         self.fields = fields
 
     @property
@@ -40,7 +47,7 @@ class ArmkinError(Exception):
 
     def within(self, place: str, **fields: Any) -> Self:
         """The same error, said of a place: ``row 3: ...``."""
-        return type(self)(f"{place}: {self}", **{**self.fields, **fields})
+        return type(self)(f"{place}: {self.message}", advice=self.advice, **{**self.fields, **fields})
 
 
 class FileError(ArmkinError):
@@ -63,6 +70,14 @@ class UsageError(ArmkinError, ValueError):
     """An argument does not fit the arm or the command."""
 
 
+class RedundantArmError(UsageError):
+    """An arm has more joints than its task has constraints; fields: robot, joints, surplus."""
+
+
+class NoHomingError(UsageError):
+    """Joints have no limit switch to home by; fields: joints, file."""
+
+
 class NoSolutionError(ArmkinError):
     """No pose reaches the target, or none does so within the limits."""
 
@@ -73,3 +88,15 @@ class MissingExtraError(ArmkinError):
 
 class LinkError(ArmkinError):
     """The port, or the board behind it, does not answer as it must."""
+
+
+class PortInUseError(LinkError):
+    """Another armkin has the port; fields: port, process."""
+
+
+class PositionLostError(LinkError):
+    """Nobody knows where the arm stands; fields: robot_file, port, homing (whether it can home)."""
+
+
+class PositionKnownError(LinkError):
+    """The arm's position is known, so that nobody may vouch for another; fields: joints."""

@@ -22,7 +22,7 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
     """
     name = os.fspath(path)
     if "\0" in name:
-        raise FileError(f"{name!r}: cannot write: a name has no null bytes")
+        raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
     try:
         real = os.path.realpath(name)  # through a link: what it points to is replaced, not the link
         if os.path.exists(real) and not stat.S_ISREG(os.stat(real).st_mode):
@@ -40,7 +40,7 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
                 os.unlink(temporary)
             raise
     except OSError as error:
-        raise FileError(f"{name}: cannot write: {error.strerror or error}") from None
+        raise FileError(f"{name}: cannot write: {error.strerror or error}", file=name) from None
 
 
 def _open(file: str | int, mode: Literal["w", "wb"]) -> IO[Any]:

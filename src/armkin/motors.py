@@ -144,7 +144,9 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     m = len(arm.motor_gain)
     steps = (-1.0, 0.0, 1.0, 2.0) if 4**m <= _CANDIDATES else (0.0, 1.0)
     if len(steps) ** m > _CANDIDATES:
-        raise UsageError(f"{arm.name} has {m} motors: --best tries all neighbours of up to 12")
+        raise UsageError(
+            f"{arm.name} has {m} motors: the best pulses are searched among the neighbours of up to 12", motors=m
+        )
     around = np.array(list(product(steps, repeat=m)))
     flat_q, flat_x = values.reshape(-1, arm.n), exact.reshape(-1, m)
     chosen = np.empty((len(flat_q), m), dtype=np.int64)

@@ -191,7 +191,7 @@ def test_a_rate_beyond_the_device_is_refused_with_the_figure(three_dof: Arm) -> 
     goal = np.deg2rad([-30, 5, -5])
     with pytest.raises(UsageError, match=r"joint q2 at 60 deg/s needs 7,160 counts/s of motor q2; .* 4,000\n") as e:
         plan_moves(three_dof, [0, 0, 0], goal, min_interval=4000)
-    assert "--speed 55" in str(e.value)
+    assert "the speed to 55 percent" in str(e.value)
     plan_moves(three_dof, [0, 0, 0], goal, min_interval=4000, speed=0.55)
 
 

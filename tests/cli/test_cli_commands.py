@@ -162,7 +162,8 @@ def test_a_joint_locked_outside_its_limits_is_said() -> None:
     """Else the nearest pose, which holds it as well, would pass for one within limits."""
     result = run("ik", "robots/panda.yaml", 400, 0, 400, 180, 0, 0, "--lock", "J3=500", "--json")
     assert result.code == 3
-    assert "warning: --lock J3=500: the limits of J3 are -166.003 to 166.003: all branches are outside" in result.err
+    said = "--lock J3=500: the limits of J3 are -166.003 to 166.003: all branches are outside"
+    assert json.loads(result.err)["warnings"] == [said]
 
 
 def test_ik_lets_another_task_be_asked_for() -> None:

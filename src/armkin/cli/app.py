@@ -130,11 +130,13 @@ def run(arguments: list[str]) -> int:
     before = signal.signal(signal.SIGTERM, _terminate)
     if arguments[:1] in ([], ["help"]):  # armkin help fk
         arguments = [*arguments[1:2], "--help"]
+    output.for_programs("--json" in arguments)
     try:
         code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
         # What a failed command has printed stays printed: the rows of a batch before the malformed one.
         return _exit_code(_flush) or code
     finally:
+        output.flush()
         signal.signal(signal.SIGTERM, before)
 
 
@@ -142,8 +144,11 @@ def _exit_code(command: Callable[[], Any]) -> int:
     try:
         return int(command() or 0)
     except errors.ArmkinError as error:
-        output.error(str(error))
-        return next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
+        from armkin.cli import advice
+
+        code = next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
+        output.error(advice.message(error), error.kind, code, error.fields, advice.next_step(error))
+        return code
     except _ClosedPipe:
         return _enough()
     except (KeyboardInterrupt, typer.Abort):
@@ -153,7 +158,7 @@ def _exit_code(command: Callable[[], Any]) -> int:
     except OSError as error:
         return _os_error(error)
     except MemoryError:
-        output.error("not enough memory; ask for less at once")
+        output.error("not enough memory; ask for less at once", "memory", RUNTIME)
         return RUNTIME
     except Exception as error:
         return _unexpected(error)
@@ -174,7 +179,7 @@ def _os_error(error: OSError) -> int:
     if _is_closed_pipe(error):
         return _enough()
     where = error.filename if error.filename is not None else "standard output"
-    output.error(f"{where}: {error.strerror or error}")
+    output.error(f"{where}: {error.strerror or error}", "system", RUNTIME, {"file": str(where)})
     _drop_stdout()
     return RUNTIME
 
@@ -217,14 +222,17 @@ def _unexpected(error: Exception) -> int:
         context = getattr(error, "ctx", None)
         if context is not None:
             message = f"{message}\nsee {context.command_path} --help"
-        output.error(message[:1].lower() + message[1:])
-        return int(getattr(error, "exit_code", USAGE))
+        code = int(getattr(error, "exit_code", USAGE))
+        output.error(message[:1].lower() + message[1:], "usage", code)
+        return code
     if os.environ.get("ARMKIN_TRACEBACK"):
         import traceback
 
         traceback.print_exc()
     output.error(
         f"internal error: {type(error).__name__}: {error}\n"
-        "this is a bug in armkin: please report it with the command line and ARMKIN_TRACEBACK=1's output"
+        "this is a bug in armkin: please report it with the command line and ARMKIN_TRACEBACK=1's output",
+        "internal",
+        RUNTIME,
     )
     return RUNTIME

@@ -60,7 +60,7 @@ def streamed_rows(source: str, names: Sequence[str], what: str) -> Iterator[tupl
             try:
                 row = _row(line, number, names, what)
             except UsageError as error:
-                raise UsageError(f"{_name(source)}: row {number}: {error}") from None
+                raise error.within(f"{_name(source)}: row {number}", row=number) from None
             if row is not None:
                 yield number, row
 
@@ -96,7 +96,10 @@ class Tally:
         if self.unsolved:
             raise NoSolutionError(
                 f"{self.unsolved} of {self.rows} rows have no branch within limits; "
-                f"the first is row {self.first_unsolved}"
+                f"the first is row {self.first_unsolved}",
+                rows=self.rows,
+                unsolved=self.unsolved,
+                row=self.first_unsolved,
             )
 
 
@@ -153,7 +156,8 @@ def _opened(source: str) -> Iterator[IO[bytes]]:
     try:
         file = open(source, "rb")  # noqa: SIM115
     except (OSError, ValueError) as error:
-        raise FileError(f"{source}: cannot read: {getattr(error, 'strerror', None) or error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{source}: cannot read: {reason}", file=source) from None
     with file:
         yield file
 
@@ -188,7 +192,7 @@ def _chunk(lines: list[bytes], first: int, names: Sequence[str], what: str, sour
         try:
             row = _row(line, number, names, what)
         except UsageError as error:
-            problem = UsageError(f"{_name(source)}: row {number}: {error}")
+            problem = error.within(f"{_name(source)}: row {number}", row=number)
             break
         if row is not None:
             index.append(number)

@@ -150,7 +150,9 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
         try:
             check_limits(arm, goal[None])
         except NoSolutionError as error:
-            raise NoSolutionError(f"row {rows[i]}: {error}" if rows else str(error)) from None
+            if rows:
+                raise error.within(f"row {rows[i]}", row=rows[i]) from None
+            raise
     return Goals(joints, rows)
 
 

@@ -22,10 +22,11 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     plain = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
     shown = text if len(text) <= 40 else text[:37] + "..."
     if not _NUMBER.fullmatch(plain):
-        raise UsageError(f"{name}: {_why_not(plain, shown)}")
+        raise UsageError(f"{name}: {_why_not(plain, shown)}", argument=name, value=shown)
     value = float(plain)
     if abs(value) > largest:
-        raise UsageError(f"{name}: '{shown}' is too large; numbers here go up to {largest:g}")
+        message = f"{name}: '{shown}' is too large; numbers here go up to {largest:g}"
+        raise UsageError(message, argument=name, value=shown, most=largest)
     return value
 
 
@@ -43,7 +44,10 @@ def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float
     if len(words) != len(names):
         raise UsageError(
             f"{what} takes {len(names)} number{'s' if len(names) != 1 else ''} ({' '.join(names)}), "
-            f"got {len(words)}{_separator_hint(words, names)}"
+            f"got {len(words)}{_separator_hint(words, names)}",
+            argument=what,
+            names=list(names),
+            got=len(words),
         )
     return [number(word, name) for word, name in zip(words, names, strict=True)]
 
@@ -67,7 +71,8 @@ def whole(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
     value = number(text, name, max(high, LARGEST))
     if value != int(value) or not low <= value <= high:
-        raise UsageError(f"{name}: '{text}' must be a whole number from {low} to {high}")
+        message = f"{name}: '{text}' must be a whole number from {low} to {high}"
+        raise UsageError(message, argument=name, value=text, least=low, most=high)
     return int(value)
 
 

@@ -1,14 +1,17 @@
 """Where things go: data to stdout or a file, messages to stderr, progress to a terminal only."""
 
+import math
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import TextIO
+from typing import Any, TextIO
 
 from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
+_COLOURS = {"note": "36", "warning": "33", "error": "31"}
+_waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
 
 
 @contextmanager
@@ -33,28 +36,83 @@ def spare(robot: str, out: str | None) -> None:
         raise UsageError(f"--out {out} is the robot file; give another name")
 
 
+def for_programs(wanted: bool) -> None:
+    """Begin a command. Under --json an error is one JSON object: notes and warnings wait, and go into it."""
+    global _waiting
+    _waiting = [] if wanted else None
+
+
 def warn(message: str) -> None:
     """Say something on stderr that does not change the exit code."""
-    _say("warning", "33", message)
+    _later("warning", message)
 
 
 def note(message: str) -> None:
     """Say something on stderr that is good to know."""
-    _say("note", "36", message)
+    _later("note", message)
 
 
-def error(message: str) -> None:
-    """Say on stderr why the command fails."""
-    _say("error", "31", message)
+def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | None = None, advice: str = "") -> None:
+    """Say on stderr why the command fails; under --json as one JSON object.
+
+    message: as people read it, with the advice in it; fields: what it is about.
+    """
+    if _waiting is None:
+        _say("error", message)
+        return
+    import json
+
+    found = {
+        "error": "\n".join(_plain(line) for line in message.splitlines()),
+        "kind": kind,
+        "exit_code": exit_code,
+        **(fields or {}),
+    }
+    if advice:
+        found["next"] = advice
+    for word in ("warning", "note"):
+        if said := [text for which, text in _waiting if which == word]:
+            found[f"{word}s"] = said
+    _waiting.clear()
+    _print(json.dumps(_plain_values(found)))
 
 
-def _say(word: str, colour: str, message: str) -> None:
+def flush() -> None:
+    """Say what has waited: the command had no error."""
+    for word, message in _waiting or ():
+        _say(word, message)
+    for_programs(False)
+
+
+def _later(word: str, message: str) -> None:
+    if _waiting is None:
+        _say(word, message)
+    else:
+        _waiting.append((word, message))
+
+
+def _plain_values(value: Any) -> Any:
+    """JSON has no infinity and no arrays of numpy's."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain_values(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain_values(part) for part in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def _say(word: str, message: str) -> None:
     if sys.stderr is None:
         return
-    head = f"\x1b[{colour}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
+    head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
     # A file's name may hold anything: two lines of printable text, whatever it is.
     lines = [_plain(line) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
+    _print(text)
+
+
+def _print(text: str) -> None:
     with suppress(OSError, UnicodeError):  # nobody listens: the exit code still tells
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
 

@@ -121,12 +121,13 @@ def unsolved(arm: Arm, answer: dict[str, Any], refused: str | None = None) -> No
     """
     nearest = answer["closest"]
     away = f"the nearest pose within limits is {nearest['distance_mm']:.4f} mm away"
+    fields = {"robot": arm.name, "status": answer["status"], "distance_mm": nearest["distance_mm"]}
     if answer["status"] == "unreachable":
-        return NoSolutionError(f"{arm.name} cannot reach this target; {away}")
+        return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
     if refused is not None:
         listed = "ik --all-branches lists all"
-        return NoSolutionError(f"{refused}; {listed if answer['branches_within_limits'] else away}")
-    return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}")
+        return NoSolutionError(f"{refused}; {listed if answer['branches_within_limits'] else away}", **fields)
+    return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}", **fields)
 
 
 def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:

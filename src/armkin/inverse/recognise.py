@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from armkin.errors import UsageError
+from armkin.errors import RedundantArmError, UsageError
 from armkin.inverse import general, nearly_special, tool_axis
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
@@ -31,20 +31,22 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     task = task_for(arm, task_name)
     if arm.n > task.constraints:
         surplus = arm.n - task.constraints
-        raise UsageError(
+        raise _redundant(
+            arm,
+            surplus,
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
-            f"{surplus} degree{'s' if surplus > 1 else ''} of freedom: fix {surplus} of "
-            f"{', '.join(arm.joint_names)} with --lock JOINT=VALUE, or try values with --sweep JOINT=LOW:HIGH:COUNT"
+            f"{surplus} degree{'s' if surplus > 1 else ''} of freedom",
         )
     effective = rank(arm, task, 1e-9)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         usual = default_task(arm)
-        fix = f"fix {arm.n - effective} of {', '.join(arm.joint_names)} with --lock JOINT=VALUE"
-        way_out = fix if usual in (None, task.name) else f"its usual task is {usual}"
-        raise UsageError(
+        problem = (
             f"{arm.name}: task {task.name} has {task.constraints} constraints, of which its {arm.n} joints can meet "
-            f"{effective} at a time:\nthere would be infinitely many solutions or none; {way_out}"
+            f"{effective} at a time:\nthere would be infinitely many solutions or none"
         )
+        if usual in (None, task.name):
+            raise _redundant(arm, arm.n - effective, problem)
+        raise UsageError(f"{problem}; its usual task is {usual}", robot=arm.name, task=task.name, usual_task=usual)
     for recognise in _CLASSES:
         geometry = recognise(arm, task)
         if geometry is not None:
@@ -52,8 +54,14 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     usual = default_task(arm)
     hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
     locked = arm.file is not None and len(arm.file.joints) > arm.n
-    joints = f"the {arm.n} joints left after --lock" if locked else f"its {arm.n} joints"
-    raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}")
+    joints = f"the {arm.n} joints that are not held" if locked else f"its {arm.n} joints"
+    raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}", robot=arm.name, task=task.name)
+
+
+def _redundant(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
+    names = list(arm.joint_names)
+    advice = f"hold {surplus} of {', '.join(names)} with armkin.lock(arm, {{joint: value}})"
+    return RedundantArmError(problem, advice=advice, robot=arm.name, joints=names, surplus=surplus)
 
 
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:

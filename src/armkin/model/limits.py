@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from armkin.model.units import DEGREE, limits_out
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -25,6 +27,13 @@ def outside(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
     """
     values = np.asarray(q, dtype=float)
     return (values < arm.lower - SLACK) | (values > arm.upper + SLACK)
+
+
+def fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
+    """The same as an error's fields: joint, value, lower, upper [deg | mm]; null where unlimited."""
+    unit = 1.0 if arm.prismatic[joint] else DEGREE
+    lower, upper = (end if math.isfinite(end) else None for end in limits_out(arm)[joint])
+    return {"joint": arm.joint_names[joint], "value": float(value) / unit, "lower": lower, "upper": upper}
 
 
 def said(arm: Arm, joint: int, value: float) -> str:

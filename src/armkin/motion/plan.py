@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.model.limits import outside, said
+from armkin.model.limits import fields, outside, said
 from armkin.motion.profile import at_rest, trapezoid
 from armkin.motion.trajectory import Straight, Trajectory
 from armkin.motors import motor_accel
@@ -111,4 +111,5 @@ def check_limits(arm: Arm, targets: Array) -> None:
         raise UsageError("joint values must be finite to be sent")
     for row, joint in np.argwhere(outside(arm, targets)):
         which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
-        raise NoSolutionError(f"{which}{said(arm, joint, targets[row, joint])}: nothing was moved")
+        value = targets[row, joint]
+        raise NoSolutionError(f"{which}{said(arm, joint, value)}: nothing was moved", **fields(arm, joint, value))

@@ -113,7 +113,7 @@ def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
         lines = sorted({line for line, _ in problems[1:]})
         places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
         message = f"{told[0]}\n{len(told) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
-    return RobotFileError(message, problems=list(told))
+    return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(told))
 
 
 def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:

@@ -29,7 +29,7 @@ Length = Annotated[float, Field(ge=-1e7, le=1e7)]
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres
 Rate = Annotated[float, Field(gt=0, le=1e6)]
 Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
-# A name may stand in `--lock J3=20` and in tables: no spaces, commas, colons or equal signs.
+# A name may stand in `J3=20` on the command line and in tables: no spaces, commas, colons or equal signs.
 Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
 # An int and not a Literal, which would take `true` for 1; 0 is for `checks` to find.
 Sign = Annotated[int, Field(ge=-1, le=1, json_schema_extra={"enum": [1, -1]})]
@@ -221,7 +221,7 @@ class Board(_Model):
 class Joint(_Model):
     """One joint, its place in the chain, its range and its motor."""
 
-    name: Name = Field(description="The joint's name in tables, messages and `--lock`.")
+    name: Name = Field(description="The joint's name in tables, in messages and on the command line.")
     type: JointType = Field("revolute", description="revolute (default) or prismatic.")
     dh: DH | None = Field(None, description="The DH row (conventions standard and modified).")
     screw: Screw | None = Field(None, description="The screw axis (convention screws).")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware import protocol
-from armkin.errors import UsageError
+from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock import joint_index
 from armkin.motors import pulses
 
@@ -66,9 +66,11 @@ def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) 
     wanted = [j for group in _groups(arm, wanted) for j in group]
     bare = [joints[j].name for j in wanted if joints[j].homing is None]
     if bare:
-        raise UsageError(
-            f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home "
-            "pose, and give --assume-home to the next send"
+        raise NoHomingError(
+            f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home pose",
+            advice="then Machine.prepare(assume_home=True)",
+            joints=bare,
+            file=arm.path,
         )
     orders = {j: joint.homing.order for j, joint in enumerate(joints) if joint.homing is not None}
     wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))

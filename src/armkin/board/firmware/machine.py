@@ -15,7 +15,8 @@ import numpy as np
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import Error, Flag, Segment, State, Status
 from armkin.board.firmware.session import DeviceError, Session
-from armkin.errors import LinkError
+from armkin.errors import LinkError, PositionKnownError, PositionLostError
+from armkin.model.units import joints_out
 from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
@@ -64,7 +65,10 @@ class Machine:
         if board != expected:
             raise LinkError(
                 f"{port.name} is another board than {arm.name}'s {configuration.board.kind} "
-                f"(board {board}, not {expected}): choose another --port, or correct board: in {arm.path}"
+                f"(board {board}, not {expected}): choose another port, or correct board: in {arm.path}",
+                port=port.name,
+                board=board,
+                expected=expected,
             )
         self.status = self.session.rest()  # a former session's motion ends first
         self._simulated = port.simulated
@@ -101,12 +105,14 @@ class Machine:
         """
         lost = self.position() == "lost"
         if assume_home and not lost:
-            raise LinkError(
-                f"the position is known ({self.describe()}): --assume-home is only for a lost one\n"
-                "leave it out: motion starts where the arm stands"
+            raise PositionKnownError(
+                f"the position is known ({self.describe()}), and only a lost one may be assumed\n"
+                "motion starts where the arm stands",
+                advice="leave assume_home out",
+                joints=joints_out(self.arm, self.joints()).tolist(),
             )
         if lost and not assume_home and not self._simulated:
-            raise LinkError(self._demand())
+            raise self._demand()
         if not self.configured:
             self.configure()
         if lost:
@@ -155,16 +161,22 @@ class Machine:
         config = self.configuration.image.crc() if self.status.flags & Flag.CONFIGURED else 0
         self.info = protocol.Info(**{**vars(self.info), "config": config, "known": self.status.known})
 
-    def _demand(self) -> str:
-        homing = self.arm.file is not None and all(joint.homing for joint in self.arm.file.joints)
-        how = f"armkin home {self.arm.path} --port {self.session.port.name}" if homing else "put it there"
+    def _demand(self) -> PositionLostError:
         what = "the arm's position is lost"
         if self.info.config and not self.configured:
             changed = f"{self.arm.path} has changed"
             what = f"the board is configured for another arm, or {changed}: its position is lost"
-        return (
-            f"{what}\n{how if homing else 'put the arm in its home pose'}"
-            f"{', or' if homing else ' and'} add --assume-home (the arm stands in its home pose)"
+        return self._lost(what)
+
+    def _lost(self, message: str) -> PositionLostError:
+        homing = self.arm.file is not None and all(joint.homing for joint in self.arm.file.joints)
+        put = "put the arm in its home pose and prepare(assume_home=True)"
+        return PositionLostError(
+            message,
+            advice=f"home it, or {put}" if homing else put,
+            robot_file=self.arm.path,
+            port=self.session.port.name,
+            homing=homing,
         )
 
     # Moving
@@ -304,12 +316,14 @@ class Machine:
                 self.status = self.session.status()
         except LinkError:
             return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
-        return LinkError(f"{why}\n{self.standing()}")
+        if self.position() == "lost":
+            return self._lost(f"{why}\n{self.standing()}")
+        return LinkError(f"{why}\n{self.standing()}", joints=joints_out(self.arm, self.joints()).tolist())
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         if self.position() == "lost":
-            return "the arm's position is lost: home it, or put it in its home pose and add --assume-home"
+            return "the arm's position is lost"
         return f"the arm stands at {self.describe()}, its position is known: the next command starts there"
 
     def _call(self, make: Callable[[int], bytes]) -> None:

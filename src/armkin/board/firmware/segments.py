@@ -228,7 +228,7 @@ def _spacing(ramp: _Trapezoid, a: int, b: int, cycles: float, clock: int, min_in
     over = max(over, math.ceil(1.6 * cycles / (_LONGEST * steps)))
     ticks = over * steps
     if ticks > 65535:
-        raise UsageError("this motion is slower than the device can time; choose a higher --speed")
+        raise UsageError("this motion is slower than the device can time; choose a higher speed")
     mean = cycles / ticks
     # Intervals at the two ends: right at the faster one, and at the other such that the time is right.
     fast = mean

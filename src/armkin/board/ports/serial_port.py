@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from armkin.board.ports.port import BAUD, SIM
-from armkin.errors import LinkError
+from armkin.errors import LinkError, PortInUseError
 
 _READ = 0.005  # [s] a read waits at most
 _MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
@@ -177,9 +177,8 @@ class _Lock:
         if not _try_lock(file):
             holder = _read_pid(file)
             file.close()
-            raise LinkError(
-                f"port {name} is in use by armkin (process {holder}): wait for it, or armkin stop --port {name}"
-            )
+            message = f"port {name} is in use by armkin (process {holder})"
+            raise PortInUseError(message, advice="wait for it", port=name, process=holder)
         file.seek(0)
         file.truncate()
         file.write(str(os.getpid()))

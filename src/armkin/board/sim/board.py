@@ -1,4 +1,4 @@
-"""A board in this process that speaks the firmware's bytes: `--port sim`, and the tests without hardware.
+"""A board in this process that speaks the firmware's bytes: port `sim`, and the tests without hardware.
 
 It is written from firmware/PROTOCOL.md and held to the same golden conversations as the firmware. Time is
 simulated: it passes in `advance`, so that a long move takes no longer than its arithmetic.

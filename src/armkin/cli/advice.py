@@ -1,0 +1,61 @@
+"""The next step after an error, in the command line's words.
+
+An error of the core says what is wrong, and what a program can do about it; somebody at a terminal has
+options and commands instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from armkin.errors import (
+    ArmkinError,
+    NoHomingError,
+    PortInUseError,
+    PositionKnownError,
+    PositionLostError,
+    RedundantArmError,
+)
+
+
+def next_step(error: ArmkinError) -> str:
+    """What to type next; empty if the message says it all.
+
+    >>> next_step(PortInUseError("in use", advice="wait for it", port="COM3", process=7))
+    'wait for it, or armkin stop --port COM3'
+    """
+    for kind, words in _WORDS.items():
+        if isinstance(error, kind):
+            return words(error)
+    return error.advice
+
+
+def message(error: ArmkinError) -> str:
+    """An error's message with its next step."""
+    step = next_step(error)
+    if not step:
+        return error.message
+    lines = error.message.count("\n") + 1
+    return f"{error.message}{': ' if lines > 1 or isinstance(error, _ONE_LINE) else chr(10)}{step}"
+
+
+def _redundant(error: ArmkinError) -> str:
+    joints = ", ".join(error.fields["joints"])
+    fix = f"fix {error.fields['surplus']} of {joints} with --lock JOINT=VALUE"
+    return f"{fix}, or try values with --sweep JOINT=LOW:HIGH:COUNT"
+
+
+def _lost(error: ArmkinError) -> str:
+    home = f"armkin home {error.fields['robot_file']} --port {error.fields['port']}"
+    assume = "add --assume-home (the arm stands in its home pose)"
+    return f"{home}, or {assume}" if error.fields["homing"] else f"put the arm in its home pose and {assume}"
+
+
+_ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError)
+_WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
+    RedundantArmError: _redundant,
+    NoHomingError: lambda error: "give --assume-home to the next send",
+    PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
+    PositionLostError: _lost,
+    PositionKnownError: lambda error: "leave --assume-home out",
+}

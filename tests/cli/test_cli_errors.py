@@ -1,0 +1,117 @@
+"""Errors for programs: one JSON object on stderr; the core knows no option."""
+
+from __future__ import annotations
+
+import ast
+import json
+import pickle
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armkin import errors
+from armkin.cli import advice
+from armkin.cli.app import load
+from armkin.cli.commands import COMMANDS
+from command_line import run
+
+SOURCE = Path(__file__).parents[2] / "src" / "armkin"
+DOF = "robots/three_dof.yaml"
+
+
+def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
+    """The error of a command line under --json, whose stdout must be empty."""
+    result = run(*words, "--json", stdin=stdin)
+    assert result.out == ""
+    found: dict[str, Any] = json.loads(result.err)
+    assert found["exit_code"] == result.code
+    return found
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (("fk", "nope"), {"kind": "file", "exit_code": 1, "file": "nope"}),
+        (("fk", DOF, 1, 2), {"kind": "usage", "exit_code": 2, "names": ["q1", "q2", "q3"], "got": 2}),
+        (("fk", DOF, 1, "x", 3), {"kind": "usage", "argument": "q2", "value": "x"}),
+        (("fk", DOF, 1, 2, 3, "--jsn"), {"kind": "usage", "exit_code": 2}),
+        (("fq",), {"kind": "usage", "exit_code": 2}),
+        (("ik", "panda", 1, 2, 3, 0, 0, 0), {"kind": "redundant_arm", "exit_code": 2, "surplus": 1}),
+        (("send", DOF, 0, 121, 0, "--port", "sim"), {"kind": "no_solution", "joint": "q2", "value": 121, "upper": 120}),
+        (("send", DOF, 0, 0, 0, "--port", "/no/port"), {"kind": "link", "exit_code": 5}),
+        (("fk", DOF, "--batch", "-", "--out", "/no/such/folder/x"), {"kind": "file", "exit_code": 1}),
+    ],
+)
+def test_an_error_is_one_object(words: tuple[object, ...], found: dict[str, Any]) -> None:
+    answer = failed(*words)
+    assert answer["error"]
+    assert {key: answer[key] for key in found} == found
+
+
+def test_an_invalid_robot_file_names_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text("name: bad\nconvention: standard\njoints: [{name: q1, dh: {alpha: 0, a: 1, d: 2}}]\nbored: 1\n")
+    answer = failed("info", path)
+    assert (answer["kind"], answer["exit_code"], answer["file"], answer["line"]) == ("robot_file", 4, str(path), 4)
+
+
+def test_a_row_is_named() -> None:
+    result = run("fk", DOF, "--batch", "-", "--json", stdin=b"1,2,3\n1,2\n")
+    assert result.code == 2
+    assert len(result.lines) == 1  # the complete rows before it stand
+    assert json.loads(result.err)["row"] == 2
+
+
+def test_without_a_solution_both_are_there() -> None:
+    result = run("ik", DOF, 900, 0, 0, "--json")
+    assert (result.code, result.json["best"]) == (3, None)
+    found = json.loads(result.err)
+    assert (found["kind"], found["status"]) == ("no_solution", "unreachable")
+    assert found["distance_mm"] == result.json["closest"]["distance_mm"]
+
+
+def test_notes_and_warnings_go_into_the_error() -> None:
+    result = run("ik", DOF, 0.5, 0, 0.3, "--json")
+    found = json.loads(result.err)
+    assert found["exit_code"] == 3
+    assert len(found["notes"]) == 1
+
+
+def test_without_an_error_notes_and_warnings_are_lines() -> None:
+    result = run("fk", DOF, 0, 130, 0, "--json")
+    assert result.code == 0
+    assert result.err.startswith("warning: q2 = 130 deg is outside")
+
+
+def test_errors_survive_pickling() -> None:
+    error = errors.RedundantArmError("too many", advice="hold one", joints=["J1"], surplus=1)
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.fields, again.advice) == ("too many: hold one", error.fields, "hold one")
+
+
+def test_a_program_reads_other_advice_than_a_terminal() -> None:
+    error = errors.RedundantArmError("7 joints", advice="hold 1 with armkin.lock", joints=["J1", "J2"], surplus=1)
+    assert str(error) == "7 joints: hold 1 with armkin.lock"
+    assert advice.message(error).startswith("7 joints: fix 1 of J1, J2 with --lock JOINT=VALUE")
+
+
+def test_every_kind_that_has_advice_is_raised_somewhere() -> None:
+    source = "".join(path.read_text() for path in SOURCE.rglob("*.py") if "cli" not in path.parts)
+    for kind in advice._WORDS:
+        assert re.search(rf"(raise|return) {kind.__name__}\(", source), kind
+
+
+def test_no_text_of_the_core_names_an_option() -> None:
+    options = {word for name in COMMANDS for p in load(name).params for word in p.opts if word.startswith("--")}
+    found = [
+        f"{path.relative_to(SOURCE)}:{node.lineno}: {word}"
+        for path in sorted(SOURCE.rglob("*.py"))
+        if path.relative_to(SOURCE).parts[0] != "cli"
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        for word in re.findall(r"(?<![\w-])--[a-z][a-z-]*", node.value)
+        if word in options
+    ]
+    assert not found
