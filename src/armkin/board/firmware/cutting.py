@@ -29,11 +29,7 @@ if TYPE_CHECKING:
 
 
 class RateError(UsageError):
-    """A motor is asked for more than the board makes; `share` is what the board makes of it."""
-
-    def __init__(self, message: str, share: float) -> None:
-        super().__init__(message)
-        self.share = share
+    """A motor is asked for more than the board makes; fields: share, what the board makes of it."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +125,8 @@ def plan(
     try:
         return cut(trajectory, start, clock=clock, min_interval=min_interval)
     except RateError as error:
-        percent = math.floor(100 * speed * error.share)
-        raise RateError(f"{error}\nlower its max_speed, or send with --speed {percent}", error.share) from None
+        percent = math.floor(100 * speed * error.fields["share"])
+        raise RateError(f"{error}\nlower its max_speed, or the speed to {percent} percent", **error.fields) from None
 
 
 def _rates(stretch: Stretch, start: Counts, end: Counts) -> Array:
@@ -147,5 +143,9 @@ def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateE
     return RateError(
         f"joint {arm.joint_names[joint]} at {top[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
         f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}",
-        allowed / float(rates[k]),
+        joint=arm.joint_names[joint],
+        motor=motor_names(arm)[k],
+        rate=float(rates[k]),
+        most=allowed,
+        share=allowed / float(rates[k]),
     )

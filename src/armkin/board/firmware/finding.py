@@ -1,4 +1,4 @@
-"""The boards that are plugged in and answer: what a command without --port speaks to."""
+"""The boards that are plugged in and answer: what a command speaks to that names no port."""
 
 from __future__ import annotations
 
