@@ -221,13 +221,17 @@ def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     return exact, _HALF + 4 * np.finfo(float).eps * size
 
 
+def undriven(arm: Arm) -> list[str]:
+    """Names of the joints that no motor turns."""
+    return [name for name, column in zip(arm.joint_names, arm.motor_gain.T, strict=True) if not column.any()]
+
+
 def joints_per_pulse(arm: Arm) -> Array:
     """How far a pulse of each motor moves each joint: (n, motors) [rad | mm].
 
     Raises UsageError if the motors do not determine the joints.
     """
-    gain = arm.motor_gain
-    still = [name for name, column in zip(arm.joint_names, gain.T, strict=True) if not column.any()]
+    gain, still = arm.motor_gain, undriven(arm)
     if len(still) == arm.n:
         raise UsageError(f"{arm.name} has no drives; add drive: to its joints, or motors:")
     if still:

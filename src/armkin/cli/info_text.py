@@ -32,6 +32,7 @@ def text(answer: dict[str, Any]) -> str:
         _matrix(answer),
         _hardware(answer),
         _solver(answer),
+        _lacks(answer["lacks"]),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -205,4 +206,17 @@ def _solver(answer: dict[str, Any]) -> str:
         lines.append(wrapped(f"{solver['method']} ({solver['why']}): {sure}", "  ik       ", " " * 11))
     if answer["ik_refuses"]:
         lines.append(wrapped(answer["ik_refuses"], "  ik       ", " " * 11))
+    return "\n".join(lines)
+
+
+def _lacks(lacks: dict[str, list[str]]) -> str:
+    """What the commands that move the arm still need; what needs nothing is said to be ready."""
+    send = [words for words in lacks["send"] if words not in lacks["simulate"]]
+    rows = {"pulses": lacks["pulses"], "simulate": lacks["simulate"], "send": send}
+    rows["home"] = [words for words in lacks["home"] if words not in lacks["send"]]
+    lines = []
+    for name, words in rows.items():
+        more = ["the same"] if name in ("send", "home") and lacks["simulate" if name == "send" else "send"] else []
+        text = f"not yet: {'; '.join(more + words)}" if more or words else "ready"
+        lines.append(wrapped(text, f"  {name:9}", " " * 11))
     return "\n".join(lines)

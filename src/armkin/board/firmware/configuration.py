@@ -18,7 +18,7 @@ from armkin.board.firmware.protocol import AxisImage, Image, RowImage
 from armkin.errors import UsageError
 from armkin.hardware import BOARDS, DRIVERS, Board, Driver
 from armkin.motion.plan import missing_rates, rate_lines
-from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses
+from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses, undriven
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -140,7 +140,14 @@ def _without_rates(arm: Arm) -> list[Lack]:
     try:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
-        lacks.append((str(error), ["drive: {...}   # to every joint, or motors: (armkin schema shows the keys)"]))
+        still = undriven(arm)
+        which = f"joint{'s' * (len(still) > 1)} {', '.join(still)} ha{'ve' if len(still) > 1 else 's'} no drive"
+        lacks.append(
+            (
+                which if still else str(error),
+                ["drive: {...}   # to every joint, or motors: (armkin schema shows the keys)"],
+            )
+        )
     absent = missing_rates(arm)
     for key, names in absent.items():
         lacks.append(

@@ -15,6 +15,7 @@ COMMANDS = {
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "plot": "A picture of the arm.",
     "teach": "A page in the browser: see the arm, choose a branch.",
+    "robots": "The robots that come with armkin, and what each can do.",
     "info": "What a robot file says, checked.",
     "export": "The arm in other words: C99.",
     "schema": "JSON Schema of robot files, for editors.",

@@ -18,7 +18,7 @@ def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = Non
     """What a robot file says, checked.
 
     DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the
-    task of `armkin ik` with its target's numbers, and how it is solved.
+    task of `armkin ik` with its target's numbers, how it is solved, and what pulses, send and home still need.
     """
     arm = inputs.load(robot)
     answer = _answer(arm, task)
@@ -32,6 +32,8 @@ def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = Non
 
 
 def _answer(arm: Arm, task: str | None) -> dict[str, Any]:
+    from armkin.board.firmware.needs import needs
+
     file = arm.file
     assert file is not None  # it was read from one
     motors = [_motor(motor, file) for motor in file.motor_list()]
@@ -54,6 +56,7 @@ def _answer(arm: Arm, task: str | None) -> dict[str, Any]:
         "resolution": _resolution(arm),
         "gripper": None if file.gripper is None else file.gripper.model_dump(exclude_none=True),
         "board": None if file.board is None else file.board.model_dump(exclude_none=True),
+        "lacks": needs(arm),
     }
 
 

@@ -1,0 +1,67 @@
+"""`armkin robots`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from armkin.cli import output, render
+from armkin.cli.options import Json, Out
+
+_CAN = ("ik", "pulses", "simulate", "send", "home")
+
+
+def robots(json: Json = False, out: Out = None) -> None:
+    """The robots that come with armkin, and what each can do.
+
+    Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run` and
+    `--port sim`. `armkin info ROBOT` says what is missing for the rest.
+    """
+    from armkin.robot_file import catalogue
+
+    found = [_entry(name) for name in catalogue.names()]
+    with output.destination(out) as write:
+        write(render.to_json({"robots": found}) + "\n" if json else _text(found))
+
+
+def _entry(name: str) -> dict[str, Any]:
+    import armkin
+    from armkin.board.firmware.needs import needs
+
+    arm = armkin.load(name)
+    task, labels, refused = _task(arm)
+    lacks = needs(arm)
+    return {
+        **render.head(arm),
+        "description": "" if arm.file is None else arm.file.description,
+        "joints": list(arm.joint_names),
+        "joint_types": ["prismatic" if sliding else "revolute" for sliding in arm.prismatic],
+        "task": task,
+        "target_labels": labels,
+        "can": {"ik": not refused, **{what: not lacks[what] for what in _CAN[1:]}},
+        "lacks": {"ik": refused, **lacks},
+    }
+
+
+def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
+    """The task with its target's numbers, and why `armkin ik` refuses it."""
+    from armkin.errors import UsageError
+    from armkin.inverse.tasks.fitting import task_for
+
+    try:
+        task = task_for(arm)
+    except UsageError as error:
+        return None, [], [str(error)]
+    # More joints than the target has numbers: `--lock` or `--sweep` must hold some.
+    free = arm.n - task.constraints
+    return task.name, list(task.labels), [f"hold {free} joint{'s' * (free > 1)} with --lock"] if free > 0 else []
+
+
+def _text(found: list[dict[str, Any]]) -> str:
+    rows = [["robot", "joints", "task", "target", *_CAN]]
+    for entry in found:
+        kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])
+        marks = ["yes" if entry["can"][what] else "-" for what in _CAN]
+        if entry["task"] is not None and not entry["can"]["ik"]:
+            marks[0] = "--lock"
+        rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks])
+    return render.table(rows, left=range(9), indent="") + "\n"
