@@ -47,6 +47,8 @@ class Command(TyperCommand):
             if parameter.param_type_name == "option" and not getattr(parameter, "is_flag", False)
             for name in parameter.opts
         ]
+        if ctx.resilient_parsing and args and args[-1] in takes_value:
+            args = args[:-1]  # Tab was pressed for its value
         return super().parse_args(ctx, options_first(args, takes_value))
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
@@ -90,6 +92,8 @@ class Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
         name = args[0]
+        if name not in COMMANDS and ctx.resilient_parsing:  # Tab was pressed: no command, no complaint
+            return name, None, args[1:]
         if name not in COMMANDS:
             close = get_close_matches(name.lower(), COMMANDS, 1)
             hint = f"did you mean {close[0]}?" if close else "armkin --help lists them"
@@ -105,7 +109,7 @@ def load(name: str) -> Any:
     return typer.main.get_command(single)
 
 
-app = typer.Typer(cls=Commands, add_completion=False, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")
+app = typer.Typer(cls=Commands, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")
 
 
 def _version(wanted: bool) -> None:

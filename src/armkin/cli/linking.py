@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import output, render
+from armkin.cli import completion, output, render
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -26,6 +26,7 @@ PortName = Annotated[
         metavar="PORT",
         envvar="ARMKIN_PORT",
         show_envvar=False,
+        autocompletion=completion.ports,
         help="Device, COM port, pyserial URL, or sim: a board in this process. "
         "[default: ARMKIN_PORT, else the only board that answers]",
     ),

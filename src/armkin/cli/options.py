@@ -4,10 +4,23 @@ from typing import Annotated
 
 import typer
 
-Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="Robot file, or the name of a shipped robot: three_dof.")]
+from armkin.cli import completion
+
+Robot = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="Robot file, or the name of a shipped robot: three_dof.",
+        autocompletion=completion.robots,
+    ),
+]
 Joints = Annotated[
     list[str] | None,
-    typer.Argument(metavar="Q...", help="Joint values in degrees (prismatic joints: mm), or a pose's name: home, ..."),
+    typer.Argument(
+        metavar="Q...",
+        help="Joint values in degrees (prismatic joints: mm), or a pose's name: home, ...",
+        autocompletion=completion.poses,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
 JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]
@@ -30,18 +43,38 @@ Target = Annotated[
 AllBranches = Annotated[bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")]
 Near = Annotated[
     str | None,
-    typer.Option("--near", metavar="Q,...", help="Joint values to stay close to. [default: the home pose]"),
+    typer.Option("--near", metavar="Q,...", help="Joint values (or a pose) to stay close to. [default: the home pose]"),
 ]
 BranchName = Annotated[
     str | None,
-    typer.Option("--branch", metavar="NAME", help="The branch of that name, for example 'left, elbow up'."),
+    typer.Option(
+        "--branch",
+        metavar="NAME",
+        help="The branch of that name, for example 'left, elbow up'.",
+        autocompletion=completion.branches,
+    ),
 ]
 TaskName = Annotated[
     str | None,
-    typer.Option("--task", metavar="TASK", help="What the target prescribes. [default: the robot file's]"),
+    typer.Option(
+        "--task",
+        metavar="TASK",
+        help="What the target prescribes. [default: the robot file's]",
+        autocompletion=completion.tasks,
+    ),
 ]
-Lock = Annotated[list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.")]
+Lock = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.", autocompletion=completion.assignments
+    ),
+]
 Sweep = Annotated[
     list[str] | None,
-    typer.Option("--sweep", metavar="JOINT=LOW:HIGH:COUNT", help="Try a joint at several values. Repeatable."),
+    typer.Option(
+        "--sweep",
+        metavar="JOINT=LOW:HIGH:COUNT",
+        help="Try a joint at several values. Repeatable.",
+        autocompletion=completion.assignments,
+    ),
 ]

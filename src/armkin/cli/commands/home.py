@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
+from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
 from armkin.cli.options import Json, Robot
 
@@ -15,7 +15,10 @@ def home(
     robot: Robot,
     port: PortName = None,
     joints: Annotated[
-        list[str] | None, typer.Argument(metavar="[JOINT...]", help="These joints only. [default: all]")
+        list[str] | None,
+        typer.Argument(
+            metavar="[JOINT...]", help="These joints only. [default: all]", autocompletion=completion.joints
+        ),
     ] = None,
     baud: Baud = linking.BAUD,
     json: Json = False,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
+from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Robot
@@ -23,7 +23,7 @@ _LONGEST = 60.0  # [s]
 
 def jog(
     robot: Robot,
-    joint: Annotated[str, typer.Argument(metavar="JOINT", help="The joint's name.")],
+    joint: Annotated[str, typer.Argument(metavar="JOINT", help="The joint's name.", autocompletion=completion.joints)],
     speed: Annotated[str, typer.Argument(metavar="SPEED", help="In deg/s (prismatic joints: mm/s), signed.")],
     port: PortName = None,
     seconds: Annotated[str, typer.Option("--seconds", metavar="S", help="How long; Ctrl-C ends it earlier.")] = "0.5",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
+from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import Goals, Stream
 from armkin.cli.goals import goals as read_goals
@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 
 def send(
     robot: Annotated[
-        str | None, typer.Argument(metavar="[ROBOT]", help="Robot file; a piped answer names its own.")
+        str | None,
+        typer.Argument(
+            metavar="[ROBOT]",
+            help="Robot file or name; a piped answer names its own.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     q: Joints = None,
     port: PortName = None,
