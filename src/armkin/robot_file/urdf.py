@@ -1,0 +1,224 @@
+"""URDF, the robot description of ROS, read as a robot file with screws.
+
+Of a URDF a chain needs the joints' types, origins, axes, limits and speeds, and which link hangs on which.
+All else (meshes, inertias, transmissions, dynamics, effort) is left out, no other file is opened, and XML's
+own dangers (entities, DTDs, deep nesting, size) are errors. The format: http://wiki.ros.org/urdf/XML.
+
+A joint's origin and axis in the base frame, when all joints are 0, are its screw: nothing is fitted or rounded
+beyond 1e-12 mm.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.errors import FileError, RobotFileError
+from armkin.robot_file.urdf_document import Joint, Tree, document, is_xacro
+from armkin.robot_file.writing import pose, tidy
+
+MAX_BYTES = 8 * 2**20
+SNAP = 1e-4  # [rad] an angle this close to a right angle counts as one, with `snap`
+METRE = 1000.0  # [mm]
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_MOVING = ("revolute", "continuous", "prismatic")
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A robot file's keys and values, and what a reader of the result should know."""
+
+    data: dict[str, Any]
+    notes: tuple[str, ...]
+    base: str
+    tip: str
+
+
+def read(
+    path: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None, snap: bool = False
+) -> Imported:
+    """Read a URDF file; see `parse`. Raises FileError if it cannot be read."""
+    name = os.fspath(path)
+    try:
+        with Path(name).open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(f"{name}: cannot read the URDF: {reason}") from None
+    return parse(raw, name, base=base, tip=tip, snap=snap)
+
+
+def parse(
+    raw: bytes, name: str = "robot.urdf", *, base: str | None = None, tip: str | None = None, snap: bool = False
+) -> Imported:
+    """The chain from link `base` to link `tip` as a robot file with convention screws.
+
+    base: by default the link without a parent; tip: by default the one link in which the chain can end.
+    snap: angles within 1e-4 rad of a right angle become right angles. Raises RobotFileError for what is no
+    URDF of an arm, UsageError where base or tip must be chosen.
+    """
+    if len(raw) > MAX_BYTES:
+        raise RobotFileError(f"{name}: larger than {MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
+    robot, links, joints = document(raw, name)
+    tree = Tree(name, links, joints)
+    first = tree.base(base)
+    chain = tree.chain(first, tree.tip(first, tip))
+    return _robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
+
+
+def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> Imported:
+    """The chain as a robot file."""
+    if "${" in "".join(str(joint.parts) for joint in chain):
+        raise is_xacro(path)
+    T = np.eye(4)
+    joints: list[dict[str, Any]] = []
+    notes: list[str] = []
+    names = _names([joint.name for joint in chain if joint.kind != "fixed"], notes)
+    for joint in chain:
+        where = f"{path}: joint {joint.name}"
+        T = T @ _origin(joint, where, snap)
+        if joint.kind == "fixed":
+            continue
+        if joint.kind not in _MOVING:
+            kinds = "revolute, continuous, prismatic and fixed can be read"
+            raise RobotFileError(f"{where}: type {joint.kind or 'is missing'}; {kinds}")
+        if "mimic" in joint.parts:
+            leader = joint.text("mimic", "joint") or "another joint"
+            raise RobotFileError(
+                f"{where}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
+                "choose another tip"
+            )
+        direction = T[:3, :3] @ _axis(joint, where, snap)
+        joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
+    if not joints:
+        raise RobotFileError(f"{path}: no joint moves between {base} and {tip}; choose another base or tip")
+    if len(joints) > 12:
+        raise RobotFileError(f"{path}: {len(joints)} joints between {base} and {tip}; a robot file has at most 12")
+    T[:3, 3] *= METRE
+    title = re.sub(r"[^\x20-\x7e]+", " ", robot).strip()[:80] or "arm"
+    data = {
+        "name": title,
+        "source": f"{os.path.basename(path)}: URDF of {title}, from link {base} to link {tip}"
+        + (", right angles snapped" if snap else ""),
+        "convention": "screws",
+        "zero_pose": pose(T.tolist()),
+        "joints": joints,
+    }
+    return Imported(data, tuple(notes), base, tip)
+
+
+def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str, notes: list[str]) -> dict[str, Any]:
+    """A joint of the robot file: screw, limits, home and speed."""
+    slides = joint.kind == "prismatic"
+    unit, size = ("mm", METRE) if slides else ("deg", 180.0 / math.pi)
+    vector = [tidy(x, 15) for x in direction.tolist()]
+    entry: dict[str, Any] = {"name": name}
+    if slides:
+        entry |= {"type": "prismatic", "screw": {"w": [0, 0, 0], "v": vector}}
+    else:
+        entry["screw"] = {"w": vector, "q": [tidy(x * METRE, 12) for x in point.tolist()]}
+    lower, upper = (_value(joint, key, where) for key in ("lower", "upper"))
+    if joint.kind != "continuous" and "limit" in joint.parts:
+        low, high = (tidy((value or 0.0) * size, 9) for value in (lower, upper))
+        if low > high:
+            raise RobotFileError(f"{where}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
+        if low == high == 0:
+            notes.append(f"joint {name} has limits 0 and 0: read as no limits")
+        elif low == high:
+            raise RobotFileError(f"{where}: both limits are {low:g} {unit}; a joint that never moves is fixed")
+        else:
+            entry["limits"] = [low, high]
+            if not low <= 0 <= high:
+                entry["home"] = tidy((low + high) / 2, 9)
+                notes.append(f"joint {name} has 0 outside its limits: home is their middle, {entry['home']:g} {unit}")
+    elif joint.kind != "continuous":
+        notes.append(f"joint {name} has no <limit>: read as no limits")
+    speed = _value(joint, "velocity", where) or 0.0
+    if speed < 0:
+        raise RobotFileError(f"{where}: velocity {speed:g} is negative")
+    if 0 < speed * size <= 1e6:
+        entry["max_speed"] = tidy(speed * size, 9)
+    return entry
+
+
+def _names(joints: list[str], notes: list[str]) -> dict[str, str]:
+    """Joint names as a robot file takes them: no spaces, slashes or colons, 32 characters, all different."""
+    taken: dict[str, str] = {}
+    for name in joints:
+        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:32]
+        plain = plain if re.match(r"[A-Za-z_]", plain) else f"_{plain}"[:32]
+        number = 2
+        while plain in taken.values():
+            plain, number = f"{plain[:29]}_{number}", number + 1
+        if plain != name:
+            notes.append(f"joint {name[:60]} is named {plain}")
+        taken[name] = plain
+    return taken
+
+
+def _origin(joint: Joint, where: str, snap: bool) -> Matrix:
+    """Where the joint stands in its parent link [m]."""
+    xyz = _triple(joint.text("origin", "xyz"), (0.0, 0.0, 0.0), f"{where}: origin xyz")
+    rpy = _triple(joint.text("origin", "rpy"), (0.0, 0.0, 0.0), f"{where}: origin rpy")
+    if max(map(abs, xyz)) > 1e4:
+        raise RobotFileError(f"{where}: origin xyz is more than 10 km; a URDF is in metres")
+    (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
+            [-sp, cp * sr, cp * cr, xyz[2]],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _cos_sin(angle: float, snap: bool) -> tuple[float, float]:
+    quarter = round(angle / (math.pi / 2))
+    if abs(angle - quarter * (math.pi / 2)) <= (SNAP if snap else 0.0):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def _axis(joint: Joint, where: str, snap: bool) -> Matrix:
+    """The joint's direction in its own frame, of length 1; by default x, as the format says."""
+    axis = np.array(_triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{where}: axis xyz"))
+    length = float(np.linalg.norm(axis))
+    if not 1e-12 < length < 1e12:
+        raise RobotFileError(f"{where}: axis {' '.join(f'{x:g}' for x in axis)} has no direction")
+    axis = axis / length
+    largest = int(np.argmax(np.abs(axis)))
+    if snap and np.abs(np.delete(axis, largest)).max() <= SNAP:
+        axis = np.eye(3)[largest] * np.sign(axis[largest])
+    return np.asarray(axis)
+
+
+def _value(joint: Joint, key: str, where: str) -> float | None:
+    text = joint.text("limit", key)
+    return None if text is None else _floats(text, 1, f"{where}: limit {key}")[0]
+
+
+def _triple(text: str | None, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+    return default if text is None else _floats(text, 3, where)
+
+
+def _floats(text: str, count: int, where: str) -> tuple[float, ...]:
+    """So many finite numbers, separated by blanks."""
+    words = text.split()
+    if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
+        many = "a number" if count == 1 else f"{count} numbers"
+        raise RobotFileError(f"{where}: '{text[:60]}' is not {many}")
+    values = tuple(float(word) for word in words)
+    if not all(math.isfinite(value) for value in values):
+        raise RobotFileError(f"{where}: '{text[:60]}' is not finite")
+    return values

@@ -1,0 +1,218 @@
+"""The XML of a URDF: its links and joints, and the tree that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from armkin.errors import MissingExtraError, RobotFileError, UsageError
+
+MAX_DEPTH = 50
+MAX_LINKS = 2_000
+
+_FORMATS = {"sdf": "an SDF file", "mujoco": "a MuJoCo file", "COLLADA": "a mesh", "gazebo": "a Gazebo file"}
+
+
+@dataclass
+class Joint:
+    """A <joint> as it stands in the file."""
+
+    name: str
+    kind: str
+    parts: dict[str, dict[str, str]] = field(default_factory=dict)  # tag -> attributes
+
+    def text(self, tag: str, attribute: str) -> str | None:
+        """An attribute of one of the joint's elements, or None."""
+        return self.parts.get(tag, {}).get(attribute)
+
+
+class _Reader:
+    """The XML parser's listener: keeps the links' names and the joints, and the depth in bounds."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.depth, self.robot = name, 0, ""
+        self.links: dict[str, None] = {}
+        self.joints: dict[str, Joint] = {}
+        self.joint: Joint | None = None
+
+    def start(self, tag: str, attributes: Mapping[str, str]) -> None:
+        self.depth += 1
+        if "xacro" in tag:
+            raise is_xacro(self.name)
+        if self.depth > MAX_DEPTH:
+            raise RobotFileError(f"{self.name}: elements nested deeper than {MAX_DEPTH}; a URDF has about 5")
+        if self.depth == 1 and tag != "robot":
+            what = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
+            raise RobotFileError(f"{self.name}: is not a URDF but {what}; a URDF begins with <robot name=...>")
+        if self.depth == 1:
+            self.robot = attributes.get("name", "")
+        elif self.depth == 2 and tag in ("link", "joint"):
+            self._named(tag, attributes)
+        elif self.depth == 3 and self.joint is not None:
+            self.joint.parts.setdefault(tag, dict(attributes))
+
+    def _named(self, tag: str, attributes: Mapping[str, str]) -> None:
+        name = attributes.get("name")
+        if not name:
+            raise RobotFileError(f"{self.name}: a <{tag}> has no name")
+        known: Mapping[str, object] = self.links if tag == "link" else self.joints
+        if name in known:
+            raise RobotFileError(f"{self.name}: two {tag}s are named {name}; the names of {tag}s are unique")
+        if len(known) >= MAX_LINKS:
+            raise RobotFileError(f"{self.name}: more than {MAX_LINKS} {tag}s")
+        if tag == "link":
+            self.links[name] = None
+        else:
+            self.joint = self.joints[name] = Joint(name, attributes.get("type", ""))
+
+    def end(self, tag: str) -> None:
+        if self.depth == 2:
+            self.joint = None
+        self.depth -= 1
+
+    def data(self, text: str) -> None:
+        """Text between elements means nothing in a URDF."""
+
+    def close(self) -> None:
+        """The document has ended."""
+
+
+def document(raw: bytes, name: str) -> tuple[str, list[str], list[Joint]]:
+    """The robot's name, its links and its joints."""
+    try:
+        from defusedxml.common import DefusedXmlException
+        from defusedxml.ElementTree import DefusedXMLParser, ParseError
+    except ImportError:
+        raise MissingExtraError("reading a URDF needs defusedxml: pip install 'armkin[urdf]'") from None
+    reader = _Reader(name)
+    parser = DefusedXMLParser(target=reader, forbid_dtd=True)
+    try:
+        parser.feed(raw)
+        parser.close()
+    except DefusedXmlException:
+        raise RobotFileError(f"{name}: has a DTD or entities, which no URDF needs; remove <!DOCTYPE ...>") from None
+    except (ParseError, ValueError, LookupError) as error:
+        if isinstance(error, UsageError):
+            raise
+        if b"xmlns:xacro" in raw[:10_000] or name.endswith(".xacro"):
+            raise is_xacro(name) from None
+        raise RobotFileError(f"{name}: is not XML: {error}") from None
+    return reader.robot, list(reader.links), list(reader.joints.values())
+
+
+def is_xacro(name: str) -> RobotFileError:
+    return RobotFileError(
+        f"{name}: is a xacro, a template of a URDF; make the URDF first:\n"
+        "`xacro FILE > arm.urdf` (ROS) or `pip install xacrodoc; xacrodoc FILE -o arm.urdf`"
+    )
+
+
+class Tree:
+    """Which link hangs on which, checked: every link has one parent at most, and there is no circle."""
+
+    def __init__(self, name: str, links: list[str], joints: list[Joint]) -> None:
+        self.name, self.links = name, links
+        self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
+        self.children: dict[str, list[Joint]] = {link: [] for link in links}
+        for joint in joints:
+            parent, child = joint.text("parent", "link"), joint.text("child", "link")
+            for what, link in (("parent", parent), ("child", child)):
+                if link is None:
+                    raise RobotFileError(f"{name}: joint {joint.name}: has no <{what} link=...>")
+                if link not in self.children:
+                    raise RobotFileError(f"{name}: joint {joint.name}: there is no {what} link {link}")
+            assert parent is not None
+            assert child is not None
+            if child in self.parent:
+                first = self.parent[child].name
+                raise RobotFileError(
+                    f"{name}: link {child} hangs on two joints, {first} and {joint.name}; a URDF is a tree, "
+                    "a closed linkage cannot be read"
+                )
+            self.parent[child] = joint
+            self.children[parent].append(joint)
+        for link in links:
+            seen = {link}
+            while link in self.parent:
+                link = str(self.parent[link].text("parent", "link"))
+                if link in seen:
+                    raise RobotFileError(
+                        f"{name}: link {link} hangs on itself by way of others: the joints are a circle"
+                    )
+                seen.add(link)
+                if len(seen) > 200:
+                    raise RobotFileError(f"{name}: a chain of more than 200 links")
+
+    def base(self, wanted: str | None) -> str:
+        """The link that the chain begins with."""
+        if wanted is not None:
+            return self._known(wanted, "base")
+        roots = [link for link in self.links if link not in self.parent and self.children[link]]
+        if len(roots) != 1:
+            what = f"several links have no parent: {listed(roots)}" if roots else "no link carries another"
+            if not roots:
+                raise RobotFileError(f"{self.name}: {what}; there is no chain")
+            raise UsageError(f"{self.name}: {what}; the base must be named")
+        return roots[0]
+
+    def tip(self, base: str, wanted: str | None) -> str:
+        """The link that the chain ends with: the only leaf that moves, or the one asked for."""
+        if wanted is not None:
+            link = self._known(wanted, "tip")
+            while link != base and link in self.parent:
+                link = str(self.parent[link].text("parent", "link"))
+            if link != base:
+                raise UsageError(f"{self.name}: tip {wanted} does not hang on base {base}")
+            return wanted
+        leaves = [(self.moving(base, link), link) for link in self.leaves(base)]
+        moving = [link for count, link in leaves if count]
+        if not moving:
+            raise RobotFileError(f"{self.name}: no joint moves between {base} and its ends; there is no arm")
+        if len(moving) > 1:
+            several = list(dict.fromkeys([*self._shared_body(base, moving), *moving]))
+            raise UsageError(
+                f"{self.name}: the arm has several ends, and which is its tip is not said; "
+                f"the tip must be named: {listed(several)}"
+            )
+        return moving[0]
+
+    def leaves(self, base: str) -> list[str]:
+        """Links below base that carry none."""
+        found, stack = [], [base]
+        while stack:
+            link = stack.pop()
+            below = [str(joint.text("child", "link")) for joint in self.children[link]]
+            stack += below
+            if not below:
+                found.append(link)
+        return sorted(found, key=self.links.index)
+
+    def moving(self, base: str, link: str) -> int:
+        """How many moving joints lie between base and a link."""
+        return sum(joint.kind != "fixed" for joint in self.chain(base, link))
+
+    def _shared_body(self, base: str, links: list[str]) -> list[str]:
+        """The links of the last moving body that all these links hang on; [] if that is the base."""
+        ways = [self.chain(base, link) for link in links]
+        common = [joint for joint in ways[0] if all(joint in way for way in ways) and joint.kind != "fixed"]
+        body = [str(joint.text("child", "link")) for joint in common[-1:]]
+        for link in body:
+            body += [str(joint.text("child", "link")) for joint in self.children[link] if joint.kind == "fixed"]
+        return body
+
+    def chain(self, base: str, tip: str) -> list[Joint]:
+        """The joints from base to tip."""
+        joints: list[Joint] = []
+        while tip != base:
+            joints.append(self.parent[tip])
+            tip = str(joints[-1].text("parent", "link"))
+        return joints[::-1]
+
+    def _known(self, link: str, what: str) -> str:
+        if link not in self.children:
+            raise UsageError(f"{self.name}: there is no link {link} for the {what}; the links are {listed(self.links)}")
+        return link
+
+
+def listed(names: list[str]) -> str:
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

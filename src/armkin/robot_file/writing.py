@@ -1,0 +1,93 @@
+"""Robot files as text: what `read` reads back to the last bit.
+
+Numbers are written without exponents (``1e-05`` is text to YAML 1.1) and with all their digits; a pose is
+written as xyz and roll, pitch, yaw from which its matrix comes back to rounding.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
+from typing import Any
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", "none", "nan", "inf"}
+
+
+def number(value: float) -> str:
+    """The shortest decimal number that reads back as this float, without an exponent.
+
+    >>> number(1e-05), number(90.0), number(-0.0)
+    ('0.00001', '90', '0')
+    """
+    if value == 0:
+        return "0"
+    text = format(Decimal(repr(float(value))), "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def text(data: Mapping[str, Any], comments: Iterable[str] = ()) -> str:
+    """A robot file's text from its keys and values, comments first.
+
+    >>> print(text({"name": "a", "joints": [{"name": "q1", "limits": (-90.0, 90.0)}]}, ["made by hand"]), end="")
+    # made by hand
+    name: a
+    joints:
+      - name: q1
+        limits: [-90, 90]
+    """
+    lines = [f"# {line}" for comment in comments for line in comment.splitlines()]
+    for key, value in data.items():
+        if isinstance(value, Mapping) or not _is_list_of_mappings(value):
+            lines.append(f"{key}: {_flow(value)}")
+            continue
+        lines.append(f"{key}:")
+        for item in value:
+            entries = [f"{k}: {_flow(v)}" for k, v in item.items()]
+            lines += [f"  {'-' if i == 0 else ' '} {entry}" for i, entry in enumerate(entries)]
+    return "\n".join(lines) + "\n"
+
+
+def pose(T: Sequence[Sequence[float]]) -> dict[str, list[float]]:
+    """A rigid transform [mm] as ``{xyz, rpy}`` in mm and degrees; its rotation comes back to 1e-15.
+
+    The yaw is taken first and turned back, so that roll and pitch stay sharp where the pitch is a quarter turn.
+
+    >>> pose([[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+    {'xyz': [5.0, 0.0, 0.0], 'rpy': [0.0, 90.0, 0.0]}
+    """
+    (xx, xy, xz, x), (yx, yy, yz, y), (zx, _, _, z) = ([float(e) for e in row] for row in list(T)[:3])
+    # At a pitch of a quarter turn x's direction has no yaw; y's has, together with the roll.
+    upright = math.hypot(xx, yx) < 1e-9
+    yaw = math.atan2(-xy, yy) if upright else math.atan2(yx, xx)
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-zx, c * xx + s * yx)
+    roll = math.atan2(s * xz - c * yz, c * yy - s * xy)
+    return {"xyz": [tidy(v, 12) for v in (x, y, z)], "rpy": [tidy(math.degrees(a), 13) for a in (roll, pitch, yaw)]}
+
+
+def tidy(value: float, digits: int) -> float:
+    """Rounded to so many decimals, and no negative zero."""
+    return round(value, digits) + 0.0
+
+
+def _is_list_of_mappings(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return number(value)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    word = str(value)
+    return word if _PLAIN.fullmatch(word) and word.lower() not in _WORDS else json.dumps(word, ensure_ascii=False)
