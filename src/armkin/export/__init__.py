@@ -1,4 +1,7 @@
 """An arm in other words.
 
-c/  C99 that needs nothing but libm
+tables.py   robot files in another convention: screws, DH standard or modified
+urdf.py     URDF, with limits, speeds and visuals
+numbers.py  plain numbers for JSON
+c/          C99 that needs nothing but libm
 """

@@ -54,19 +54,26 @@ def text(data: Mapping[str, Any], comments: Iterable[str] = ()) -> str:
 def pose(T: Sequence[Sequence[float]]) -> dict[str, list[float]]:
     """A rigid transform [mm] as ``{xyz, rpy}`` in mm and degrees; its rotation comes back to 1e-15.
 
-    The yaw is taken first and turned back, so that roll and pitch stay sharp where the pitch is a quarter turn.
-
     >>> pose([[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
     {'xyz': [5.0, 0.0, 0.0], 'rpy': [0.0, 90.0, 0.0]}
     """
-    (xx, xy, xz, x), (yx, yy, yz, y), (zx, _, _, z) = ([float(e) for e in row] for row in list(T)[:3])
+    position = [tidy(float(row[3]), 12) for row in list(T)[:3]]
+    return {"xyz": position, "rpy": [tidy(math.degrees(a), 13) for a in angles(T)]}
+
+
+def angles(T: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [rad] of a transform, R = Rz(yaw) Ry(pitch) Rx(roll), from which R comes back to 1e-15.
+
+    The yaw is taken first and turned back, so that roll and pitch stay sharp where the pitch is a quarter turn.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = ([float(e) for e in row[:3]] for row in list(T)[:3])
     # At a pitch of a quarter turn x's direction has no yaw; y's has, together with the roll.
     upright = math.hypot(xx, yx) < 1e-9
     yaw = math.atan2(-xy, yy) if upright else math.atan2(yx, xx)
     c, s = math.cos(yaw), math.sin(yaw)
     pitch = math.atan2(-zx, c * xx + s * yx)
     roll = math.atan2(s * xz - c * yz, c * yy - s * xy)
-    return {"xyz": [tidy(v, 12) for v in (x, y, z)], "rpy": [tidy(math.degrees(a), 13) for a in (roll, pitch, yaw)]}
+    return roll + 0.0, pitch + 0.0, yaw + 0.0
 
 
 def tidy(value: float, digits: int) -> float:

@@ -1,0 +1,61 @@
+"""An arm as plain numbers, for other programs: one JSON object in mm and degrees."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.export import tables
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def numbers(arm: Arm) -> dict[str, Any]:
+    """Joints with their screws, limits and speeds, DH tables where there are any, the chain's matrices.
+
+    `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
+    """
+    screws = tables.screws(arm)
+    limits, home, unit = units.limits_out(arm), units.home_out(arm), units.names(arm)
+    speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
+    joints = [
+        {
+            "name": name,
+            "type": "prismatic" if arm.prismatic[i] else "revolute",
+            "unit": unit[i],
+            "screw": screws["joints"][i]["screw"],
+            "sign": int(arm.dh_sign[i]),
+            "ratio": float(arm.ratio[i]),
+            "limits": list(limits[i]) if np.isfinite(limits[i]).all() else None,
+            "home": home[i],
+            "max_speed": None if np.isnan(speeds[i]) else speeds[i],
+            "max_accel": None if np.isnan(accels[i]) else accels[i],
+        }
+        for i, name in enumerate(arm.joint_names)
+    ]
+    return {
+        "length_unit": "mm",
+        "angle_unit": "deg",
+        "joints": joints,
+        "base": arm.base.tolist(),
+        "zero_pose": screws["zero_pose"],
+        "tool": screws.get("tool", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}),
+        "links": arm.link.tolist(),
+        "dh_standard": _table(arm, modified=False),
+        "dh_modified": _table(arm, modified=True),
+    }
+
+
+def _table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
+    """A DH table with its base and tool, or None if there is none."""
+    try:
+        data = tables.dh(arm, modified=modified)
+    except UsageError:
+        return None
+    nothing = {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}
+    rows = [joint["dh"] for joint in data["joints"]]
+    return {"base": data.get("base", nothing), "rows": rows, "tool": data.get("tool", nothing)}

@@ -1,0 +1,266 @@
+"""An arm in another convention: screws, or a Denavit-Hartenberg table, standard or modified.
+
+All are robot files again: limits, drives, tool and the meaning of targets stay. Screws exist for every arm; a DH
+table exists unless two axes are a hair from parallel, where their common normal runs away.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.model import units
+from armkin.model.rotation import FLIP, inverse
+from armkin.robot_file.writing import pose, tidy
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+COORDINATES = 1e-9  # [mm] how exactly a table must give the arm's poses
+PARALLEL = 1e-13  # [rad] axes this close have no common normal of their own
+LEAST = 1e-11  # [mm] a distance below is rounding
+
+_GEOMETRY = ("convention", "base", "tool", "zero_pose", "joints")
+
+
+def screws(arm: Arm) -> dict[str, Any]:
+    """The arm as a robot file with screws: keys and values.
+
+    >>> import armkin
+    >>> screws(armkin.load("robots/three_dof.yaml"))["joints"][1]["screw"]
+    {'w': [0.0, -1.0, 0.0], 'q': [0.0, 0.0, 170.0]}
+    """
+    T, rows = inverse(arm.base), []
+    links = _canonical(arm)
+    for i in range(arm.n):
+        T = T @ links[i]
+        direction, point = [tidy(x, 15) for x in T[:3, 2]], [tidy(x, 12) for x in T[:3, 3]]
+        rows.append({"screw": {"w": [0, 0, 0], "v": direction} if arm.prismatic[i] else {"w": direction, "q": point}})
+    zero = T @ links[-1] @ inverse(_tool(arm))
+    return _file(arm, "screws", rows, arm.base, _tool(arm), {"zero_pose": pose(zero.tolist())})
+
+
+def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
+    """The arm as a robot file with a DH table: keys and values.
+
+    Raises UsageError if no table gives the arm's poses to 1e-9 mm.
+
+    >>> import armkin
+    >>> dh(armkin.load("robots/three_dof.yaml"), modified=True)["joints"][1]["dh"]
+    {'alpha': 90.0, 'a': 0.0, 'd': 0.0, 'theta': 0.0}
+    """
+    links = _canonical(arm)
+    base, theta, d = _start(arm, links[0])
+    normals = [_common_normal(link) for link in links[1:-1]]
+    thetas = [theta] + [normal.theta_after for normal in normals]
+    ds = [d] + [normal.d_after for normal in normals]
+    for i, normal in enumerate(normals):
+        thetas[i] += normal.theta
+        ds[i] += normal.d
+    twists = [(normal.alpha, normal.a) for normal in normals]
+    last, tool = _end(arm, links[-1], modified)
+    thetas[-1] += last.theta
+    ds[-1] += last.d
+    before = [(0.0, 0.0), *twists] if modified else [*twists, (last.alpha, last.a)]
+    rows = [
+        {"dh": {"alpha": _degrees(alpha), "a": tidy(a, 12), "d": tidy(offset, 12), "theta": _degrees(angle)}}
+        for (alpha, a), offset, angle in zip(before, ds, thetas, strict=True)
+    ]
+    data = _file(arm, "modified" if modified else "standard", rows, base, tool, {})
+    _check(arm, data, links)
+    return data
+
+
+class _Normal(NamedTuple):
+    """Rz(theta) Tz(d) Tx(a) Rx(alpha) Rz(theta_after) Tz(d_after)."""
+
+    theta: float
+    d: float
+    a: float
+    alpha: float
+    theta_after: float = 0.0
+    d_after: float = 0.0
+
+
+def _canonical(arm: Arm) -> Array:
+    """The chain's links with the joints' signs taken out: each z axis is that of the row or screw, not of the joint."""
+    flips = [FLIP if sign < 0 else np.eye(4) for sign in arm.dh_sign]
+    links = arm.link.copy()
+    for i, flip in enumerate(flips):
+        links[i] = links[i] @ flip
+        links[i + 1] = flip @ links[i + 1]
+    return links
+
+
+def _tool(arm: Arm) -> Array:
+    """The fixed frame that the robot file has after its last joint."""
+    if arm.file is None:
+        return np.eye(4)
+    from armkin.model.rotation import transform
+
+    return transform(arm.file.tool.xyz, arm.file.tool.rpy)
+
+
+def _start(arm: Arm, link: Array) -> tuple[Array, float, float]:
+    """The base, and what of the first link is a turn about and a shift along the first axis."""
+    inner = inverse(arm.base) @ link
+    if _is_screw_along_z(inner):
+        return arm.base, math.atan2(inner[1, 0], inner[0, 0]), float(inner[2, 3])
+    return link, 0.0, 0.0
+
+
+def _end(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
+    """What of the last link belongs to the last row, and the tool that is left."""
+    tool = _tool(arm)
+    inner = link @ inverse(tool)
+    theta = math.atan2(inner[1, 0], inner[0, 0])
+    if modified:
+        if _is_screw_along_z(inner):
+            return _Normal(theta, float(inner[2, 3]), 0.0, 0.0), tool
+        return _Normal(0.0, 0.0, 0.0, 0.0), link
+    # A row's frame has its x axis across the joint's axis, and meets it: Denavit and Hartenberg's two conditions.
+    x, p = inner[:3, 0], inner[:3, 3]
+    a = float(x[:2] @ p[:2])
+    if abs(x[2]) < 1e-14 and np.abs(p[:2] - a * x[:2]).max() < LEAST:
+        return _Normal(theta, float(p[2]), a, math.atan2(inner[2, 1], inner[2, 2])), tool
+    return _Normal(0.0, 0.0, 0.0, 0.0), link
+
+
+def _is_screw_along_z(T: Array) -> bool:
+    """Whether a transform turns about and shifts along z alone."""
+    return bool(np.hypot(T[0, 2], T[1, 2]) < 1e-14 and T[2, 2] > 0 and np.hypot(T[0, 3], T[1, 3]) < LEAST)
+
+
+def _common_normal(link: Array) -> _Normal:
+    """The common normal between a link's two axes: x of the row (Craig, Introduction to Robotics, sect. 3.4).
+
+    Of parallel axes that normal is taken that starts at the first axis' origin. Of its two directions that with
+    theta in (-90, 90] is taken, whatever the sign of a.
+    """
+    z, p = link[:3, 2], link[:3, 3]
+    sine = math.hypot(z[0], z[1])
+    if sine <= PARALLEL:
+        a = math.hypot(p[0], p[1])
+        a = a if a > LEAST else 0.0
+        theta = math.atan2(p[1], p[0]) if a else 0.0
+        if not _forward(theta):
+            a, theta = -a, theta - math.copysign(math.pi, theta)
+        alpha = 0.0 if z[2] > 0 else math.pi
+        d, d_after = 0.0, float(p[2] * np.sign(z[2]))
+    else:
+        n = np.array([-z[1], z[0]]) / sine
+        alpha, a = math.atan2(sine, z[2]), float(n @ p[:2])
+        a = a if abs(a) > LEAST else 0.0
+        theta = math.atan2(n[1], n[0])
+        if not _forward(theta):
+            n, a, alpha = -n, -a, -alpha
+            theta = math.atan2(n[1], n[0])
+        d_after = float((p[:2] - a * n) @ z[:2]) / sine**2
+        d = float(p[2] - d_after * z[2])
+    c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    turned = np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0, sa, ca]]).T @ link[:3, :3]
+    return _Normal(theta, d, a, alpha, math.atan2(turned[1, 0], turned[0, 0]), d_after)
+
+
+def _forward(theta: float) -> bool:
+    """Whether an angle is in (-90, 90] degrees, but for rounding."""
+    return -math.pi / 2 + 1e-9 < theta < math.pi / 2 + 1e-9
+
+
+def _degrees(angle: float) -> float:
+    value = tidy(math.degrees(angle), 12)
+    return tidy(180.0 - (180.0 - value) % 360.0, 12)  # in (-180, 180]
+
+
+def _file(
+    arm: Arm, convention: str, rows: list[dict[str, Any]], base: Array, tool: Array, more: dict[str, Any]
+) -> dict[str, Any]:
+    """A robot file with these rows, and all else as it was."""
+    head, joints, rest = _kept(arm)
+    data: dict[str, Any] = {**head, "convention": convention}
+    for key, frame in (("base", base), ("tool", tool)):
+        if np.abs(frame - np.eye(4)).max() > 1e-15:
+            data[key] = pose(frame.tolist())
+    order = ("name", "type")
+    data |= more | {
+        "joints": [
+            {k: old[k] for k in order if k in old} | row | {k: v for k, v in old.items() if k not in order}
+            for old, row in zip(joints, rows, strict=True)
+        ]
+    }
+    data |= rest
+    return _same_pitch(arm, data)
+
+
+def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+    """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
+    if arm.file is None:
+        joints = []
+        limits, home = units.limits_out(arm), units.home_out(arm)
+        for i, name in enumerate(arm.joint_names):
+            joint: dict[str, Any] = {"name": name}
+            joint |= {"type": "prismatic"} if arm.prismatic[i] else {}
+            joint |= {"limits": list(limits[i])} if np.isfinite(limits[i]).all() else {}
+            joint |= {"home": home[i]} if home[i] else {}
+            joints.append(joint)
+        return {"name": arm.name}, joints, {}
+    data = arm.file.model_dump(exclude_unset=True, exclude_none=True)
+    joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw")} for joint in data["joints"]]
+    head = {k: v for k, v in data.items() if k in ("name", "description", "source", "task", "pitch_offset")}
+    rest = {k: v for k, v in data.items() if k not in head and k not in _GEOMETRY}
+    return head, joints, rest
+
+
+def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
+    """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
+    from armkin.inverse.tasks.fitting import task_for
+
+    for name in ("xyz_pitch", "xyz_pitch_roll"):
+        try:
+            before = task_for(arm, name).offsets[0]
+        except UsageError:
+            continue
+        after = task_for(_built({**data, "pitch_offset": 0.0, "task": name}), name).offsets[0]
+        offset = _degrees(before - after)
+        data = {k: v for k, v in data.items() if k != "pitch_offset"}
+        if offset:
+            keys = list(data)
+            at = keys.index("convention")
+            data = {k: data[k] for k in keys[:at]} | {"pitch_offset": offset} | {k: data[k] for k in keys[at:]}
+            if data.get("task") not in (None, "xyz_pitch", "xyz_pitch_roll"):
+                del data["pitch_offset"]
+        break
+    return data
+
+
+def _built(data: dict[str, Any]) -> Arm:
+    from armkin import robot_file
+    from armkin.model.build import build
+    from armkin.robot_file.writing import text
+
+    return build(robot_file.parse(text(data), str(data["name"])))
+
+
+def _check(arm: Arm, data: dict[str, Any], links: Array) -> None:
+    """The table gives the arm's poses, or UsageError says which axes spoil it."""
+    from armkin.forward import fk
+
+    q = np.random.default_rng(5).uniform(-1.5, 1.5, (20, arm.n)) * np.where(arm.prismatic, 100.0, 1.0)
+    sizes = [abs(v) for joint in data["joints"] for v in (joint["dh"]["a"], joint["dh"]["d"])]
+    if max(sizes) < 1e7:
+        off = np.abs(fk(_built(data), q) - fk(arm, q))
+        if off[:, :3, 3].max() < COORDINATES and off[:, :3, :3].max() < 1e-11:
+            return
+    sines = np.hypot(links[1:-1, 0, 2], links[1:-1, 1, 2])
+    sines = np.where(sines > PARALLEL, sines, np.inf)
+    k = int(np.argmin(sines))
+    angle = f"{math.degrees(sines[k]):.2g}"
+    raise UsageError(
+        f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {arm.joint_names[k]} and "
+        f"{arm.joint_names[k + 1]} are {angle} deg from parallel, and their common normal is far away; screws say it "
+        "exactly"
+    )

@@ -1,0 +1,145 @@
+"""An arm as URDF: joints with limits and speeds, links as cylinders and balls.
+
+Metres and radians, as the format wants. A link's frame is its joint's, with z along the axis; the last link,
+`tool`, is the TCP. Of a calibrated arm joint values are the actual ones, as a URDF knows no ratio. What a
+robot file has and a URDF has not (home, accelerations, drives) is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.model.arm import actual
+from armkin.robot_file.writing import angles, number
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+METRE = 1000.0  # [mm]
+THICK = 0.035  # a link's radius, of the reach
+SHORTEST = 1e-6  # [mm] a shorter piece is not drawn
+
+_COLOURS = (("body", "0.85 0.85 0.85 1"), ("joint", "0.25 0.35 0.5 1"))
+
+
+def urdf(arm: Arm) -> str:
+    """The arm as the text of a URDF file.
+
+    >>> import armkin
+    >>> urdf(armkin.load("robots/three_dof.yaml")).splitlines()[2]
+    '<robot name="three_dof">'
+    """
+    turned = actual(arm)
+    links = ["base_link", *(f"{name}_link" for name in arm.joint_names)]
+    radius = THICK * arm.reach
+    lines = [
+        '<?xml version="1.0"?>',
+        f"<!-- {_comment(arm)} -->",
+        f"<robot name={quoteattr(arm.name)}>",
+        *(f'  <material name="{name}"><color rgba="{rgba}"/></material>' for name, rgba in _COLOURS),
+        *_link("base_link", [_piece(np.zeros(3), turned.link[0][:3, 3], radius)]),
+    ]
+    for i, name in enumerate(arm.joint_names):
+        lines += _joint(turned, i, name, links[i], links[i + 1])
+        lines += _link(links[i + 1], [_hub(radius), *_body(turned.link[i + 1], radius * 0.85)])
+    tool = "tool" if "tool" not in links else "tool_link"
+    lines += [
+        f'  <joint name="{_free("tool_joint", arm.joint_names)}" type="fixed">',
+        *_place(turned.link[-1], links[-1], tool),
+        "  </joint>",
+        f'  <link name="{tool}"/>',
+        "</robot>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _comment(arm: Arm) -> str:
+    source = f"; {arm.file.source}" if arm.file is not None and arm.file.source else ""
+    text = f"{arm.name}, written by armkin export --urdf{source}"
+    return text.replace("--", "- -").replace("\n", " ")
+
+
+def _free(name: str, taken: tuple[str, ...]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _joint(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
+    slides, limited = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
+    kind = "prismatic" if slides else "revolute" if limited else "continuous"
+    unit = METRE if slides else 1.0
+    speed = 0.0 if math.isnan(arm.max_speed[i]) else float(arm.max_speed[i]) / unit
+    ends = f'lower="{_real(arm.lower[i] / unit)}" upper="{_real(arm.upper[i] / unit)}" ' if limited else ""
+    return [
+        f'  <joint name="{name}" type="{kind}">',
+        *_place(arm.link[i], parent, child),
+        '    <axis xyz="0 0 1"/>',
+        f'    <limit {ends}effort="0" velocity="{_real(speed)}"/>',
+        "  </joint>",
+    ]
+
+
+def _place(T: Array, parent: str, child: str) -> list[str]:
+    return [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>', f"    {_origin(T)}"]
+
+
+def _origin(T: Array) -> str:
+    xyz = " ".join(_real(x / METRE) for x in T[:3, 3])
+    rpy = " ".join(_real(angle) for angle in angles(T.tolist()))
+    return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+
+
+def _real(value: float) -> str:
+    return number(0.0 if abs(value) < 1e-18 else float(value))
+
+
+def _link(name: str, pieces: list[list[str]]) -> list[str]:
+    drawn = [line for piece in pieces for line in piece]
+    return [f'  <link name="{name}">', *drawn, "  </link>"] if drawn else [f'  <link name="{name}"/>']
+
+
+def _body(link: Array, radius: float) -> list[list[str]]:
+    """A link as `armkin.view.skeleton` draws it: along its joint's axis first, then straight to the next joint."""
+    corner = np.array([0.0, 0.0, link[2, 3]])
+    return [_piece(np.zeros(3), corner, radius), _piece(corner, link[:3, 3], radius)]
+
+
+def _hub(radius: float) -> list[str]:
+    """A joint: a short cylinder about its axis."""
+    shape = f'<cylinder radius="{_size(radius)}" length="{_size(2.2 * radius)}"/>'
+    return _visual("joint", '<origin xyz="0 0 0" rpy="0 0 0"/>', shape)
+
+
+def _piece(start: Array, end: Array, radius: float) -> list[str]:
+    """A cylinder from start to end [mm] in the link's frame, with a ball at its end; [] if there is no way between."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    if length < SHORTEST:
+        return []
+    z = along / length
+    # Ry(pitch) after Rz(yaw) turns z into the piece's direction; a cylinder needs no more.
+    pitch, yaw = math.atan2(math.hypot(z[0], z[1]), z[2]), math.atan2(z[1], z[0])
+    where = " ".join(_size(x) for x in (start + end) / 2)
+    ball = " ".join(_size(x) for x in end)
+    cylinder = f'<cylinder radius="{_size(radius)}" length="{_size(length)}"/>'
+    return [
+        *_visual("body", f'<origin xyz="{where}" rpy="0 {pitch:.6f} {yaw:.6f}"/>', cylinder),
+        *_visual("body", f'<origin xyz="{ball}" rpy="0 0 0"/>', f'<sphere radius="{_size(radius)}"/>'),
+    ]
+
+
+def _visual(material: str, origin: str, shape: str) -> list[str]:
+    return [
+        f'    <visual>{origin}<geometry>{shape}</geometry><material name="{material}"/></visual>',
+    ]
+
+
+def _size(value: float) -> str:
+    """Millimetres of a picture, in metres."""
+    return number(round(float(value) / METRE, 7))
