@@ -30,7 +30,7 @@ MAY_IMPORT: dict[str, str] = {
     "motors": "errors formula model forward",
     "motion": "errors formula model forward motors",
     "reach": "errors files formula model forward motors",
-    "export": "",
+    "export": "errors formula robot_file model forward inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
     "view": "errors formula model forward",

@@ -3,6 +3,7 @@
 import inspect
 import json
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
-    function = getattr(import_module(f"armkin.cli.commands.{name}"), name)
+    word = f"{name}_" if iskeyword(name) else name
+    function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     assert inspect.getdoc(function).splitlines()[0] == COMMANDS[name]
     assert name in run("--help").out
     result = run(name, "--help")

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib import import_module
+from keyword import iskeyword
 from typing import Annotated, Any
 
 import typer
@@ -103,7 +104,8 @@ class Commands(TyperGroup):
 
 def load(name: str) -> Any:
     """Import a command's module and let Typer read its function."""
-    function = getattr(import_module(f"armkin.cli.commands.{name}"), name)
+    word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
+    function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
     single.command(name, cls=Command, context_settings=_SETTINGS)(function)
     return typer.main.get_command(single)

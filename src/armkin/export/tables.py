@@ -237,6 +237,23 @@ def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
+def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
+    """What the other table's targets count from elsewhere, in words; [] for most arms."""
+    from armkin.inverse.tasks.fitting import task_for
+
+    try:
+        before, after = task_for(arm), task_for(_built(data))
+    except UsageError:
+        return []
+    if before.name != after.name:
+        return [f"the task was {before.name} and is {after.name}"]
+    found = []
+    for label, old, new in zip(before.labels[before.position :], before.offsets, after.offsets, strict=False):
+        if abs(turn := _degrees(new - old)) > 1e-9:
+            found.append(f"{label} counts from another zero: in targets it is {turn:g} deg more for the same pose")
+    return found
+
+
 def _built(data: dict[str, Any]) -> Arm:
     from armkin import robot_file
     from armkin.model.build import build

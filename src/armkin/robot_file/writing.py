@@ -67,8 +67,8 @@ def angles(T: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     The yaw is taken first and turned back, so that roll and pitch stay sharp where the pitch is a quarter turn.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, _, _) = ([float(e) for e in row[:3]] for row in list(T)[:3])
-    # At a pitch of a quarter turn x's direction has no yaw; y's has, together with the roll.
-    upright = math.hypot(xx, yx) < 1e-9
+    # At a pitch of a quarter turn x's direction has no yaw; y's has, together with the roll, which becomes 0.
+    upright = math.hypot(xx, yx) < 1e-15
     yaw = math.atan2(-xy, yy) if upright else math.atan2(yx, xx)
     c, s = math.cos(yaw), math.sin(yaw)
     pitch = math.atan2(-zx, c * xx + s * yx)

@@ -17,6 +17,7 @@ COMMANDS = {
     "teach": "A page in the browser: see the arm, choose a branch.",
     "robots": "The robots that come with armkin, and what each can do.",
     "info": "What a robot file says, checked.",
-    "export": "The arm in other words: C99.",
+    "import": "A robot file from a URDF.",
+    "export": "The arm in other words: URDF, DH tables, screws, JSON, C99.",
     "schema": "JSON Schema of robot files, for editors.",
 }

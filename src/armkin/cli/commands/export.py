@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, output
+from armkin.cli import inputs, output, render
 from armkin.cli.options import Out, Robot, TaskName
 from armkin.errors import UsageError
 
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 
 def export(
     robot: Robot,
+    urdf: Annotated[
+        bool, typer.Option("--urdf", help="URDF: limits, speeds, links as cylinders; metres and radians.")
+    ] = False,
+    dh: Annotated[bool, typer.Option("--dh", help="A robot file with a standard DH table.")] = False,
+    mdh: Annotated[bool, typer.Option("--mdh", help="A robot file with a modified (Craig) DH table.")] = False,
+    screws: Annotated[bool, typer.Option("--screws", help="A robot file with screws.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Joints, screws, tables and matrices as one JSON object.")
+    ] = False,
     c: Annotated[
         bool, typer.Option("--c", help="C99: fk, Jacobian, all branches; a header and a test program.")
     ] = False,
@@ -25,8 +34,17 @@ def export(
     task: TaskName = None,
     out: Out = None,
 ) -> None:
-    """The arm in other words: C99."""
+    """The arm in other words: URDF, DH tables, screws, JSON, C99.
+
+    All but --c go to stdout, or to the file that --out names. --dh, --mdh and --screws give a robot file: the
+    same arm, the same poses.
+    """
     kinds: dict[str, tuple[bool, Callable[[Arm], None]]] = {
+        "--urdf": (urdf, lambda arm: _urdf(arm, out)),
+        "--dh": (dh, lambda arm: _table(arm, "standard", out)),
+        "--mdh": (mdh, lambda arm: _table(arm, "modified", out)),
+        "--screws": (screws, lambda arm: _table(arm, "screws", out)),
+        "--json": (json, lambda arm: _json(arm, out)),
         "--c": (c, lambda arm: _c(arm, task, single, out)),
     }
     asked = [name for name, (wanted, _) in kinds.items() if wanted]
@@ -37,6 +55,35 @@ def export(
         raise UsageError("--float goes with --c alone")
     output.spare(robot, out)
     kinds[asked[0]][1](inputs.load(robot))
+
+
+def _urdf(arm: Arm, out: str | None) -> None:
+    import numpy as np
+
+    from armkin.export.urdf import urdf
+
+    with output.destination(out) as write:
+        write(urdf(arm))
+    if slow := [name for name, speed in zip(arm.joint_names, arm.max_speed, strict=True) if np.isnan(speed)]:
+        output.note(f"velocity is 0 for {', '.join(slow)}: the robot file has no max_speed there")
+
+
+def _table(arm: Arm, convention: str, out: str | None) -> None:
+    from armkin.export import tables
+    from armkin.robot_file.writing import text
+
+    data = tables.screws(arm) if convention == "screws" else tables.dh(arm, modified=convention == "modified")
+    with output.destination(out) as write:
+        write(text(data))
+    for line in tables.differences(arm, data):
+        output.note(line)
+
+
+def _json(arm: Arm, out: str | None) -> None:
+    from armkin.export.numbers import numbers
+
+    with output.destination(out) as write:
+        write(f"{render.to_json({**render.head(arm), **numbers(arm)})}\n")
 
 
 def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:

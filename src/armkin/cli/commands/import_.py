@@ -1,0 +1,75 @@
+"""`armkin import`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import output
+from armkin.cli.options import Out
+from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.robot_file.urdf import Imported
+
+
+def import_(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A URDF file, flattened if it was a xacro.")],
+    base: Annotated[
+        str | None, typer.Option("--base", metavar="LINK", help="Where the chain begins. [default: the root]")
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option("--tip", metavar="LINK", help="Where it ends; needed where the arm has several ends.")
+    ] = None,
+    dh: Annotated[bool, typer.Option("--dh", help="A DH table instead of screws, if the arm has one.")] = False,
+    snap: Annotated[bool, typer.Option("--snap", help="Angles within 1e-4 rad of a right angle become one.")] = False,
+    out: Out = None,
+) -> None:
+    """A robot file from a URDF.
+
+    Screws, exactly as the URDF has them, limits, speeds and names, on stdout: armkin import arm.urdf > arm.yaml
+    """
+    from armkin import robot_file
+    from armkin.export import tables
+    from armkin.model.build import build
+    from armkin.robot_file import urdf
+    from armkin.robot_file.writing import text
+
+    output.spare(file, out)
+    try:
+        found = urdf.read(file, base=base, tip=tip, snap=snap)
+    except UsageError as error:
+        raise UsageError(f"{error}\ngive it with {'--base' if 'base' in str(error) else '--tip'} LINK") from None
+    arm = build(robot_file.parse(text(found.data), f"{file} as a robot file"))
+    data: dict[str, Any] = tables.dh(arm) if dh else found.data
+    with output.destination(out) as write:
+        write(text(data, found.notes))
+    for note in found.notes:
+        output.note(note)
+    output.note(f"{arm.n} joints from {found.base} to {found.tip}")
+    if not snap and (gain := _gain(file, found, arm)):
+        output.note(gain)
+
+
+def _gain(file: str, found: Imported, arm: Arm) -> str | None:
+    """What --snap would buy: another solver class, and how far the tip would move for it."""
+    import numpy as np
+
+    import armkin
+    from armkin import robot_file
+    from armkin.model.build import build
+    from armkin.robot_file import urdf
+    from armkin.robot_file.writing import text
+
+    snapped = build(robot_file.parse(text(urdf.read(file, base=found.base, tip=found.tip, snap=True).data)))
+    try:
+        before, after = armkin.method(arm)[0], armkin.method(snapped)[0]
+    except UsageError:
+        return None
+    if before == after:
+        return None
+    q = np.random.default_rng(2).uniform(-2.0, 2.0, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
+    moved = np.linalg.norm((armkin.fk(arm, q) - armkin.fk(snapped, q))[:, :3, 3], axis=1).max()
+    return f"ik is solved as: {before}; with --snap as: {after}, and the tip moves by up to {moved:.2g} mm"

@@ -1,0 +1,312 @@
+"""URDF in: real chains to rounding, every trap of real files, hostile XML."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin import robot_file
+from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
+from armkin.model.build import build
+from armkin.robot_file import urdf
+from armkin.robot_file.writing import angles, number, text
+from command_line import ROOT, run
+from urdf_chains import CHAINS, moving, pose
+from urdf_chains import text as as_urdf
+
+
+def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
+    found = urdf.parse(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
+    return build(robot_file.parse(text(found.data, found.notes)))
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
+    """To 1e-9 mm: against poses computed by pinocchio or yourdfpy (`expected`), and by tests/urdf_chains.py."""
+    chain = CHAINS[name]
+    arm = imported(chain)
+    joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
+    given = [(case["q_si"], np.array(case["T_m"])) for case in chain.get("expected", [])]
+    slides = np.array([joint["type"] == "prismatic" for joint in joints])
+    for q in np.random.default_rng(7).uniform(-3, 3, (20, len(joints))) * np.where(slides, 0.1, 1.0):
+        given.append((q, pose(chain, {joint["name"]: value for joint, value in zip(joints, q, strict=True)})))
+    for q, T in given:
+        got = armkin.fk(arm, np.asarray(q) * np.where(slides, 1000.0, 1.0))
+        assert np.abs(got[:3, 3] - 1000 * T[:3, 3]).max() < 1e-9
+        assert np.abs(got[:3, :3] - T[:3, :3]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_real_chain_keeps_limits_and_speeds(name: str) -> None:
+    chain = CHAINS[name]
+    file = imported(chain).file
+    assert file is not None
+    joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
+    for joint, source in zip(file.joints, joints, strict=True):
+        size = 1000.0 if source["type"] == "prismatic" else 180 / np.pi
+        if source["type"] == "continuous":
+            assert joint.limits is None
+        elif joint.limits is not None:
+            assert joint.limits == pytest.approx([float(source["lower"]) * size, float(source["upper"]) * size])
+            assert joint.limits[0] <= joint.home <= joint.limits[1]
+        if float(source.get("velocity") or 0) > 0:
+            assert joint.max_speed == pytest.approx(float(source["velocity"]) * size)
+
+
+# The arm that the traps spoil.
+JOINTS = """
+<link name="base"/><link name="upper"/><link name="lower"/><link name="hand"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1"/>
+  <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1.5" effort="-1"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0" rpy="1.5708 0 0"/>
+  <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1.5" effort="1"/></joint>
+<joint name="wrist" type="revolute"><parent link="lower"/><child link="hand"/><origin xyz="0.2 0 0"/>
+  <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1.5" effort="1"/></joint>
+"""
+ELBOW = 'type="revolute"><parent link="upper"/>'
+TWO_ENDS = (
+    '<link name="finger"/><joint name="grip" type="prismatic"><parent link="hand"/><child link="finger"/>'
+    '<limit lower="0" upper="0.04" velocity="0.1" effort="1"/></joint><link name="tcp"/>'
+    '<joint name="tcp_joint" type="fixed"><parent link="hand"/><child link="tcp"/></joint>'
+)
+
+
+def document(*changes: tuple[str, str]) -> bytes:
+    body = JOINTS
+    for old, new in changes:
+        assert old in body
+        body = body.replace(old, new, 1)
+    return f'<robot name="spoilt">{body}</robot>'.encode()
+
+
+BAD = {
+    "several ends": (document(("</joint>\n<joint name=\"elbow", TWO_ENDS.join(["</joint>", '\n<joint name="elbow']))),
+                     "the tip must be named: hand, tcp, finger"),
+    "axis of no length": (document(('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>')), "axis 0 0 0 has no direction"),
+    "not a number": (document(('xyz="0 0 0.1"', 'xyz="0 0 nan"')), "origin xyz: '0 0 nan' is not 3 numbers"),
+    "two numbers": (document(('xyz="0 0 0.1"', 'xyz="0 0.1"')), "origin xyz: '0 0.1' is not 3 numbers"),
+    "infinite": (document(('lower="-2"', 'lower="-1e999"')), "limit lower: '-1e999' is not finite"),
+    "word": (document(('velocity="1.5"', 'velocity="fast"')), "limit velocity: 'fast' is not a number"),
+    "limits reversed": (document(('lower="-2" upper="2"', 'lower="2" upper="-2"')),
+                        "lower limit 114.592 deg is above upper limit -114.592 deg"),
+    "limits equal": (document(('lower="-2" upper="2"', 'lower="1" upper="1"')), "a joint that never moves is fixed"),
+    "millimetres as metres": (document(('xyz="0.3 0 0"', 'xyz="30000 0 0"')), "a URDF is in metres"),
+    "mimic on the chain": (document(("<axis", '<mimic joint="elbow" multiplier="-1"/><axis')), "mimics elbow"),
+    "floating joint": (document((f'"elbow" {ELBOW}', f'"elbow" {ELBOW.replace("revolute", "floating")}')),
+                       "type floating; revolute, continuous, prismatic and fixed can be read"),
+    "no type": (document((ELBOW, ELBOW[15:])), "type is missing"),
+    "unknown child": (document(('<child link="lower"/>', '<child link="lowr"/>')), "there is no child link lowr"),
+    "no parent": (document(('<parent link="upper"/>', "")), "joint elbow: has no <parent link=...>"),
+    "two joints of a name": (document(('name="wrist"', 'name="elbow"')), "two joints are named elbow"),
+    "two links of a name": (document(('<link name="hand"/>', '<link name="lower"/>')), "two links are named lower"),
+    "closed linkage": (document(('<child link="hand"/>', '<child link="upper"/>')),
+                       "link upper hangs on two joints, shoulder and wrist"),
+    "circle": (document(('<parent link="base"/>', '<parent link="hand"/>')), "the joints are a circle"),
+    "two roots": (document(('<parent link="upper"/>', '<parent link="stand"/>'),
+                           ('<link name="hand"/>', '<link name="hand"/><link name="stand"/>')),
+                  "several links have no parent: base, stand"),
+    "no joints": (b'<robot name="x"><link name="a"/></robot>', "no link carries another; there is no chain"),
+    "all fixed": (document().replace(b"revolute", b"fixed"), "no joint moves between base and its ends"),
+    "xacro": (b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="x"/></robot>', "xacrodoc"),
+    "xacro value": (document(('xyz="0 0 0.1"', 'xyz="0 0 ${height}"')), "is a xacro, a template of a URDF"),
+    "sdf": (b'<sdf version="1.6"><model name="x"/></sdf>', "is not a URDF but an SDF file"),
+    "mjcf": (b'<mujoco model="x"/>', "is not a URDF but a MuJoCo file"),
+    "html": (b"<html></html>", "its outermost element is <html>"),
+    "not xml": (b"joints: []", "is not XML"),
+    "empty": (b"", "is not XML"),
+    "cut off": (document()[:300], "is not XML"),
+    "nameless": (document(('<link name="hand"/>', "<link/>")), "a <link> has no name"),
+    "entities": (b'<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>', "has a DTD or entities"),
+    "external file": (b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"/>', "has a DTD"),
+    "deep": (b'<robot name="x">' + b"<a>" * 200_000, "elements nested deeper than 50"),
+    "large": (b'<robot name="x">' + b"<link/>" * 1_500_000, "larger than 8 MB"),
+    "many links": (b'<robot name="x">' + b"".join(b'<link name="l%d"/>' % i for i in range(9000)) + b"</robot>",
+                   "more than 2000 links"),
+    "long chain": (b'<robot name="x">' + b"".join(
+        b'<link name="l%d"/><joint name="j%d" type="revolute"><parent link="l%d"/><child link="l%d"/></joint>'
+        % (i, i, i, (i + 1) % 1500) for i in range(1499)) + b'<link name="l1499"/></robot>', "more than 200 links"),
+    "strange encoding": (b'<?xml version="1.0" encoding="klingon"?><robot/>', "is not XML"),
+    "null bytes": (b"\0" * 1000, "is not XML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
+    raw, says = BAD[name]
+    began = time.perf_counter()
+    with pytest.raises((RobotFileError, UsageError)) as caught:
+        urdf.parse(raw, "arm.urdf")
+    assert time.perf_counter() - began < 2
+    assert says in str(caught.value)
+    assert str(caught.value).startswith("arm.urdf: ")
+    assert str(caught.value).count("\n") <= 1
+
+
+def test_the_arm_that_the_traps_spoil_is_one() -> None:
+    file = robot_file.parse(text(urdf.parse(document()).data))
+    assert [joint.name for joint in file.joints] == ["shoulder", "elbow", "wrist"]
+    assert file.joints[0].limits == pytest.approx([-114.591559, 114.591559])
+    assert file.joints[0].screw is not None
+    assert file.joints[0].screw.q == (0, 0, 100)
+    assert file.source == "robot.urdf: URDF of spoilt, from link base to link hand"
+
+
+def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
+    data = urdf.parse(document(('<axis xyz="0 0 1"/>', ""), ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -3"/>'))).data
+    assert data["joints"][0]["screw"]["w"] == [1, 0, 0]
+    assert data["joints"][1]["screw"]["w"] == pytest.approx([0, 1, 0], abs=1e-5)
+
+
+def test_limits_of_zero_none_and_away_from_zero() -> None:
+    changes = (('lower="-2" upper="2"', 'lower="0" upper="0"'), ('lower="-2" upper="2"', 'lower="0.5" upper="1.5"'))
+    found = urdf.parse(document(*changes))
+    assert "limits" not in found.data["joints"][0]
+    assert found.data["joints"][1]["home"] == pytest.approx(np.degrees(1.0))
+    assert len(found.notes) == 2
+    robot_file.parse(text(found.data))
+    none = urdf.parse(document(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
+    assert none.notes == ("joint shoulder has no <limit>: read as no limits",)
+
+
+def test_limits_lose_the_noise_of_radians() -> None:
+    joint = urdf.parse(document(('lower="-2" upper="2"', 'lower="-6.28318530718" upper="6.28318530718"'))).data[
+        "joints"
+    ][0]
+    assert joint["limits"] == [-360, 360]
+
+
+def test_names_that_a_robot_file_cannot_have_are_changed_and_said() -> None:
+    found = urdf.parse(document(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"')))
+    assert [joint["name"] for joint in found.data["joints"]] == ["_px100_1st_joint", "_2", "wrist"]
+    assert found.notes == ("joint /px100/1st joint is named _px100_1st_joint", "joint 2 is named _2")
+
+
+def test_a_joint_and_a_link_may_share_a_name_and_transmissions_do_not_count() -> None:
+    body = document(('name="elbow"', 'name="upper"')).replace(
+        b"</robot>", b'<transmission name="t"><joint name="upper"/><actuator name="m"/></transmission></robot>'
+    )
+    assert [joint["name"] for joint in urdf.parse(body).data["joints"]] == ["shoulder", "upper", "wrist"]
+
+
+def test_base_and_tip_choose_a_part_of_the_chain() -> None:
+    found = urdf.parse(document(), base="upper", tip="hand")
+    assert [joint["name"] for joint in found.data["joints"]] == ["elbow", "wrist"]
+    with pytest.raises(UsageError, match="there is no link hnd for the tip; the links are base, upper, lower, hand"):
+        urdf.parse(document(), tip="hnd")
+    with pytest.raises(UsageError, match="tip base does not hang on base upper"):
+        urdf.parse(document(), base="upper", tip="base")
+
+
+def test_a_mimic_joint_off_the_chain_is_ignored() -> None:
+    more = TWO_ENDS.replace("<limit", '<mimic joint="wrist"/><limit')
+    found = urdf.parse(document(('</joint>\n<joint name="elbow', f'</joint>{more}\n<joint name="elbow')), tip="tcp")
+    assert len(found.data["joints"]) == 3
+
+
+def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    mesh = '<link name="base"><visual><geometry><mesh filename="file:///etc/passwd"/></geometry></visual></link>'
+    path.write_bytes(document(('<link name="base"/>', mesh)))
+    opened: list[str] = []
+    real = Path.open
+    monkeypatch.setattr(Path, "open", lambda self, *a, **k: (opened.append(str(self)), real(self, *a, **k))[1])
+    urdf.read(path)
+    assert opened == [str(path)]
+
+
+def test_without_defusedxml_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "defusedxml.common", None)
+    with pytest.raises(ArmkinError, match=r"pip install 'armkin\[urdf\]'"):
+        urdf.parse(document())
+
+
+def test_a_file_that_is_not_there() -> None:
+    with pytest.raises(FileError, match=r"nowhere\.urdf: cannot read the URDF"):
+        urdf.read("nowhere.urdf")
+
+
+def rough_wrist() -> str:
+    """Six axes whose last one misses the wrist's centre by 0.4 um, because pi/2 is written with five digits."""
+    places = ("0 0 0.1", "0 0 0.2", "0 0 0.3", "0.1 0 0.05", "0.2 0 0", "0.1 0 0")
+    axes = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "0 -1 0")
+    joints = [
+        {"name": f"j{i}", "type": "continuous", "parent": f"l{i}", "child": f"l{i + 1}", "xyz": xyz, "axis": axis}
+        for i, (xyz, axis) in enumerate(zip(places, axes, strict=True))
+    ]
+    joints[5]["rpy"] = "0 0 1.5708"
+    return as_urdf({"links": [f"l{i}" for i in range(7)], "joints": joints})
+
+
+def test_snapping_makes_right_angles_and_the_class_that_they_buy() -> None:
+    exact, snapped = (
+        build(robot_file.parse(text(urdf.parse(rough_wrist().encode(), snap=snap).data))) for snap in (False, True)
+    )
+    assert armkin.method(exact)[0] == "near spherical wrist"
+    assert armkin.method(snapped)[0] == "spherical wrist"
+    q = np.random.default_rng(1).uniform(-3, 3, (100, 6))
+    moved = np.abs(armkin.fk(exact, q) - armkin.fk(snapped, q))
+    assert moved[:, :3, 3].max() < 1e-9  # the tip is on the last axis
+    assert 3e-6 < moved.max() < 5e-6
+
+
+def test_the_command_prints_a_robot_file_and_says_what_it_read(tmp_path: Path) -> None:
+    path = tmp_path / "ur5.urdf"
+    path.write_text(as_urdf(CHAINS["ur5"]))
+    several = run("import", path)
+    assert several.code == 2
+    assert several.out == ""
+    assert "the tip must be named: wrist_3_link, ee_link, tool0" in several.err
+    assert "--tip LINK" in several.err
+    done = run("import", path, "--tip", "tool0")
+    assert done.code == 0
+    assert "note: 6 joints from world to tool0" in done.err
+    screws = tmp_path / "screws.yaml"
+    screws.write_text(done.out)
+    table = tmp_path / "dh.yaml"
+    assert run("import", path, "--tip", "tool0", "--dh", "--out", table).code == 0
+    q = (10, -80, 70, -60, 50, 40)
+    poses = [run("fk", file, *q, "--json").json for file in (screws, table)]
+    assert poses[0]["position_mm"] == pytest.approx(poses[1]["position_mm"], abs=1e-9)
+    assert "dh: {alpha: " in table.read_text()
+    assert run("import", path, "--tip", "tool0", "--out", path).code == 2
+    rough = tmp_path / "rough.urdf"
+    rough.write_text(rough_wrist())
+    assert "ik is solved as: near spherical wrist; with --snap as: spherical wrist" in run("import", rough).err
+
+
+@pytest.mark.parametrize(
+    ("raw", "code"), [(b"<robot", 4), (b'<!DOCTYPE r [<!ENTITY a "b">]><robot/>', 4), (document(), 0)]
+)
+def test_exit_codes(raw: bytes, code: int, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(raw)
+    assert run("import", path).code == code
+    assert run("import", tmp_path / "none.urdf").code == 1
+
+
+def test_numbers_are_written_without_exponents_and_come_back() -> None:
+    for value in (1e-5, -1.5e-12, 1 / 3, 123456789.123, 2e22, 0.1 + 0.2):
+        assert "e" not in number(value)
+        assert float(number(value)) == value
+
+
+def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
+    from urdf_chains import turn
+
+    rng = np.random.default_rng(3)
+    for pitch in (0.3, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-10, -np.pi / 2 + 3e-8):
+        roll, yaw = rng.uniform(-3, 3, 2)
+        R = turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll)
+        r, p, y = angles(R.tolist())
+        again = turn([0, 0, 1], y) @ turn([0, 1, 0], p) @ turn([1, 0, 0], r)
+        assert np.abs(again - R).max() < 1e-15 * 8
+
+
+def test_shipped_file_is_data_of_this_project() -> None:
+    assert all(chain["source"] for chain in CHAINS.values())
+    assert (ROOT / "tests/robot_file/urdf_chains.json").exists()
