@@ -7,6 +7,7 @@
     │   ├── RedundantArmError   more joints than the task has constraints
     │   └── NoHomingError       joints without a limit switch
     ├── NoSolutionError    no pose reaches the target, or none within the limits
+    │   └── NoBranchError       branches reach the target, and none that may be taken
     ├── MissingExtraError  an optional package is not installed
     └── LinkError          the port, or the board behind it
         ├── PortInUseError      another armkin has the port
@@ -80,6 +81,13 @@ class NoHomingError(UsageError):
 
 class NoSolutionError(ArmkinError):
     """No pose reaches the target, or none does so within the limits."""
+
+
+class NoBranchError(NoSolutionError):
+    """Branches reach the target, and none within the limits, or none of the name asked for.
+
+    fields: robot, status, distance_mm, branches_within_limits.
+    """
 
 
 class MissingExtraError(ArmkinError):

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from armkin.errors import (
     ArmkinError,
+    NoBranchError,
     NoHomingError,
     PortInUseError,
     PositionKnownError,
@@ -54,6 +55,7 @@ def _lost(error: ArmkinError) -> str:
 _ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError)
 _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     RedundantArmError: _redundant,
+    NoBranchError: lambda error: "ik --all-branches lists all branches, also those outside limits",
     NoHomingError: lambda error: "give --assume-home to the next send",
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
     PositionLostError: _lost,

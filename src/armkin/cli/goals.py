@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armkin.cli import inputs, piped, render
+from armkin.cli import inputs, piped
 from armkin.cli.batch import streamed_rows
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
 from armkin.model import units
@@ -78,24 +78,13 @@ class Goals:
         """Joint values (w, n); near: where the arm stands [rad | mm]."""
         if self.joints is not None:
             return self.joints
-        from armkin.cli import solving
+        from armkin.inverse import choose
 
-        request = solving.Request(
-            arm=arm, task=self.task, near=units.joints_out(arm, near).tolist(), branch=self.branch
-        )
-        [answer] = solving.solve(request, self.target)  # type: ignore[arg-type]
+        request = choose.Request(arm=arm, task=self.task, near=units.joints_out(arm, near).tolist(), branch=self.branch)
+        [answer] = choose.solve(request, self.target)  # type: ignore[arg-type]
         if answer.best is None:
-            nearest = solving.closest(request, self.target[0])  # type: ignore[index]
-            legal = sum(found.within_limits for found in answer.branches)
-            raise render.unsolved(
-                arm,
-                {
-                    "status": answer.status,
-                    "branches_within_limits": legal,
-                    "closest": {"distance_mm": nearest.distance},
-                },
-                answer.refused,
-            )
+            nearest = choose.closest(request, self.target[0])  # type: ignore[index]
+            raise choose.refusal(request, answer, nearest.distance)
         return answer.branches[answer.best].q[None]
 
 

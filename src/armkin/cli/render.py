@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import output
-from armkin.errors import NoSolutionError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -112,22 +111,6 @@ def labelled(names: Sequence[str], values: Sequence[float], each_unit: Sequence[
 def joint_headings(arm: Arm) -> list[str]:
     """Column headings of joint values: ``q1/deg``."""
     return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
-
-
-def unsolved(arm: Arm, answer: dict[str, Any], refused: str | None = None) -> NoSolutionError:
-    """Why there is no best branch, and how far away the nearest legal pose is.
-
-    refused: why the branch that was asked for will not do.
-    """
-    nearest = answer["closest"]
-    away = f"the nearest pose within limits is {nearest['distance_mm']:.4f} mm away"
-    fields = {"robot": arm.name, "status": answer["status"], "distance_mm": nearest["distance_mm"]}
-    if answer["status"] == "unreachable":
-        return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
-    if refused is not None:
-        listed = "ik --all-branches lists all"
-        return NoSolutionError(f"{refused}; {listed if answer['branches_within_limits'] else away}", **fields)
-    return NoSolutionError(f"no branch is within limits (--all-branches shows them); {away}", **fields)
 
 
 def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:

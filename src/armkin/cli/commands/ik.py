@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, render, solving
+from armkin.cli import holding, inputs, output, render
 from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
 from armkin.cli.options import (
     AllBranches,
@@ -27,6 +27,7 @@ from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
+    from armkin.inverse import choose
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -53,19 +54,20 @@ def ik(
     Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
     the nearest pose within limits is shown instead.
     """
+    from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
 
     output.spare(robot, out)
     arm = inputs.load(robot)
     what = task_for(arm, task)
-    held = solving.locks(arm, lock)
-    request = solving.Request(
+    held = holding.locks(arm, lock)
+    request = choose.Request(
         arm=arm,
         task=what.name,
         near=None if near is None else inputs.joint_list(arm, near, "--near"),
         branch=branch,
         held=held,
-        swept=solving.sweeps(arm, sweep, held),
+        swept=holding.sweeps(arm, sweep, held),
     )
     if batch is not None:
         inputs.no_numbers(target)
@@ -90,29 +92,31 @@ def ik(
         return
     values = one_row(inputs.target(arm, what, target)).values
     goal = units.targets_in(what.labels, values)
-    [found] = solving.solve(request, goal)
+    [found] = choose.solve(request, goal)
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None:
-        raise render.unsolved(arm, answer, found.refused)
+        raise choose.refusal(request, found, answer["closest"]["distance_mm"])
 
 
 def _answers(
-    request: solving.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
+    request: choose.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
 ) -> Iterator[dict[str, Any]]:
+    from armkin.inverse import choose
+
     targets = units.targets_in(task.labels, chunk.values)
-    answers = solving.solve(request, targets)
+    answers = choose.solve(request, targets)
     for values, goal, found in zip(chunk.values.tolist(), targets, answers, strict=True):
         yield _answer(request, task, values, goal, found, all_branches, turns, with_closest=with_closest)
 
 
 def _answer(
-    request: solving.Request,
+    request: choose.Request,
     task: Task,
     values: list[float],
     goal: Array,
-    found: solving.Answer,
+    found: choose.Answer,
     all_branches: bool,
     turns: bool,
     *,
@@ -142,9 +146,10 @@ def _answer(
     }
 
 
-def _closest(request: solving.Request, goal: Array, found: solving.Answer) -> dict[str, Any]:
+def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> dict[str, Any]:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for."""
     import armkin
+    from armkin.inverse import choose
 
     arm = request.arm
     if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
@@ -157,7 +162,7 @@ def _closest(request: solving.Request, goal: Array, found: solving.Answer) -> di
             "converged": True,
             "branch": legal.name,
         }
-    nearest = solving.closest(request, goal)
+    nearest = choose.closest(request, goal)
     return {
         "joints": units.joints_out(arm, nearest.q).tolist(),
         "position_mm": nearest.position.tolist(),
@@ -168,7 +173,7 @@ def _closest(request: solving.Request, goal: Array, found: solving.Answer) -> di
     }
 
 
-def _branch(request: solving.Request, branch: solving.Branch, turns: bool) -> dict[str, Any]:
+def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> dict[str, Any]:
     arm = request.arm
     row = {
         "joints": branch.joints,
@@ -180,7 +185,9 @@ def _branch(request: solving.Request, branch: solving.Branch, turns: bool) -> di
         "motion": branch.motion,
     }
     if turns:
-        row["turns"] = solving.turns(request, branch)
+        from armkin.inverse import choose
+
+        row["turns"] = choose.turns(request, branch)
     return row
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, render, solving
+from armkin.cli import holding, inputs, render
 from armkin.cli.batch import batch_rows
 from armkin.cli.numbers import listed
 from armkin.cli.options import Joints, Lock, Robot, TaskName
@@ -103,13 +103,14 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     import numpy as np
 
     from armkin.forward import position
+    from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)
     values = inputs.target_list(arm, what, text)
-    request = solving.Request(arm=arm, task=what.name, held=solving.locks(arm, lock))
-    [answer] = solving.solve(request, units.targets_in(what.labels, [values]))
+    request = choose.Request(arm=arm, task=what.name, held=holding.locks(arm, lock))
+    [answer] = choose.solve(request, units.targets_in(what.labels, [values]))
     goal = render.labelled(what.labels, values, units.label_units(what.labels))
     if not answer.branches:
         raise NoSolutionError(f"{arm.name} cannot reach {goal}: there is no branch to draw")

@@ -1,24 +1,34 @@
-"""Inverse kinematics for the command line: one answer a target, branches sorted, locked joints put back."""
+"""One answer a target: joints held or swept, branches of the whole arm sorted, one chosen, or why none is.
+
+`ik` gives arrays; this gives what a person or a page wants to know of each target, in mm and degrees
+(`armkin.model.units`).
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from armkin.cli import output
-from armkin.cli.numbers import number, whole
-from armkin.errors import UsageError
-from armkin.model import units
+import numpy as np
+
+from armkin.errors import NoBranchError, NoSolutionError, UsageError
+from armkin.inverse.branches.names import find
+from armkin.inverse.branches.turns import turns as copies_of
+from armkin.inverse.closest import Closest
+from armkin.inverse.closest import closest as nearest_pose
+from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.solve import ik
+from armkin.model import limits, units
+from armkin.model.lock import lock, unlock
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
-    from armkin.inverse.closest import Closest
-    from armkin.inverse.solutions import Solutions
     from armkin.model.arm import Arm
 
-MOST_SWEEPS = 10_000
+MOST_SWEEPS = 10_000  # combinations of swept values that are tried
 
 
 @dataclass(frozen=True)
@@ -66,16 +76,21 @@ class Answer:
 
 
 def solve(request: Request, targets: Array) -> list[Answer]:
-    """Answer targets (N, ...) [mm, rad]."""
-    import armkin
-    from armkin.inverse.branches.names import find
+    """Answer targets (N, ...) [mm, rad].
 
+    Raises UsageError if the task does not fit the arm, no branch has the name asked for, or more than
+    MOST_SWEEPS combinations are swept.
+    """
+    combinations = math.prod(len(values) for values in request.swept.values())
+    if combinations > MOST_SWEEPS:
+        message = f"{combinations} combinations of swept values; at most {MOST_SWEEPS} are tried"
+        raise UsageError(message, combinations=combinations, most=MOST_SWEEPS)
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     parts: list[list[tuple[int, Answer, set[str]]]] = [[] for _ in targets]
     for held in _holds(request):
-        one = armkin.lock(arm, held) if held else arm
-        s = armkin.ik(one, targets, request.task, near=near[_kept(arm, held)])
+        one = lock(arm, held) if held else arm
+        s = ik(one, targets, request.task, near=near[_kept(arm, held)])
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
@@ -86,71 +101,39 @@ def solve(request: Request, targets: Array) -> list[Answer]:
 
 def closest(request: Request, target: Array) -> Closest:
     """The pose within limits nearest to one target [mm, rad], with swept joints free."""
-    from dataclasses import replace
-
-    import armkin
-
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     held = _in(arm, request.held)
-    one = armkin.lock(arm, held) if held else arm
-    nearest = armkin.closest(one, target, request.task, near=near[_kept(arm, held)])
-    return replace(nearest, q=armkin.unlock(arm, held, nearest.q)) if held else nearest
+    one = lock(arm, held) if held else arm
+    nearest = nearest_pose(one, target, request.task, near=near[_kept(arm, held)])
+    return replace(nearest, q=unlock(arm, held, nearest.q)) if held else nearest
 
 
 def turns(request: Request, branch: Branch) -> list[list[float]]:
     """All copies of a branch within limits, whole turns away, the nearest first [deg | mm]; held joints stay."""
-    import numpy as np
-
-    import armkin
-
     arm = request.arm
-    copies = armkin.turns(arm, branch.q, near=units.joints_in(arm, request.near_out))
+    copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
     return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
 
 
-def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
-    """`--lock J=V`: joint name -> value [deg | mm]."""
-    found: dict[str, float] = {}
-    for text in words or ():
-        name, value = _named(arm, text, "--lock", "J3=20", found)
-        found[name] = number(value, f"--lock {name}")
-        low, high = units.limits_out(arm)[arm.joint_names.index(name)]
-        if not low <= found[name] <= high:
-            output.warn(f"--lock {text}: the limits of {name} are {low:g} to {high:g}: all branches are outside")
-    return found
-
-
-def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
-    """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
-    found: dict[str, list[float]] = {}
-    total = 1
-    for text in words or ():
-        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", {**held, **found})
-        parts = value.split(":")
-        if len(parts) != 3:
-            raise UsageError(f"--sweep {text}: write JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16")
-        low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
-        count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
-        found[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
-        total *= count
-    if total > MOST_SWEEPS:
-        raise UsageError(f"--sweep: {total} combinations; at most {MOST_SWEEPS} are tried")
-    return found
-
-
-def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
-    from armkin.model.lock import joint_index
-
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise UsageError(f"{option} {text}: write JOINT=VALUE, for example {example}")
-    joint_index(arm, name)
-    if name in taken:
-        raise UsageError(f"{option} {text}: {name} is held already")
-    return name, value
+def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionError:
+    """Why an answer has no best branch; distance: how far away the nearest pose within limits is [mm]."""
+    arm = request.arm
+    away = f"the nearest pose within limits is {distance:.4f} mm away"
+    legal = sum(branch.within_limits for branch in answer.branches)
+    fields: dict[str, Any] = {
+        "robot": arm.name,
+        "status": answer.status,
+        "distance_mm": distance,
+        "branches_within_limits": legal,
+    }
+    if answer.status == "unreachable":
+        return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
+    if answer.refused is not None:
+        return NoBranchError(answer.refused if legal else f"{answer.refused}; {away}", **fields)
+    return NoBranchError(f"no branch is within limits; {away}", **fields)
 
 
 def _holds(request: Request) -> Iterator[dict[str, float]]:
@@ -171,13 +154,8 @@ def _kept(arm: Arm, held: Mapping[str, float]) -> list[int]:
 
 def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
     """The answers of one solver call, for the whole arm."""
-    import numpy as np
-
-    import armkin
-    from armkin.model import limits
-
     arm = request.arm
-    q = armkin.unlock(arm, held, s.q) if held else s.q
+    q = unlock(arm, held, s.q) if held else s.q
     outside = limits.outside(arm, q)  # nan is not outside anything
     within = s.within_limits & ~outside.any(axis=-1)
     mm, rad = s.residual()
@@ -209,7 +187,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
             if valid[b]
         ]
         free = [name for name, is_free in zip(kept, s.free[i].tolist(), strict=True) if is_free]
-        yield Answer(armkin.Status(status).name.lower(), s.method, s.why, sure, free, branches, None)
+        yield Answer(Status(status).name.lower(), s.method, s.why, sure, free, branches, None)
 
 
 def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answer:

@@ -1,0 +1,54 @@
+"""Joints held or swept, as words: `--lock J3=20`, `--sweep J3=-90:90:16`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import output
+from armkin.cli.numbers import number, whole
+from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
+    """`--lock J=V`: joint name -> value [deg | mm]."""
+    found: dict[str, float] = {}
+    for text in words or ():
+        name, value = _named(arm, text, "--lock", "J3=20", found)
+        found[name] = number(value, f"--lock {name}")
+        low, high = units.limits_out(arm)[arm.joint_names.index(name)]
+        if not low <= found[name] <= high:
+            output.warn(f"--lock {text}: the limits of {name} are {low:g} to {high:g}: all branches are outside")
+    return found
+
+
+def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
+    """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
+    from armkin.inverse.choose import MOST_SWEEPS
+
+    found: dict[str, list[float]] = {}
+    for text in words or ():
+        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", {**held, **found})
+        parts = value.split(":")
+        if len(parts) != 3:
+            raise UsageError(f"--sweep {text}: write JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16")
+        low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
+        count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
+        found[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
+    return found
+
+
+def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
+    from armkin.model.lock import joint_index
+
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise UsageError(f"{option} {text}: write JOINT=VALUE, for example {example}")
+    joint_index(arm, name)
+    if name in taken:
+        raise UsageError(f"{option} {text}: {name} is held already")
+    return name, value
