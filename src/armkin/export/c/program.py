@@ -54,6 +54,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "joints": str(arm.n),
         "branches": str(branches),
         "target": str(target_size(task)),
+        "goal": str(kernel.goal_size(task)),
         "target_is": _target_is(task),
         "joints_are": ", ".join(
             f"{name} [{'mm' if slides else 'rad'}]" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)
@@ -66,7 +67,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     parts = [
         part("source_head"),
         part("numbers_float" if single else "numbers_double"),
-        settings(task, single),
+        settings(single),
         kernel.forward_kinematics(arm, single),
         kernel.jacobian(arm, single),
         solve,
@@ -76,7 +77,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part("source_tail"),
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single))
-    return Program(*(_named(_filled(text, fields), prefix) for text in texts))
+    return Program(*(_named(filled(text, fields), prefix) for text in texts))
 
 
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
@@ -91,11 +92,11 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     )
 
 
-def settings(task: Task, single: bool = False) -> str:
+def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
     values = _SINGLE if single else _DOUBLE
     lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
-    return "\n".join([*lines, f"#define ARM_GOAL {kernel.goal_size(task)}", ""])
+    return "\n".join([*lines, ""])
 
 
 def target_size(task: Task) -> int:
@@ -118,7 +119,8 @@ def identifier(name: str) -> str:
     return text if text[0].isalpha() else f"arm_{text}"
 
 
-def _filled(text: str, fields: dict[str, str]) -> str:
+def filled(text: str, fields: dict[str, str]) -> str:
+    """A text with its @names@ filled in."""
     return re.sub(r"@(\w+)@", lambda match: fields[match[1]], text)
 
 
