@@ -33,6 +33,7 @@ MAY_IMPORT: dict[str, str] = {
     "export": "errors formula robot_file model forward inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
+    "compiled": "errors formula model forward inverse inverse/tasks inverse/branches inverse/closed export/c",
     "view": "errors formula model forward",
     "plot": "errors files formula model forward view reach",
     "board/ports": "errors",

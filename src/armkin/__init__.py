@@ -15,6 +15,8 @@ TYPE_CHECKING = False  # type checkers know better; importing typing would doubl
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from armkin.compiled.arm import CompiledArm as CompiledArm
+    from armkin.compiled.arm import compile as compile
     from armkin.errors import ArmkinError as ArmkinError
     from armkin.errors import FileError as FileError
     from armkin.errors import LinkError as LinkError
@@ -46,6 +48,8 @@ if TYPE_CHECKING:
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
+    "CompiledArm": "compiled.arm",
+    "compile": "compiled.arm",
     "ArmkinError": "errors",
     "FileError": "errors",
     "LinkError": "errors",

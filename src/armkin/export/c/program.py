@@ -85,11 +85,16 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
 
     Raises UsageError if the class has no form in C.
     """
-    if geometry.pairs is not None:
+    if has_form(geometry):
         return kernel.candidates(arm, task, geometry, single, prefer)
     raise UsageError(
         f"{arm.name}: its class ({geometry.name}) has no form in C yet; the task {task.name} is solved in Python alone"
     )
+
+
+def has_form(geometry: Geometry) -> bool:
+    """Whether a class of arms can be written in C."""
+    return geometry.pairs is not None
 
 
 def settings(single: bool = False) -> str:

@@ -1,0 +1,15 @@
+/* @about@ */
+#include <math.h>
+#include <stdint.h>
+
+#define ARM_LANES 32 /* poses worked on at once: vectors of the compiler's choice, and blocks that stay in the cache */
+#define ARM_INLINE static inline __attribute__((always_inline))
+#define ARM_RESTRICT restrict
+#define ARM_ROUNDED 1e-14 /* a rotation this far from orthonormal is taken as it is: `armkin.inverse.tasks` */
+#define ARM_WILD 1e5 /* rad: beyond, angles are left to Python, whose functions reduce them exactly */
+
+typedef double arm_real;
+enum { ARM_JOINTS = @joints@ };
+
+const char arm_content[] = "@content@";
+

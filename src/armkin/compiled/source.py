@@ -1,0 +1,106 @@
+"""The C file that `armkin.compile` builds: an arm's formulas, and the loop over a batch."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from armkin.export.c import kernel, program
+from armkin.formula.c_code import number
+from armkin.inverse.solve import ACCEPTED, ACCEPTED_MM, FAR
+from armkin.inverse.tasks.task import LARGEST
+
+if TYPE_CHECKING:
+    from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+PARTS = Path(__file__).parent / "parts"
+
+
+class Library(NamedTuple):
+    """A C file, its content's sha256, which it holds as `arm_content`, and branches: 0 if it has no `arm_batch`."""
+
+    text: str
+    content: str
+    branches: int
+
+
+def library(arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
+    """The C file of an arm: fk alone without a task, or if the class has no form in C."""
+    solve, branches = ("", 0)
+    if task is not None and geometry is not None and program.has_form(geometry):
+        solve, branches = program.candidates(arm, task, geometry, prefer=False)
+    fields = {
+        "about": f"{program.identifier(arm.name)}: built for this computer by armkin.compile.",
+        "joints": str(arm.n),
+    }
+    parts = [_part("head"), program.settings(), _fast_numbers(), kernel.forward_kinematics(arm), _part("fk")]
+    if branches:
+        assert task is not None
+        fields |= _of_task(arm, task, branches)
+        gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
+        parts += [_part("sizes"), solve, program.part("copies"), _choose(arm, branches), _part(gather), _part("batch")]
+    text = program.filled("\n".join(parts), {**fields, "content": "@content@"})
+    content = hashlib.sha256(text.encode()).hexdigest()
+    return Library(text.replace("@content@", content), content, branches)
+
+
+def _of_task(arm: Arm, task: Task, branches: int) -> dict[str, str]:
+    """What the parts of `ik` are filled in with."""
+    most = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
+    if task.orientation == "axis":
+        most += [number(2.0)] * 3
+    return {
+        "branches": str(branches),
+        "target": str(program.target_size(task)),
+        "goal": str(kernel.goal_size(task)),
+        "accepted": number(min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2),
+        "farthest": number(_farthest(arm)),
+        "most": ", ".join(most),
+        "axis": str(int(task.orientation == "axis")),
+    }
+
+
+def _farthest(arm: Arm) -> float:
+    """How large a coordinate may be [mm]; with slides, so that the target is no more than `FAR` reaches away."""
+    if not arm.prismatic.any():
+        return LARGEST
+    return max((FAR * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
+
+
+def _part(name: str) -> str:
+    return (PARTS / f"{name}.c").read_text(encoding="utf-8")
+
+
+def _fast_numbers() -> str:
+    """The numbers of double precision, with this file's own tan and atan2."""
+    numbers = program.part("numbers_double")
+    return numbers.partition("#ifndef ARM_TAN")[0] + program.part("fast_numbers")
+
+
+def _choose(arm: Arm, branches: int) -> str:
+    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits."""
+    lines = []
+    for j in range(arm.n):
+        lower, upper = (number(float(limit[j])) for limit in (arm.lower, arm.upper))
+        at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
+        if arm.prismatic[j]:
+            lines.append(f"in &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);")
+        else:
+            lines.append(f"{at} = arm_copy({at}, near[{j} * ARM_LANES + i], {lower}, {upper}, &in);")
+    body = "\n".join(f"            {line}" for line in lines)
+    return f"""static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
+    int count)
+{{
+    int i, b;
+    for (b = 0; b < {branches}; b++)
+        for (i = 0; i < count; i++) {{
+            int in = 1;
+{body}
+            inside[b * ARM_LANES + i] = in;
+        }}
+}}
+"""

@@ -1,0 +1,177 @@
+"""`armkin.compile`: machine code says what Python says, wherever it comes from."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.compiled import toolchain
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.task import targets_of
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+CLOSED = ["three_dof", "puma560", "ur5e", "labvolt_5150", "cobra600", "stanford"]
+
+
+def same(a: armkin.Solutions, b: armkin.Solutions) -> None:
+    """Two answers to the same question: alike but for the rounding of joint values."""
+    for name in ("valid", "within_limits", "branch", "status", "free", "complete", "near", "target"):
+        left, right = getattr(a, name), getattr(b, name)
+        assert left.dtype == right.dtype, name
+        np.testing.assert_array_equal(left, right, err_msg=name)
+    # of two copies half a turn to either side of near, rounding takes one
+    tie = np.abs(np.abs(a.q - a.near[..., None, :]) - np.pi) < 1e-8
+    turn = np.where(tie & ~a.arm.prismatic, 2 * np.pi, 0.0)
+    apart = np.abs(a.q - b.q)
+    np.testing.assert_array_equal(np.isnan(a.q), np.isnan(b.q))
+    assert np.nan_to_num(np.minimum(apart, np.abs(apart - turn))).max(initial=0.0) < 1e-8
+    assert (a.names, a.method, a.why, a.arm, a.task) == (b.names, b.method, b.why, b.arm, b.task)
+
+
+def questions(arm: armkin.Arm, kind: str, count: int) -> np.ndarray:
+    """Targets of random postures, of multiples of 45 degrees, out of reach, or rounded."""
+    rng = np.random.default_rng(4)
+    unit = np.where(arm.prismatic, arm.reach / 8, np.pi)
+    q = rng.uniform(-1, 1, (count, arm.n)) * unit
+    if kind == "corners":
+        q = rng.integers(-4, 5, (count, arm.n)) / 4 * unit
+    task = solver(arm, None)[0]
+    target = targets_of(task, armkin.fk(arm, q), q)
+    if kind == "far":
+        target = target.copy()
+        target[..., : task.position if task.orientation != "full" else 3, *([3] if target.ndim == 3 else [])] *= 1.5
+    return target.astype(np.float32).astype(float) if kind == "float32" else target
+
+
+@pytest.mark.parametrize("kind", ["random", "corners", "far", "float32"])
+@pytest.mark.parametrize("robot", CLOSED)
+def test_it_says_what_python_says(robot: str, kind: str) -> None:
+    arm = armkin.load(ROBOTS / f"{robot}.yaml")
+    target = questions(arm, kind, 200 if kind == "corners" else 1000)
+    same(armkin.ik(arm, target), armkin.compile(arm).ik(target))
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "puma560", "labvolt_5150", "cobra600"])
+def test_one_target_and_its_shapes(robot: str) -> None:
+    arm = armkin.load(ROBOTS / f"{robot}.yaml")
+    fast = armkin.compile(arm)
+    target = questions(arm, "random", 4)
+    for given in (target[0], target[0].tolist(), target.reshape(2, 2, *target.shape[1:]), target[:0]):
+        same(armkin.ik(arm, given), fast.ik(given))
+    same(armkin.ik(arm, target[1], near=arm.home + 3), fast.ik(target[1], near=arm.home + 3))
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "puma560", "three_dof"])
+def test_near_decides_the_copies(robot: str) -> None:
+    arm = armkin.load(ROBOTS / f"{robot}.yaml")
+    fast = armkin.compile(arm)
+    target = questions(arm, "random", 300)
+    near = np.random.default_rng(5).uniform(-6, 6, (300, arm.n))
+    same(armkin.ik(arm, target, near=near[0]), fast.ik(target, near=near[0]))
+    each = fast.ik(target, near=near)
+    for k in range(40):
+        same(armkin.ik(arm, target[k], near=near[k]), fast.ik(target[k], near=near[k]))
+        np.testing.assert_array_equal(each.q[k], fast.ik(target[k : k + 1], near=near[k : k + 1]).q[0])
+
+
+def test_poses_are_those_of_python() -> None:
+    for robot in ("three_dof", "ur5e", "cobra600", "jaco_j2n6s300", "panda"):
+        arm = armkin.load(ROBOTS / f"{robot}.yaml")
+        q = np.random.default_rng(6).uniform(-20, 20, (500, arm.n))
+        q[3, 0], q[4, 0], q[5, 0] = 1e9, np.nan, np.pi
+        np.testing.assert_allclose(armkin.compile(arm).fk(q), armkin.fk(arm, q), atol=1e-9 * arm.reach)
+        np.testing.assert_allclose(armkin.compile(arm).fk(q[0]), armkin.fk(arm, q[0]), atol=1e-9 * arm.reach)
+
+
+def test_what_is_no_target_is_refused_in_the_same_words() -> None:
+    arm = armkin.load(ROBOTS / "puma560.yaml")
+    fast = armkin.compile(arm)
+    bad = np.eye(4)
+    bad[0, 0] = 1.1
+    for target, near in (
+        (bad, None),
+        (np.eye(3), None),
+        (np.full((4, 4), np.nan), None),
+        (np.eye(4), [0, 0]),
+        ("x", None),
+    ):
+        with pytest.raises(armkin.UsageError) as python:
+            armkin.ik(arm, target, near=near)
+        with pytest.raises(armkin.UsageError) as compiled:
+            fast.ik(target, near=near)
+        assert str(compiled.value) == str(python.value)
+
+
+def test_workers_change_nothing() -> None:
+    arm = armkin.load(ROBOTS / "ur5e.yaml")
+    fast = armkin.compile(arm)
+    target = questions(arm, "random", 20_000)
+    one, two = fast.ik(target), fast.ik(target, workers=2)
+    np.testing.assert_array_equal(one.q, two.q)
+    same(one, two)
+    q = np.nan_to_num(one.q[:, 0])
+    np.testing.assert_array_equal(fast.fk(q), fast.fk(q, workers=3))
+    with pytest.raises(armkin.UsageError, match="workers"):
+        fast.ik(target, workers=0)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache folder, of a user who has compiled nothing."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "armkin" / "compiled"
+
+
+SOURCE = 'const char arm_content[] = "abc"; int answer(void); int answer(void) { return 42; }'
+
+
+def test_what_was_built_is_kept_and_used_again(cache: Path) -> None:
+    assert toolchain.load(SOURCE, "abc").answer() == 42
+    [kept] = cache.glob("*.so")
+    assert stat.S_IMODE(cache.stat().st_mode) == 0o700
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o700
+    before = kept.stat().st_mtime_ns
+    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert kept.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("harm", ["open folder", "open file", "link", "torn", "another"])
+def test_what_others_could_have_written_is_not_loaded(cache: Path, harm: str, tmp_path: Path) -> None:
+    toolchain.load(SOURCE, "abc")
+    [kept] = cache.glob("*.so")
+    evil = tmp_path / "evil.so"
+    text = SOURCE.replace("42", "666").replace("abc", "abd" if harm == "another" else "abc")
+    subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", evil], input=text.encode(), check=True)
+    kept.unlink()
+    if harm == "link":
+        kept.symlink_to(evil)
+    else:
+        kept.write_bytes(evil.read_bytes() if harm != "torn" else b"\x7fELF")
+        kept.chmod(0o722 if harm == "open file" else 0o700)
+    if harm == "open folder":
+        cache.chmod(0o777)
+    assert toolchain.load(SOURCE, "abc").answer() == 42
+
+
+def test_without_a_place_to_keep_it_it_is_built_all_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(file))
+    assert toolchain.load(SOURCE, "abc").answer() == 42
+
+
+def test_without_a_compiler_one_line_says_what_to_install() -> None:
+    code = "import armkin; armkin.compile(armkin.load('robots/three_dof.yaml'))"
+    environment = {**os.environ, "PATH": str(Path(sys.executable).parent), "CC": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment, cwd=ROBOTS.parent
+    )
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("armkin.errors.MissingExtraError: a C compiler is needed and none is installed: apt install")
