@@ -39,7 +39,7 @@ MAY_IMPORT: dict[str, str] = {
     "board/ports": "errors",
     "board/firmware": "errors hardware formula model motors motion board/ports robot_file",
     "board/sim": "errors hardware board/ports board/firmware",
-    "board": "errors hardware board/ports board/firmware board/sim",
+    "board": "errors hardware formula model forward motors motion board/ports board/firmware board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion reach view board board/ports board/firmware",
 }

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import queue
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armkin.cli import inputs, piped
 from armkin.cli.batch import streamed_rows
-from armkin.errors import ArmkinError, FileError, NoSolutionError, UsageError
+from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.cutting import Cut
+    from armkin.board.moving import Stream
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-
-Planner = Callable[[Sequence[int], "Array"], "Cut"]  # counts to start from, joint values (w, n) [rad | mm]
 
 
 def goals(
@@ -55,7 +51,9 @@ def goals(
         goal = units.targets_in(what.labels, np.array([values]))
         return arm, Goals(None, [1], goal, what.name, branch)
     if batch == "-":
-        return arm, Stream(arm, batch)
+        from armkin.board.moving import Stream
+
+        return arm, Stream(arm, streamed_rows(batch, arm.joint_names, arm.name))
     if batch is not None:
         rows = list(streamed_rows(batch, arm.joint_names, arm.name))
         if not rows:
@@ -86,49 +84,6 @@ class Goals:
             nearest = choose.closest(request, self.target[0])  # type: ignore[index]
             raise choose.refusal(request, answer, nearest.distance)
         return answer.branches[answer.best].q[None]
-
-
-class Stream:
-    """Rows of standard input, each planned and sent as soon as it has come."""
-
-    def __init__(self, arm: Arm, source: str) -> None:
-        self.problem: ArmkinError | None = None
-        self._rows: queue.SimpleQueue[tuple[int, list[float]] | ArmkinError | None] = queue.SimpleQueue()
-        self._arm, self._source = arm, source
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        try:
-            for row in streamed_rows(self._source, self._arm.joint_names, self._arm.name):
-                self._rows.put(row)
-        except ArmkinError as error:
-            self._rows.put(error)
-        self._rows.put(None)
-
-    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Cut | None]:
-        """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
-        at, empty = list(start), True
-        while True:
-            try:
-                item = self._rows.get_nowait()
-            except queue.Empty:
-                yield None
-                continue
-            if item is None:
-                break
-            if isinstance(item, ArmkinError):
-                self.problem = item
-                return
-            empty = False
-            try:
-                plan = planner(at, units.joints_in(self._arm, [item[1]]))
-            except (NoSolutionError, UsageError) as error:
-                self.problem = type(error)(f"row {item[0]}: {error}; the rows before it were carried out")
-                return
-            at = plan.end.tolist()
-            yield plan
-        if empty:
-            self.problem = UsageError("standard input has no rows: nothing was moved")
 
 
 def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:

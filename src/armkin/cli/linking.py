@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,6 @@ import typer
 
 from armkin.cli import completion, output, render
 from armkin.errors import UsageError
-from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
@@ -48,6 +46,7 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
     if given is not None:
         return given
     from armkin.board.firmware.finding import answering
+    from armkin.board.stopping import stoppable
 
     kind = "a board" if configuration is None else f"an {configuration.board.kind}"
     with stoppable() as stop:
@@ -62,39 +61,6 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
     )
 
 
-class Stop:
-    """Whether somebody asked to stop: Ctrl-C, SIGTERM, a closed terminal."""
-
-    def __init__(self) -> None:
-        self.signal = 0
-
-    def __call__(self) -> bool:
-        return self.signal != 0
-
-    def caught(self, number: int, frame: object) -> None:
-        """The signal handler; a second Ctrl-C does not wait for the board."""
-        if self.signal:
-            raise KeyboardInterrupt
-        self.signal = number
-
-
-@contextmanager
-def stoppable() -> Iterator[Stop]:
-    """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
-    from armkin.board.firmware.session import StoppedError
-
-    stop = Stop()
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    before = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
-    try:
-        yield stop
-    except StoppedError:
-        raise SystemExit(128 + stop.signal) from None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 @contextmanager
 def machine(
     arm: Arm, configuration: Configuration, port: str | None, baud: int, *, simulated: str = _AT_HOME
@@ -103,26 +69,20 @@ def machine(
 
     simulated: what to say of a board in this process.
     """
-    from armkin.board.firmware.machine import Machine
     from armkin.board.firmware.session import StoppedError
-    from armkin.board.opening import open_port
+    from armkin.board.opening import open_machine
+    from armkin.board.stopping import stoppable
 
     port = port_name(port, configuration, baud)
-    with stoppable() as stop:
-        link = open_port(port, board=configuration.board, baud=baud)
+    if port == SIM:
+        output.note(simulated)
+    with stoppable() as stop, open_machine(arm, configuration, port, baud=baud, stop=stop) as one:
         try:
-            if link.simulated:
-                output.note(simulated)
-            one = Machine(link, arm, configuration, stop)
-            try:
-                yield one
-            except StoppedError as error:
-                if error.status is not None:
-                    one.status = error.status
-                    output.warn(f"stopped: {one.standing()}")
-                raise
-        finally:
-            link.close()
+            yield one
+        except StoppedError as error:
+            if error.status is not None:
+                output.warn(f"stopped: {one.standing()}")
+            raise
 
 
 def configured(arm: Arm, *, rehearsal: bool = False) -> Configuration:
@@ -130,22 +90,6 @@ def configured(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     from armkin.board.firmware.configuration import configure
 
     return configure(arm, rehearsal=rehearsal)
-
-
-def where(machine: Machine) -> dict[str, Any]:
-    """JSON: where the arm stands."""
-    import armkin
-
-    arm = machine.arm
-    known = machine.position() != "lost"
-    q = machine.joints() if known else None
-    return {
-        "position": machine.position(),
-        "pulses": list(machine.counts()) if known else None,
-        "joints": None if q is None else units.joints_out(arm, q).tolist(),
-        "joint_units": units.names(arm),
-        "position_mm": None if q is None else (armkin.fk(arm, q)[:3, 3] + 0.0).tolist(),
-    }
 
 
 def where_text(arm: Arm, found: dict[str, Any]) -> str:

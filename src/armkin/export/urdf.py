@@ -60,7 +60,7 @@ def urdf(arm: Arm) -> str:
 
 def _comment(arm: Arm) -> str:
     source = f"; {arm.file.source}" if arm.file is not None and arm.file.source else ""
-    text = f"{arm.name}, written by armkin export --urdf{source}"
+    text = f"{arm.name}, written by armkin{source}"
     return text.replace("--", "- -").replace("\n", " ")
 
 

@@ -29,13 +29,14 @@ def home(
     file's homing. Keep clear of the arm: it moves as far as it must.
     """
     from armkin.board.firmware import homing
+    from armkin.board.moving import where
 
     arm = inputs.load(robot)
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     homing.searches(arm, configuration, joints or ())  # refuses before a port is opened
     with linking.machine(arm, configuration, port, baud) as machine:
         homing.home(machine, joints or (), lambda name: output.note(f"homing {name}"))
-        found = linking.where(machine)
+        found = where(machine)
     with output.destination(None) as write:
         write(
             render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"

@@ -35,6 +35,7 @@ def jog(
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
     itself when this command falls silent, and before the joint limits if the position is known.
     """
+    from armkin.board.moving import where
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)
@@ -53,7 +54,7 @@ def jog(
             rate = top / _SLOW if rate > 0 else -top / _SLOW
             output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
         machine.jog(_rates(arm, machine, j, rate), time)
-        found = linking.where(machine)
+        found = where(machine)
     with output.destination(None) as write:
         write(
             render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"

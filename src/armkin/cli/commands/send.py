@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.goals import Goals, Stream
 from armkin.cli.goals import goals as read_goals
 from armkin.cli.linking import SIM, AssumeHome, Baud, PortName
 from armkin.cli.numbers import number
@@ -18,9 +17,9 @@ from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.cutting import Cut
-    from armkin.formula.arrays import Array
+    from armkin.board.moving import Planner, Stream
+    from armkin.cli.goals import Goals
     from armkin.model.arm import Arm
 
 
@@ -68,6 +67,8 @@ def send(
     All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
     its path; its position stays known.
     """
+    from armkin.board.moving import Planner, Stream, where
+
     fraction = number(speed, "--speed") / 100
     if not 0 < fraction <= 1:
         raise UsageError(f"--speed: '{speed}' must be above 0 and at most 100 percent")
@@ -77,7 +78,7 @@ def send(
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     arm, goals = read_goals(robot, q, target, branch, task, batch)
     configuration = linking.configured(arm, rehearsal=dry_run or port == SIM)
-    planner = _Planner(arm, configuration, fraction)
+    planner = Planner(arm, configuration, fraction)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
@@ -92,7 +93,7 @@ def send(
         began = machine.counts()
         planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
-            source: Iterable[Cut | None] = goals.plans(planner.plan, began)
+            source: Iterable[Cut | None] = goals.plans(planner, began)
             whole = None  # how many rows will come is not known
         else:
             source = plans = _all(planner, goals, began)  # every refusal before anything moves
@@ -101,91 +102,20 @@ def send(
         with output.progress("ms of motion", whole) as tick:
             machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
         planned = planner.summary(planner.done, began)
-        found = {**planned, "port": machine.session.port.name, **linking.where(machine)}
+        found = {**planned, "port": machine.session.port.name, **where(machine)}
     with output.destination(None) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
 
 
-class _Planner:
-    """Plans for one arm at one speed, and what they come to."""
-
-    def __init__(self, arm: Arm, configuration: Configuration, speed: float) -> None:
-        self.arm, self.speed = arm, speed
-        self.done: list[Cut] = []
-        self.use(configuration.board.clock, configuration.board.min_interval)
-
-    def use(self, clock: int, min_interval: int) -> None:
-        """Take the figures of the board that is there."""
-        self.clock, self.min_interval = clock, min_interval
-
-    def counts(self, q: Array) -> list[int]:
-        """Counts at joint values."""
-        import armkin
-
-        return list(armkin.pulses(self.arm, q).tolist())
-
-    def plan(self, start: Sequence[int], q: Array) -> Cut:
-        """A plan through joint values (w, n) [rad | mm]."""
-        from armkin.board.firmware.cutting import plan
-
-        return plan(self.arm, start, q, speed=self.speed, clock=self.clock, min_interval=self.min_interval)
-
-    def noted(self, plans: Iterable[Cut | None]) -> Iterator[Cut | None]:
-        """The same plans, remembered for the summary."""
-        for plan in plans:
-            if plan is not None:
-                self.done.append(plan)
-            yield plan
-
-    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> dict[str, Any]:
-        """JSON: what the plans come to."""
-        import numpy as np
-
-        import armkin
-        from armkin.motors import motor_names, pulse_units
-
-        arm = self.arm
-        first = list(start) if start is not None else plans[0].start.tolist()
-        last = plans[-1].end.tolist() if plans else first
-        top = np.max([plan.trajectory.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
-        rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
-        end = armkin.joints(arm, last)
-        return {
-            "waypoints": sum(len(plan.ends) for plan in plans),
-            "start_joints": units.joints_out(arm, armkin.joints(arm, first)).tolist(),
-            "joints": units.joints_out(arm, end).tolist(),
-            "joint_units": units.names(arm),
-            "motors": motor_names(arm),
-            "pulse_units": pulse_units(arm),
-            "start_pulses": first,
-            "pulses": last,
-            "moves": [b - a for a, b in zip(first, last, strict=True)],
-            "position_mm": (armkin.fk(arm, end)[:3, 3] + 0.0).tolist(),
-            "duration_s": sum(plan.duration for plan in plans),
-            "segments": sum(plan.segments for plan in plans),
-            "top_speed": units.joints_out(arm, top).tolist(),
-            "top_rate": rate.tolist(),
-        }
-
-
-def _all(planner: _Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Cut]:
+def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Cut]:
     """All plans at once, from counts; a stream is read to its end."""
     import armkin
+    from armkin.board.moving import Stream
 
     if isinstance(goals, Stream):
-        import time
-
-        plans = []
-        for plan in goals.plans(planner.plan, start):
-            if plan is None:
-                time.sleep(0.01)
-            else:
-                plans.append(plan)
-        if goals.problem is not None:
-            raise goals.problem
-        return plans
+        return goals.whole(planner, start)
     near = armkin.joints(planner.arm, list(start))
     return [planner.plan(start, goals.resolve(planner.arm, near))]
 

@@ -30,6 +30,7 @@ def status(robot: Robot, port: PortName = None, baud: Baud = linking.BAUD, json:
 
 def _found(machine: Machine) -> dict[str, Any]:
     from armkin.board.firmware.protocol import Error, Flag, State
+    from armkin.board.moving import where
 
     info, status, board = machine.info, machine.status, machine.configuration.board
     flags = Flag(status.flags)
@@ -39,7 +40,7 @@ def _found(machine: Machine) -> dict[str, Any]:
         "board": board.kind,
         "firmware": ".".join(map(str, info.firmware)),
         "configured": machine.configured,
-        **linking.where(machine),
+        **where(machine),
         "state": State(status.state).name.lower(),
         "error": Error(status.error).name.lower() if status.error else None,
         "drivers_on": Flag.DRIVERS in flags,

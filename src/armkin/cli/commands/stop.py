@@ -26,8 +26,9 @@ def stop(port: PortName = None, baud: Baud = linking.BAUD) -> None:
         output.note(f"process {process} has stopped the arm and given the port back")
         return
     from armkin.board.firmware.session import Session
+    from armkin.board.stopping import stoppable
 
-    with linking.stoppable() as asked:
+    with stoppable() as asked:
         link = SerialPort(port, baud)
         try:
             session = Session(link, asked)

@@ -1,0 +1,152 @@
+"""An arm that is told where to go: plans for its board one after another, rows as they come, where it stands."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.board.firmware.cutting import Cut, plan
+from armkin.errors import ArmkinError, NoSolutionError, UsageError
+from armkin.forward import fk
+from armkin.model import units
+from armkin.motors import joints, motor_names, pulse_units, pulses
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.machine import Machine
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+_AHEAD = 1000  # rows that are read before they are planned
+
+
+class Planner:
+    """Plans for one arm at one speed, and what they come to."""
+
+    def __init__(self, arm: Arm, configuration: Configuration, speed: float) -> None:
+        self.arm, self.speed = arm, speed
+        self.done: list[Cut] = []
+        self.use(configuration.board.clock, configuration.board.min_interval)
+
+    def use(self, clock: int, min_interval: int) -> None:
+        """Take the figures of the board that is there."""
+        self.clock, self.min_interval = clock, min_interval
+
+    def counts(self, q: Array) -> list[int]:
+        """Counts at joint values."""
+        return list(pulses(self.arm, q).tolist())
+
+    def plan(self, start: Sequence[int], q: Array) -> Cut:
+        """A plan through joint values (w, n) [rad | mm]."""
+        return plan(self.arm, start, q, speed=self.speed, clock=self.clock, min_interval=self.min_interval)
+
+    def noted(self, plans: Iterable[Cut | None]) -> Iterator[Cut | None]:
+        """The same plans, remembered for the summary."""
+        for made in plans:
+            if made is not None:
+                self.done.append(made)
+            yield made
+
+    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> dict[str, Any]:
+        """JSON: what the plans come to."""
+        arm = self.arm
+        first = list(start) if start is not None else plans[0].start.tolist()
+        last = plans[-1].end.tolist() if plans else first
+        top = np.max([plan.trajectory.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
+        rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
+        end = joints(arm, last)
+        return {
+            "waypoints": sum(len(plan.ends) for plan in plans),
+            "start_joints": units.joints_out(arm, joints(arm, first)).tolist(),
+            "joints": units.joints_out(arm, end).tolist(),
+            "joint_units": units.names(arm),
+            "motors": motor_names(arm),
+            "pulse_units": pulse_units(arm),
+            "start_pulses": first,
+            "pulses": last,
+            "moves": [b - a for a, b in zip(first, last, strict=True)],
+            "position_mm": (fk(arm, end)[:3, 3] + 0.0).tolist(),
+            "duration_s": sum(plan.duration for plan in plans),
+            "segments": sum(plan.segments for plan in plans),
+            "top_speed": units.joints_out(arm, top).tolist(),
+            "top_rate": rate.tolist(),
+        }
+
+
+class Stream:
+    """Rows of joint values that come while the arm moves, each planned as soon as it is there.
+
+    A thread reads them, at most a thousand ahead: who writes faster than the arm moves has to wait.
+    """
+
+    def __init__(self, arm: Arm, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
+        """rows: number and joint values [deg | mm]; what is wrong with one is an ArmkinError."""
+        self.problem: ArmkinError | None = None
+        self._rows: queue.Queue[tuple[int, Sequence[float]] | ArmkinError | None] = queue.Queue(_AHEAD)
+        self._arm = arm
+        threading.Thread(target=self._read, args=(rows,), daemon=True).start()
+
+    def _read(self, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
+        try:
+            for row in rows:
+                self._rows.put(row)
+        except ArmkinError as error:
+            self._rows.put(error)
+        self._rows.put(None)
+
+    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Cut | None]:
+        """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
+        at, empty = list(start), True
+        while True:
+            try:
+                item = self._rows.get_nowait()
+            except queue.Empty:
+                yield None
+                continue
+            if item is None:
+                break
+            if isinstance(item, ArmkinError):
+                self.problem = item
+                return
+            empty = False
+            try:
+                made = planner.plan(at, units.joints_in(self._arm, [item[1]]))
+            except (NoSolutionError, UsageError) as error:
+                words = f"row {item[0]}: {error.message}; the rows before it were carried out"
+                self.problem = type(error)(words, advice=error.advice, **{**error.fields, "row": item[0]})
+                return
+            at = made.end.tolist()
+            yield made
+        if empty:
+            self.problem = UsageError("there are no rows: nothing was moved")
+
+    def whole(self, planner: Planner, start: Sequence[int]) -> list[Cut]:
+        """All plans, once the last row has come. Raises what is wrong with one."""
+        plans = []
+        for made in self.plans(planner, start):
+            if made is None:
+                time.sleep(0.01)
+            else:
+                plans.append(made)
+        if self.problem is not None:
+            raise self.problem
+        return plans
+
+
+def where(machine: Machine) -> dict[str, Any]:
+    """Where the arm stands, as JSON [deg | mm]."""
+    arm = machine.arm
+    known = machine.position() != "lost"
+    q = machine.joints() if known else None
+    return {
+        "position": machine.position(),
+        "pulses": list(machine.counts()) if known else None,
+        "joints": None if q is None else units.joints_out(arm, q).tolist(),
+        "joint_units": units.names(arm),
+        "position_mm": None if q is None else (fk(arm, q)[:3, 3] + 0.0).tolist(),
+    }

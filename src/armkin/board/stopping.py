@@ -1,0 +1,40 @@
+"""Signals while an arm moves: a request to stop it first."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from armkin.board.firmware.session import StoppedError
+
+
+class Stop:
+    """Whether somebody asked to stop: Ctrl-C, SIGTERM, a closed terminal."""
+
+    def __init__(self) -> None:
+        self.signal = 0
+
+    def __call__(self) -> bool:
+        return self.signal != 0
+
+    def caught(self, number: int, frame: object) -> None:
+        """The signal handler; a second Ctrl-C does not wait for the board."""
+        if self.signal:
+            raise KeyboardInterrupt
+        self.signal = number
+
+
+@contextmanager
+def stoppable() -> Iterator[Stop]:
+    """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
+    stop = Stop()
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    before = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
+    try:
+        yield stop
+    except StoppedError:
+        raise SystemExit(128 + stop.signal) from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
