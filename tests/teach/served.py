@@ -5,8 +5,10 @@ from __future__ import annotations
 import http.client
 import json
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import armkin
@@ -27,12 +29,14 @@ def serving(desk: Desk) -> Iterator[Server]:
         server.shutdown()
         thread.join()
         server.server_close()
+        desk.close()
 
 
 @contextmanager
-def served(robot: str = "three_dof") -> Iterator[Server]:
-    """The server of a robot of the project."""
-    with serving(Desk(armkin.load(str(ROOT / f"robots/{robot}.yaml")))) as server:
+def served(robot: str | Path = "three_dof", board: str | None = None) -> Iterator[Server]:
+    """The server of a robot of the project, or of a file; board: a port."""
+    path = robot if isinstance(robot, Path) else ROOT / f"robots/{robot}.yaml"
+    with serving(Desk(armkin.load(str(path)), board)) as server:
         yield server
 
 
@@ -85,15 +89,27 @@ class Page:
     def act(self, name: str, **fields: Any) -> tuple[int, Any]:
         return act(self.server, name, fields, self.id)
 
-    def hear(self, topic: str) -> Any:
-        """The next news of a topic."""
+    def hear(self, topic: str, until: Callable[[Any], bool] = lambda data: True) -> Any:
+        """The next news of a topic that is as it shall be."""
         current = ""
         while True:
             line = self._events.readline().decode().rstrip("\n")
             if line.startswith("event: "):
                 current = line[7:]
             elif line.startswith("data: ") and current == topic:
-                return json.loads(line[6:])
+                data = json.loads(line[6:])
+                if until(data):
+                    return data
+
+    def idle(self) -> Any:
+        """The board's state once it has nothing to do."""
+        board = self.server.desk.board
+        assert board is not None
+        end = time.monotonic() + 20
+        while board.pilot.doing or board.pilot.stopping:
+            assert time.monotonic() < end, board.pilot.state()
+            time.sleep(0.005)
+        return board.pilot.state()
 
     def close(self) -> None:
         """As a browser closes a page: the connection ends."""

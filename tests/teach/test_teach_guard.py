@@ -128,7 +128,7 @@ def test_fields_that_are_wrong_are_named(server: Server, fields: Any) -> None:
         page.act("take")
         status, answer = page.act("look", **fields)
         assert status == 422, answer
-        assert answer["kind"] == "Usage"
+        assert answer["kind"] == "usage"
     finally:
         page.close()
 

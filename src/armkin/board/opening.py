@@ -16,16 +16,17 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def open_port(name: str, *, board: Board, baud: int = BAUD) -> Port:
+def open_port(name: str, *, board: Board, baud: int = BAUD, paced: bool = False) -> Port:
     """Open a port by name: /dev/ttyACM0, COM3, socket://host:4000, sim.
 
-    board: what `sim` pretends to be. Raises LinkError with what to do.
+    board: what `sim` pretends to be; paced: `sim` takes the time that a real board would. Raises LinkError with
+    what to do.
     """
     if name == SIM:
         from armkin.board.sim.board import SimBoard
-        from armkin.board.sim.port import SimPort
+        from armkin.board.sim.port import PacedSimPort, SimPort
 
-        return SimPort(SimBoard(board))
+        return (PacedSimPort if paced else SimPort)(SimBoard(board))
     return SerialPort(name, baud)
 
 

@@ -16,6 +16,7 @@ from armkin.teach.tabs import Tab, Tabs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.teach.board import Board
 
 Fields = Mapping[str, Any]
 Action = Callable[[Tab, Fields], dict[str, Any]]
@@ -24,14 +25,27 @@ Action = Callable[[Tab, Fields], dict[str, Any]]
 class Desk:
     """What the pages of one run share: the arm, the pose they show, who holds control."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, port: str | None = None, baud: int = 250_000) -> None:
+        """port: of a board, as `armkin send` takes it. Raises UsageError if the robot file says too little for it."""
         self.arm = arm
-        self.tabs = Tabs()
+        self.board: Board | None = None
+        self.tabs = Tabs(self._abandoned)
         self._solving = threading.Lock()  # one question at a time: two cores are not many
         self._shown: dict[str, Any] = {}
         # Name -> what it does, for the page in control; and what every page may do.
         self.actions: dict[str, Action] = {"look": self._look}
         self.free: dict[str, Action] = {"take": self._take, "stop": self._stop}
+        if port is not None:
+            from armkin.teach.board import Board
+            from armkin.teach.pilot import Pilot
+
+            self.board = Board(Pilot(arm, port, baud, lambda state: self.tabs.tell("board", state)))
+            self.actions |= self.board.actions()
+
+    def close(self) -> None:
+        """Stop the arm, give the port back."""
+        if self.board is not None:
+            self.board.pilot.close()
 
     def act(self, name: str, tab_id: str, fields: Fields) -> dict[str, Any]:
         """Carry out an action for a page. Raises RefusedError, or an ArmkinError that says what is wrong."""
@@ -53,7 +67,8 @@ class Desk:
             drawn = scene(self.arm)
             held = (drawn["lock"],) if drawn["lock"] else ()
             self._shown = look(self.arm, Question(self.arm.home, held=held))
-        return {"tab": tab.id, "scene": scene(self.arm), "look": self._shown}
+        board = None if self.board is None else self.board.pilot.state()
+        return {"tab": tab.id, "scene": scene(self.arm), "look": self._shown, "board": board}
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a pose or a target is, with all branches; the other pages see it, too."""
@@ -79,15 +94,23 @@ class Desk:
             answer = look(arm, question)
         self._shown = answer
         self.tabs.tell("look", answer, but=tab)
+        if self.board is not None and not answer["outside"]:
+            self.board.shown(units.joints_in(arm, answer["q"]))
         return answer
 
     def stands(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if nothing is known of it."""
-        return None
+        return None if self.board is None else self.board.pilot.stands()
+
+    def _abandoned(self) -> None:
+        if self.board is not None:
+            self.board.abandoned()
 
     def _take(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         self.tabs.take(tab)
         return {}
 
     def _stop(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        if self.board is not None:
+            self.board.stop()
         return {}

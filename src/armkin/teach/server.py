@@ -108,7 +108,7 @@ class _Handler(BaseHTTPRequestHandler):
             serve()
         except RefusedError as error:
             self.close_connection = True  # its body may still be on the way
-            self._json(error.status, {"error": str(error), "kind": "Refused"})
+            self._json(error.status, {"error": str(error), "kind": "refused"})
         except OSError:
             self.close_connection = True
 
@@ -135,11 +135,11 @@ class _Handler(BaseHTTPRequestHandler):
             answer = self.server.desk.act(self.path.removeprefix("/api/"), headers.get(guard.TAB, ""), fields)
         except ArmkinError as error:
             status = 502 if isinstance(error, LinkError) else 422
-            self._json(status, {"error": str(error), "kind": type(error).__name__.removesuffix("Error")})
+            self._json(status, {"error": error.message, "kind": error.kind})
         except RefusedError:
             raise
         except Exception as error:
-            self._json(500, {"error": f"internal error: {error!r}: this is a bug in armkin", "kind": "Internal"})
+            self._json(500, {"error": f"internal error: {error!r}: this is a bug in armkin", "kind": "internal"})
         else:
             self._json(200, answer)
 

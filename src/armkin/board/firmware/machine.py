@@ -263,18 +263,21 @@ class Machine:
             yield _Batch([axes[k] for k in moving], at, end, part, not todo, clock)
             at = end
 
-    def jog(self, rate: dict[int, int], seconds: float) -> Status:
-        """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first."""
+    def jog(self, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> Status:
+        """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
+
+        more: asked every 10 ms; the motion ends when it says no.
+        """
         vector = [rate.get(axis, 0) for axis in range(len(self.configuration.board.axes))]
         port, session = self.session.port, self.session
         begin = port.now()
         try:
-            while (left := seconds - (port.now() - begin)) > 0:
+            while (left := seconds - (port.now() - begin)) > 0 and more():
                 session.call(lambda tag: protocol.jog(tag, vector))
                 if session.state != State.JOGGING:
                     break  # at a limit
                 pause = port.now() + min(0.08, left)
-                while port.now() < pause:
+                while port.now() < pause and more():
                     session.pump(max(0.001, min(0.01, pause - port.now())))
             session.call(lambda tag: protocol.jog(tag, [0] * len(vector)))
             for _ in session.arrivals():

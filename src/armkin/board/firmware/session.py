@@ -73,6 +73,7 @@ class Session:
         self._queue = 0
         self._tag = 0
         self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
+        self.latest: Status | None = None  # as last heard
         self._status: Status | None = None
         self._error: Ack | Status | None = None
         self._heard = port.now()
@@ -256,6 +257,7 @@ class Session:
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
+                self.latest = reply if reply.page == 0 else self.latest
                 self._measure(reply.tag)
             self._acknowledge(reply)
 

@@ -14,7 +14,7 @@ COMMANDS = {
     "ports": "Serial ports of this computer, Arduinos first.",
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "plot": "A picture of the arm.",
-    "teach": "A page in the browser: see the arm, choose a branch.",
+    "teach": "A page in the browser: see the arm, choose a branch, send it.",
     "robots": "The robots that come with armkin, and what each can do.",
     "info": "What a robot file says, checked.",
     "import": "A robot file from a URDF.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -10,14 +10,9 @@ from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Robot
-from armkin.errors import LinkError, UsageError
+from armkin.errors import UsageError
 from armkin.model import units
 
-if TYPE_CHECKING:
-    from armkin.board.firmware.machine import Machine
-    from armkin.model.arm import Arm
-
-_SLOW = 8  # a lost position: an eighth of max_speed
 _LONGEST = 60.0  # [s]
 
 
@@ -35,6 +30,7 @@ def jog(
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
     itself when this command falls silent, and before the joint limits if the position is known.
     """
+    from armkin.board.firmware import jogging
     from armkin.board.moving import where
     from armkin.model.lock import joint_index
 
@@ -49,11 +45,12 @@ def jog(
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     with linking.machine(arm, configuration, port, baud) as machine:
-        _prepare(machine)
-        if machine.position() == "lost" and abs(rate) > top / _SLOW:
-            rate = top / _SLOW if rate > 0 else -top / _SLOW
+        jogging.prepare(machine)
+        slow = top / jogging.SLOW
+        if machine.position() == "lost" and abs(rate) > slow:
+            rate = slow if rate > 0 else -slow
             output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
-        machine.jog(_rates(arm, machine, j, rate), time)
+        machine.jog(jogging.rates(machine, j, rate), time)
         found = where(machine)
     with output.destination(None) as write:
         write(
@@ -61,29 +58,3 @@ def jog(
             if json
             else linking.where_text(arm, found)
         )
-
-
-def _prepare(machine: Machine) -> None:
-    if machine.session.port.simulated:
-        machine.prepare()
-        return
-    if not machine.configured:
-        if machine.info.known:
-            raise LinkError(
-                f"the board knows the position of another arm, or {machine.arm.path} has changed:\n"
-                "armkin home or armkin send --assume-home configures it anew"
-            )
-        machine.configure()
-    machine.enable(machine.configuration.axes)
-
-
-def _rates(arm: Arm, machine: Machine, joint: int, rate: float) -> dict[int, int]:
-    """Counts per second of the joint's motors, by axis."""
-    vector = [0.0] * arm.n
-    vector[joint] = rate
-    exact = arm.motor_gain @ units.joints_in(arm, vector)
-    # Towards zero: rounding must not exceed what the board allows.
-    found = {axis: int(value) for axis, value in zip(machine.configuration.axes, exact, strict=True)}
-    if not any(found.values()):
-        raise UsageError(f"SPEED: {rate:g} is less than one count a second")
-    return found

@@ -1,5 +1,6 @@
 // @ts-check
 /** The page: one pose, shown by all of its parts. */
+import { Board } from "./board.js";
 import { get } from "./dom.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
@@ -23,6 +24,10 @@ class Page {
     this.motors = new Motors(arm, () => this.ask({}));
     /** @type {import("./view.js").View | null} */
     this.view = null;
+    this.moving = false; // the board moves: the page shows where its pins are
+    this.board = new Board(arm, {
+      pose: () => this.q, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble,
+    });
     this.asking = new Latest((fields) => this.answer(fields));
     get("robot").textContent = arm.robot;
     document.title = `${arm.robot} - armkin teach`;
@@ -32,7 +37,7 @@ class Page {
   turn(q) {
     this.q = q;
     this.joints.show(q);
-    this.view?.pose(q);
+    if (!this.moving) this.view?.pose(q);
     this.ask({});
   }
 
@@ -64,6 +69,29 @@ class Page {
     }
   }
 
+  /** The board says where the arm stands. @param {import("./types.js").BoardState} state */
+  moved(state) {
+    const ended = this.moving && state.doing === "";
+    this.moving = !["", "connect", "follow"].includes(state.doing);
+    if (!this.view) return;
+    if (this.moving && state.joints) {
+      this.view.pose(state.joints);
+      this.view.haunt([]);
+    } else if (ended) {
+      this.ask({});
+      this.show(this.look);
+    } else this.haunt();
+  }
+
+  /** Ghosts: the other branches, the nearest pose, and the arm itself where it stands elsewhere. */
+  haunt() {
+    const ghosts = this.tip.ghosts();
+    const stands = this.board.state?.joints;
+    const away = stands?.some((value, i) => Math.abs(value - this.q[i]) > 0.1);
+    if (stands && away) ghosts.push({ joints: stands, colour: "#3a444f", faint: false });
+    this.view?.haunt(ghosts);
+  }
+
   /** @param {Look} look @param {boolean} [aimed] whether the pose follows a target */
   show(look, aimed = false) {
     this.look = look;
@@ -73,9 +101,9 @@ class Page {
     this.joints.say(look.outside);
     this.tip.show(look);
     this.motors.show(look);
-    if (!this.view) return;
+    if (!this.view || this.moving) return;
     this.view.pose(look.q);
-    this.view.haunt(this.tip.ghosts());
+    this.haunt();
     const flat = look.task === "xy" || look.task === "xy_theta";
     const { position_mm: tip, rpy_deg } = look.tip;
     const target = look.target ?? tip;
@@ -154,7 +182,7 @@ async function start() {
     get("canvas").inert = !mine;
   };
   const opened = await enter(
-    { control, look: (look) => page?.show(look) },
+    { control, look: (look) => page?.show(look), board: (state) => page?.board.show(state) },
     (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : ""),
   );
   page = new Page(opened.scene, opened.look);
@@ -162,13 +190,17 @@ async function start() {
   theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light", one);
   get("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark", one));
   get("take").addEventListener("click", () => act("take").catch((error) => trouble(error.message)));
-  const stop = () => act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`));
+  const stop = () => {
+    one.board.stopped();
+    act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`));
+  };
   get("stop").addEventListener("click", stop);
   /** @type {Object<string, () => void>} */
-  const actions = {};
+  const actions = { g: () => one.board.grip(one.board.open ? "closed" : "open") };
   for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);
   keys(actions, (way) => one.nudge(way), stop);
   one.show(opened.look);
+  if (opened.board) one.board.show(opened.board);
   await one.draw();
   document.documentElement.dataset.ready = "yes";
 }

@@ -98,7 +98,7 @@ export class View {
     this.scene.updateMatrixWorld();
     const box = new Box3().setFromObject(this.solid.group);
     for (const ghost of this.shown) box.expandByObject(ghost.group);
-    const size = Math.max(0.8 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
+    const size = Math.max(1.05 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
     this.camera.position.set(x, y, z).multiplyScalar(size).add(this.middle);

@@ -1,0 +1,59 @@
+"""The gripper: an axis of its own, opened and closed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armkin.board.firmware.segments import line
+from armkin.errors import LinkError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration, Grip
+    from armkin.board.firmware.machine import Machine
+
+
+def gripper_of(name: str, configuration: Configuration) -> Grip:
+    """The arm's gripper; UsageError if it has none, or none that can move."""
+    gripper = configuration.grip
+    if gripper is None:
+        raise UsageError(f"{name} has no gripper; add gripper: to its robot file")
+    for key, rate in (("max_speed", gripper.top), ("max_accel", gripper.accel)):
+        if rate is None:
+            raise UsageError(f"the gripper has no {key}: motion needs one; add {key}: to gripper:")
+    return gripper
+
+
+def known(machine: Machine, gripper: Grip) -> bool:
+    """Whether the board knows where the gripper stands."""
+    return machine.configured and bool(machine.status.known >> gripper.axis & 1)
+
+
+def prepare(machine: Machine, gripper: Grip, start: int | None) -> None:
+    """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
+    is_known = known(machine, gripper)
+    if is_known and start is not None:
+        raise LinkError("the gripper's position is known: --assume is only for a lost one; leave it out")
+    if not is_known and start is None and not machine.session.port.simulated:
+        raise LinkError(
+            "the gripper's position is lost: add --assume open (or closed, or a value)\n"
+            "a servo jumps there at once, at its full speed: keep your fingers out"
+        )
+    if not machine.configured:
+        machine.configure()
+    if not is_known:
+        machine.vouch({gripper.axis: gripper.open if start is None else start})
+    machine.enable((gripper.axis,))
+
+
+def grip(machine: Machine, gripper: Grip, target: int) -> int:
+    """Move the gripper to counts; where it stands then."""
+    assert gripper.top is not None
+    assert gripper.accel is not None
+    at = machine.status.counts[gripper.axis]
+    far = abs(target - at)
+    if far:
+        board = machine.configuration.board
+        clock, least = board.clock, board.min_interval
+        move = line([at], [target], gripper.top / far, gripper.accel / far, clock=clock, min_interval=least)
+        machine.run_axis(move, gripper.axis, board.clock)
+    return machine.status.counts[gripper.axis]

@@ -1,0 +1,211 @@
+"""What a page may have the board do: send a pose, home, jog, grip, follow; each is refused unless it is safe."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.board.firmware import gripping, homing, jogging
+from armkin.board.firmware.cutting import plan
+from armkin.errors import FileError, LinkError, UsageError
+from armkin.model import units
+from armkin.motion.plan import check_limits
+from armkin.teach import guard
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.machine import Machine
+    from armkin.formula.arrays import Array
+    from armkin.teach.desk import Action, Fields
+    from armkin.teach.pilot import Pilot
+    from armkin.teach.tabs import Tab
+
+DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
+FOLLOW_SPEED = 0.15  # of every joint's max_speed
+FOLLOW_HOP = 5.0  # [deg | 2 mm] of the joint that moves farthest: where the arm stops and looks for its goal again
+_LONGEST_JOG = 60.0  # [s]
+
+
+class Board:
+    """The page's actions on a board."""
+
+    def __init__(self, pilot: Pilot) -> None:
+        self.pilot, self.arm = pilot, pilot.arm
+        self.follows = False
+        self._alive = 0.0  # until when a jog goes on
+        self._jogging: tuple[int, float] | None = None
+        self._goal: Array | None = None
+        self._lock = threading.Lock()
+
+    def actions(self) -> dict[str, Action]:
+        """Name -> action, for the page in control."""
+        return {
+            "connect": self.connect,
+            "send": self.send,
+            "assume_home": self.assume_home,
+            "home": self.home,
+            "jog": self.jog,
+            "jog_end": self.jog_end,
+            "grip": self.grip,
+            "follow": self.follow,
+        }
+
+    def stop(self) -> None:
+        """STOP: follows no more, and holds the arm."""
+        self.follows, self._alive = False, 0.0
+        self.pilot.stop()
+
+    def abandoned(self) -> None:
+        """The page in control is gone."""
+        self.follows, self._alive = False, 0.0
+        self.pilot.abandoned()
+
+    def connect(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Open the port again."""
+        self.pilot.submit("connect", lambda machine: None)
+        return {}
+
+    def send(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Move to joint values, at a percentage of the joints' speeds."""
+        arm = self.arm
+        q = units.joints_in(arm, guard.numbers(fields, "q", arm.n))
+        speed = guard.number(fields, "speed", 1, 100) / 100
+        check_limits(arm, q[None])
+        self.check_file()
+        self.pilot.submit("send", lambda machine: self._move(machine, q, speed))
+        return {}
+
+    def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Take the operator's word that the arm stands in its home pose."""
+        if not guard.flag(fields, "consent"):
+            raise UsageError("say first that the arm stands in its home pose")
+        self.check_file()
+
+        def job(machine: Machine) -> None:
+            machine.prepare(assume_home=True)
+
+        self.pilot.submit("assume home", job)
+        return {}
+
+    def home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Find the limit switches."""
+        homing.searches(self.arm, self.pilot.configuration)
+        self.check_file()
+        self.pilot.submit("home", homing.home)
+        return {}
+
+    def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Turn one joint as long as this is asked again and again; the arm stops when it is not."""
+        arm = self.arm
+        joint = guard.whole(fields, "joint", arm.n)
+        percent = guard.number(fields, "percent", -100, 100)
+        if percent == 0:
+            raise UsageError("percent: 0 is no jog")
+        wanted = (joint, percent)
+        if self.pilot.doing == "jog" and self._jogging == wanted:
+            self._alive = time.monotonic() + DEAD_MAN
+            return {}
+        self.check_file()
+        self.pilot.submit("jog", lambda machine: self._jog(machine, joint, percent))
+        self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
+        return {}
+
+    def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """The button was let go."""
+        self._alive = 0.0
+        return {}
+
+    def grip(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Open or close the gripper, or take a value; `assume`: it stands open now, if nothing is known of it."""
+        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
+        value = fields.get("value")
+        named = {"open": gripper.open, "closed": gripper.closed}
+        if isinstance(value, str):
+            if value not in named:
+                raise UsageError("value: expected open, closed or a number")
+            target = named[value]
+        else:
+            low, high = sorted((gripper.value(gripper.open), gripper.value(gripper.closed)))
+            target = gripper.count(guard.number(fields, "value", low, high))
+        start = gripper.open if guard.flag(fields, "assume") else None
+
+        def job(machine: Machine) -> None:
+            known = gripping.known(machine, gripper)
+            if not known and start is None and not machine.session.port.simulated:
+                raise LinkError(
+                    "the gripper's position is lost: say first that it stands open\n"
+                    "a servo jumps there at once, at its full speed: keep your fingers out"
+                )
+            gripping.prepare(machine, gripper, None if known else start)
+            gripping.grip(machine, gripper, target)
+
+        self.check_file()
+        self.pilot.submit("grip", job)
+        return {}
+
+    def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Let the arm follow the page's pose, slowly; off at every start."""
+        self.follows = guard.flag(fields, "on")
+        self._goal = None
+        return {"on": self.follows}
+
+    def shown(self, q: Array) -> None:
+        """The page shows a pose within the limits: where the arm goes if it follows."""
+        if not self.follows:
+            return
+        with self._lock:
+            self._goal = q
+            if self.pilot.doing:
+                return
+            self.check_file()
+            self.pilot.submit("follow", self._follow)
+
+    def check_file(self) -> None:
+        """Raise FileError if the robot file is not the one that the page was made of."""
+        from armkin.model.build import load
+
+        if self.arm.path and load(self.arm.path).sha256 != self.arm.sha256:
+            raise FileError(f"{self.arm.path} has changed: start armkin teach again, the arm was not moved")
+
+    def run(self, machine: Machine, goals: Array, speed: float) -> None:
+        """Move through joint values (w, n), stopping at each."""
+        self.prepare(machine)
+        clock, least = machine.info.clock, machine.info.min_interval
+        moves = plan(self.arm, machine.counts(), goals, speed=speed, clock=clock, min_interval=least)
+        machine.run([moves], self._progress)
+
+    def prepare(self, machine: Machine) -> None:
+        """Switch the motors on; LinkError if the position is lost."""
+        if machine.position() == "lost" and not machine.session.port.simulated:
+            raise LinkError(
+                "the arm's position is lost: home it, or put it in its home pose and say so; it was not moved"
+            )
+        machine.prepare()
+
+    def _move(self, machine: Machine, q: Array, speed: float) -> None:
+        self.run(machine, q[None], speed)
+
+    def _jog(self, machine: Machine, joint: int, percent: float) -> None:
+        jogging.prepare(machine)
+        share = percent / 100
+        if machine.position() == "lost":
+            share = float(np.clip(share, -1 / jogging.SLOW, 1 / jogging.SLOW))
+        top = float(units.joints_out(self.arm, self.arm.max_speed)[joint])
+        rates = jogging.rates(machine, joint, share * top)
+        machine.jog(rates, _LONGEST_JOG, more=lambda: time.monotonic() < self._alive)
+
+    def _follow(self, machine: Machine) -> None:
+        """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""
+        scale = np.where(self.arm.prismatic, 0.5, 180 / np.pi) / FOLLOW_HOP
+        while self.follows and self._goal is not None:
+            here, goal = machine.joints(), self._goal
+            far = float((np.abs(goal - here) * scale).max())
+            self.run(machine, (here + (goal - here) / max(far, 1.0))[None], FOLLOW_SPEED)
+            with self._lock:
+                if far <= 1.0 and goal is self._goal:
+                    self._goal = None
+
+    def _progress(self, done: float, total: float) -> None:
+        self.pilot.done = (round(done, 1), round(total, 1))

@@ -1,0 +1,224 @@
+"""The board behind the page: one thread owns the port, carries out one job at a time, and listens to STOP always.
+
+A job never starts by itself, and nothing waits in line behind another: what is asked while the arm moves is
+refused. STOP does not pass through here as a job: it is asked for at every turn of the session, 200 times a
+second, and answered with a hold.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.session import StoppedError
+from armkin.board.opening import open_port
+from armkin.board.ports import SIM
+from armkin.errors import ArmkinError, LinkError
+from armkin.model import units
+from armkin.motors import joints as joints_of
+from armkin.teach.guard import RefusedError
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+    from armkin.model.arm import Arm
+
+Job = Callable[[Machine], None]
+
+_POLL = 0.25  # [s] between two looks at a board that stands
+_TELL = 0.08  # [s] between two positions of an arm that moves: what a page can draw
+
+
+class Pilot:
+    """An arm's board; `tell` hears its state whenever that changes."""
+
+    def __init__(self, arm: Arm, port: str, baud: int, tell: Callable[[dict[str, Any]], None]) -> None:
+        """Raises UsageError if the robot file does not say what the board must know."""
+        self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
+        self.configuration = configure(arm, rehearsal=port == SIM)
+        self.link: Port | None = None
+        self.machine: Machine | None = None
+        self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._stop = threading.Event()
+        self._ended = False
+        self._job: tuple[str, Job] | None = ("connect", lambda machine: None)
+        self._doing = "connect"  # name of the job, "" if there is none
+        self._error = ""
+        self._told: dict[str, Any] = {}
+        self._told_at = 0.0
+        self._thread = threading.Thread(target=self._run, name="pilot")
+        self._thread.start()
+
+    # What pages ask for, in threads of theirs
+
+    def submit(self, name: str, job: Job) -> None:
+        """Have a job carried out at once. Raises RefusedError while another one is."""
+        with self._lock:
+            if self._doing or self._stop.is_set():
+                raise RefusedError(409, f"the arm is busy ({self._doing or 'stop'}): wait for it, or STOP")
+            self._job, self._doing, self._error, self.done = (name, job), name, "", (0.0, 0.0)
+        self._wake.set()
+
+    def stop(self) -> None:
+        """Stop the arm along its path; returns at once."""
+        self._stop.set()
+        self._wake.set()
+
+    def abandoned(self) -> None:
+        """The page that held control is gone: what it has started ends."""
+        if self._doing not in ("", "connect"):
+            self.stop()
+
+    def close(self) -> None:
+        """Stop what moves, and give the port back."""
+        self._ended = True
+        if self._doing:
+            self._stop.set()
+        self._wake.set()
+        self._thread.join(20)
+
+    @property
+    def doing(self) -> str:
+        """Name of the job that is carried out; empty if there is none."""
+        return self._doing
+
+    @property
+    def stopping(self) -> bool:
+        """Whether a STOP has not come to its end."""
+        return self._stop.is_set()
+
+    def state(self) -> dict[str, Any]:
+        """JSON: what the pages are told."""
+        return self._told or self._state()
+
+    def stands(self) -> tuple[int, ...] | None:
+        """Pulses where the arm stands; None if that is not known."""
+        found = self.state()["pulses"]
+        return None if found is None else tuple(found)
+
+    # The thread that owns the port
+
+    def _run(self) -> None:
+        while not self._ended:
+            self._wake.wait(_POLL)
+            self._wake.clear()
+            with self._lock:
+                job, self._job = self._job, None
+            if self._stop.is_set():
+                self._hold()
+            elif job is not None:
+                self._carry_out(*job)
+            elif self.machine is not None:
+                self._poll(self.machine)
+        if self.link is not None:
+            self.link.close()
+
+    def _carry_out(self, name: str, job: Job) -> None:
+        self._doing = name
+        self._publish()
+        try:
+            machine = self._open()
+            job(machine)
+        except StoppedError as error:
+            self._stopped(error)
+        except ArmkinError as error:
+            self._error = error.message
+            if self.machine is None or not self._answers(self.machine):
+                self._disconnect()
+        except Exception as error:
+            # Whatever went wrong, the arm must not go on with it.
+            self._error = f"internal error: {error!r}: this is a bug in armkin"
+            self._stop.set()
+            self._wake.set()
+        self._doing = ""
+        self._publish()
+
+    def _open(self) -> Machine:
+        """The machine, in a new session: what ended the last one is over."""
+        if self.link is None:
+            self.link = open_port(self.port, board=self.configuration.board, baud=self.baud, paced=True)
+        first = self.machine is None
+        self.machine = Machine(self.link, self.arm, self.configuration, self._watch)
+        if first and self.link.simulated:
+            self.machine.prepare()  # a board in this process starts with the arm at home
+        return self.machine
+
+    def _watch(self) -> bool:
+        """Asked at every turn of a session: tell where the pins are now, and whether to stop."""
+        machine = self.machine
+        latest = None if machine is None else machine.session.latest
+        if machine is not None and latest is not None and time.monotonic() - self._told_at >= _TELL:
+            machine.status = latest
+            self._publish()
+        return self._stop.is_set()
+
+    def _hold(self) -> None:
+        """STOP while no job was carried out: the board is held all the same."""
+        with self._lock:
+            self._job, self._doing = None, ""
+        if self.machine is not None:
+            try:
+                self.machine.status = self.machine.session.hold()
+            except LinkError as error:
+                self._error = error.message
+                self._disconnect()
+        self._stop.clear()
+        self._publish()
+
+    def _stopped(self, error: StoppedError) -> None:
+        if self.machine is not None and error.status is not None:
+            self.machine.status = error.status
+        self._error = "stopped"
+        self._stop.clear()
+
+    def _poll(self, machine: Machine) -> None:
+        try:
+            machine.status = machine.session.status()
+        except LinkError as error:
+            self._error = error.message
+            self._disconnect()
+        self._publish()
+
+    def _answers(self, machine: Machine) -> bool:
+        try:
+            machine.status = machine.session.status()
+        except LinkError:
+            return False
+        return True
+
+    def _disconnect(self) -> None:
+        if self.link is not None:
+            self.link.close()
+        self.link = self.machine = None
+
+    def _state(self) -> dict[str, Any]:
+        machine = self.machine
+        found: dict[str, Any] = {
+            "port": self.port,
+            "board": self.configuration.board.kind,
+            "simulated": self.port == SIM,
+            "connected": machine is not None,
+            "doing": self._doing,
+            "done_s": self.done[0],
+            "total_s": self.done[1],
+            "position": "unknown" if machine is None else machine.position(),
+            "pulses": None,
+            "joints": None,
+            "error": self._error,
+        }
+        if machine is not None and found["position"] in ("known", "retained"):
+            counts = machine.counts()
+            found["pulses"] = list(counts)
+            found["joints"] = units.joints_out(self.arm, joints_of(self.arm, counts)).tolist()
+        return found
+
+    def _publish(self) -> None:
+        state = self._state()
+        if state != self._told:
+            self._told, self._told_at = state, time.monotonic()
+            self.tell(state)

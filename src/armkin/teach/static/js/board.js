@@ -1,0 +1,161 @@
+// @ts-check
+/** The board: where the arm stands, and what it is told to do. Nothing here moves it but a button. */
+import { fixed, get, make } from "./dom.js";
+import { act } from "./server.js";
+
+const BEAT = 100; // [ms] between two signs of life of a jog: the arm stops 0.3 s after the last one
+
+const WORDS = /** @type {Object<string, string>} */ ({
+  known: "position known", retained: "position retained through a reset", lost: "position lost",
+  unknown: "not connected",
+});
+
+export class Board {
+  /**
+   * @param {import("./types.js").Arm} arm
+   * @param {{pose: () => number[], show: (q: number[]) => void, moved: (state: import("./types.js").BoardState) => void,
+   *   trouble: (text: string) => void}} page
+   */
+  constructor(arm, page) {
+    this.arm = arm;
+    this.page = page;
+    /** @type {import("./types.js").BoardState | null} */
+    this.state = null;
+    this.open = true; // the gripper, as last told
+    this.beating = 0;
+    get("gripper").hidden = arm.gripper === null;
+    if (arm.gripper) {
+      get("grip-unit").textContent = arm.gripper.unit;
+      /** @type {HTMLInputElement} */ (get("grip-value")).value = String(arm.gripper.open);
+    }
+    get("jog-joint").append(...arm.joints.map((joint, i) => make("option", { value: String(i) }, joint.name)));
+    this.wire();
+  }
+
+  wire() {
+    const number = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (get(id)).valueAsNumber;
+    const checked = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (get(id)).checked;
+    const click = (/** @type {string} */ id, /** @type {() => void} */ action) => get(id).addEventListener("click", action);
+    click("send", () => this.ask("send", { q: this.page.pose(), speed: number("speed") }));
+    click("home", () => this.ask("home"));
+    click("connect", () => this.ask("connect"));
+    click("here", () => this.state?.joints && this.page.show([...this.state.joints]));
+    click("grip", () => this.grip(this.open ? "closed" : "open"));
+    get("grip-value").addEventListener("change", () => this.grip(number("grip-value")));
+    get("consent").addEventListener("change", () => this.buttons());
+    click("assume", () => {
+      this.ask("assume_home", { consent: checked("consent") });
+      /** @type {HTMLInputElement} */ (get("consent")).checked = false;
+    });
+    get("follow").addEventListener("change", () => this.ask("follow", { on: checked("follow") }));
+    this.dead("jog-down", -1);
+    this.dead("jog-up", 1);
+  }
+
+  /** A dead man's button: by pointer, and by the space bar or Enter. @param {string} id @param {number} sign */
+  dead(id, sign) {
+    const button = get(id);
+    const begin = () => {
+      if (this.beating) return;
+      const speed = /** @type {HTMLInputElement} */ (get("jog-speed")).valueAsNumber;
+      const joint = Number(/** @type {HTMLSelectElement} */ (get("jog-joint")).value);
+      const beat = () => this.ask("jog", { joint, percent: sign * speed });
+      beat();
+      this.beating = setInterval(beat, BEAT);
+    };
+    const end = () => {
+      if (!this.beating) return;
+      clearInterval(this.beating);
+      this.beating = 0;
+      this.ask("jog_end");
+    };
+    button.addEventListener("pointerdown", begin);
+    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur", "lostpointercapture"]) {
+      button.addEventListener(name, end);
+    }
+    button.addEventListener("keydown", (event) => {
+      if (event.key !== " " && event.key !== "Enter") return;
+      event.preventDefault();
+      begin();
+    });
+    button.addEventListener("keyup", end);
+    document.addEventListener("visibilitychange", end);
+    window.addEventListener("blur", end);
+    this.endJog = end;
+  }
+
+  /** @param {string} name @param {object} [fields] */
+  async ask(name, fields = {}) {
+    try {
+      await act(name, fields);
+      this.page.trouble("");
+    } catch (error) {
+      this.page.trouble(/** @type {Error} */ (error).message);
+      if (name === "jog") clearInterval(this.beating);
+      if (name === "jog") this.beating = 0;
+    }
+  }
+
+  /** @param {string | number} value */
+  grip(value) {
+    if (!this.state || !this.arm.gripper) return;
+    const assume = /** @type {HTMLInputElement} */ (get("grip-assume")).checked;
+    this.open = value !== "closed";
+    get("grip").textContent = this.open ? "Close" : "Open";
+    this.ask("grip", { value, assume });
+  }
+
+  /** STOP was pressed: nothing follows any more. */
+  stopped() {
+    /** @type {HTMLInputElement} */ (get("follow")).checked = false;
+    clearInterval(this.beating);
+    this.beating = 0;
+  }
+
+  /** @param {import("./types.js").BoardState} state */
+  show(state) {
+    const before = this.state;
+    this.state = state;
+    get("no-board").hidden = true;
+    get("with-board").hidden = false;
+    const { doing, position } = state;
+    const words = state.connected || doing ? WORDS[position] : "not connected";
+    get("standing").textContent = `${doing ? `${doing}: ` : ""}${words} · ${state.board} on ${state.port}`;
+    get("standing").dataset.position = position;
+    get("position").textContent = state.joints
+      ? `It stands at ${this.arm.joints.map((joint, i) => `${joint.name} ${fixed(state.joints?.[i] ?? 0, 2)}`).join(", ")}.`
+      : position === "lost" ? "Nobody knows where the arm stands: home it, or put it in its home pose and say so." : "";
+    const bar = /** @type {HTMLProgressElement} */ (get("progress"));
+    bar.hidden = !doing || !state.total_s;
+    bar.value = state.total_s ? state.done_s / state.total_s : 0;
+    if (before?.doing && !doing) {
+      get("arrived").textContent = state.error ? "" : `${before.doing}: done`;
+      if (state.error && state.error !== "stopped") this.page.trouble(state.error);
+    }
+    if (state.error === "stopped") get("arrived").textContent = "stopped: the arm stands on its path, its position is known";
+    if (!state.connected && state.error) this.page.trouble(state.error);
+    get("how-safe").textContent = state.simulated
+      ? "A simulated board: nothing real moves."
+      : "If this page is closed, its browser ends or armkin teach is paused while the arm moves, the board holds it "
+        + "along its path within a second, and its position stays known. STOP is no emergency stop: for that, cut the motors' power.";
+    this.buttons();
+    this.page.moved(state);
+  }
+
+  buttons() {
+    const state = this.state;
+    if (!state) return;
+    const busy = state.doing !== "" || !state.connected;
+    const consent = /** @type {HTMLInputElement} */ (get("consent")).checked;
+    const off = (/** @type {string} */ id, /** @type {boolean} */ when) => {
+      /** @type {HTMLButtonElement} */ (get(id)).disabled = when;
+    };
+    off("send", busy);
+    off("home", busy);
+    off("grip", busy);
+    off("here", !state.joints);
+    off("assume", busy || !consent);
+    get("lost").hidden = state.position !== "lost";
+    get("connect").hidden = state.connected || state.doing !== "";
+  }
+}

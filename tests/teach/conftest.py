@@ -1,0 +1,6 @@
+"""The emulated board's helpers are modules of `tests/firmware`."""
+
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "firmware"))
