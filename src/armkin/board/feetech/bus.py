@@ -1,0 +1,100 @@
+"""A bus of servos: questions asked again until they are answered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from armkin.board.feetech import packet
+from armkin.board.feetech.packet import Reply, Splitter
+from armkin.board.feetech.registers import STATE, TORQUE, Register
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+
+BAUD = 1_000_000
+_ANSWER = 0.02  # [s] a servo may take; USB adapters hold bytes back for up to 16 ms
+_TRIES = 8  # of a question before a servo counts as gone
+
+
+class Bus:
+    """Servos behind a port, by their numbers."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.errors: dict[int, int] = {}  # servo -> error bits of its last answer
+        self.repeats = 0  # questions that were asked again
+        self._splitter = Splitter()
+
+    def ping(self, servo: int) -> bool:
+        """Whether a servo answers."""
+        return bool(self._ask(packet.packet(servo, packet.Instruction.PING), [servo], 0, tries=3))
+
+    def read(self, servo: int, register: Register) -> int:
+        """A register of one servo. Raises LinkError if it does not answer."""
+        answer = self._sure(packet.read(servo, register.address, register.size), [servo], register.size)
+        return register.unpack(answer[servo], register.address)
+
+    def write(self, servo: int, register: Register, value: int) -> None:
+        """Write a register, and read it back where the acknowledgement was lost.
+
+        Raises LinkError if the servo does not answer or keeps another value.
+        """
+        for _ in range(_TRIES):
+            self._ask(packet.write(servo, register.address, register.pack(value)), [servo], 0, tries=1)
+            if self.read(servo, register) == value:
+                return
+        raise LinkError(f"servo {servo} on {self.port.name} does not take {value} for register {register.address}")
+
+    def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, bytes]:
+        """The same registers of several servos, asked together; those that stay silent again one by one."""
+        found = self._ask(packet.sync_read(servos, address, size), servos, size, tries=2)
+        for servo in servos:
+            if servo not in found:
+                found |= self._sure(packet.read(servo, address, size), [servo], size)
+        return found
+
+    def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
+        """Write the same registers of several servos at one moment; nobody acknowledges it."""
+        self.port.write(packet.sync_write(address, data))
+
+    def states(self, servos: Sequence[int]) -> dict[int, bytes]:
+        """Position, speed, load, voltage and temperature: bytes from `STATE` on."""
+        return self.read_all(servos, *STATE)
+
+    def torque(self, servos: Sequence[int], on: bool) -> None:
+        """Switch motors on or off."""
+        for servo in servos:
+            self.write(servo, TORQUE, int(on))
+
+    def _sure(self, question: bytes, servos: Sequence[int], size: int) -> dict[int, bytes]:
+        found = self._ask(question, servos, size, tries=_TRIES)
+        missing = [servo for servo in servos if servo not in found]
+        if missing:
+            raise LinkError(
+                f"servo {missing[0]} on {self.port.name} does not answer: is its cable plugged in, is the bus powered?"
+            )
+        return found
+
+    def _ask(self, question: bytes, servos: Sequence[int], size: int, *, tries: int) -> dict[int, bytes]:
+        """Answers by servo; size: bytes that a whole one has."""
+        found: dict[int, bytes] = {}
+        for attempt in range(tries):
+            self.repeats += attempt > 0
+            self._splitter.clear()
+            while self.port.read(0.0):
+                pass  # late answers to an earlier question
+            self.port.write(question)
+            end = self.port.now() + _ANSWER + 0.002 * len(servos)
+            while len(found) < len(servos) and self.port.now() < end:
+                for answer in self._splitter.feed(self.port.read(0.002)):
+                    self._take(answer, servos, size, found)
+            if len(found) == len(servos):
+                break
+        return found
+
+    def _take(self, answer: Reply, servos: Sequence[int], size: int, found: dict[int, bytes]) -> None:
+        if answer.id in servos and len(answer.data) == size:
+            self.errors[answer.id] = answer.errors
+            found[answer.id] = answer.data

@@ -1,0 +1,107 @@
+"""What GRBL 1.1 says, read: status reports, settings, offsets, alarms and errors.
+
+Source: the project's public interface description (github.com/gnea/grbl, doc/markdown/interface.md,
+settings.md and the CSV tables of alarms and errors). grblHAL and FluidNC speak the same.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+STATUS, HOLD, RESUME, RESET, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x85"  # commands that pass every queue
+LETTERS = "XYZABC"
+RX_BUFFER = 128  # [bytes] of GRBL on an Uno; one stays free
+
+ALARMS = {
+    1: "a limit switch closed in motion",
+    2: "the target is outside GRBL's own soft limits ($20)",
+    3: "GRBL was reset in motion",
+    4: "the probe was not in its starting state",
+    5: "the probe did not touch",
+    6: "homing was interrupted by a reset",
+    7: "the door opened while homing",
+    8: "homing could not leave the switch: lengthen the pull-off ($27)",
+    9: "homing found no switch: wiring, direction ($23) or travel ($130) is wrong",
+}
+ERRORS = {
+    1: "it expected a letter",
+    2: "a number is malformed",
+    3: "it knows no such $ command",
+    5: "homing is not enabled ($22)",
+    8: "a $ command needs an idle machine",
+    9: "it is locked by an alarm",
+    15: "the jog leaves its travel",
+    20: "it does not support this command",
+    22: "no feed rate",
+    24: "two commands want the axis words",
+    33: "the target is invalid",
+}
+LOSES_POSITION = {1, 3, 6, 7, 8, 9}  # alarms after which counted steps mean nothing
+
+_VALUES = re.compile(r"[^,]+")
+
+
+@dataclass(frozen=True)
+class Report:
+    """One status report."""
+
+    state: str  # Idle, Run, Hold, Jog, Alarm, Door, Check, Home, Sleep
+    detail: int  # of Hold and Door: 0 when the machine stands
+    position: tuple[float, ...] | None  # machine position
+    free: tuple[int, int] | None  # planner blocks and receive bytes
+    pins: str  # inputs that are active: limits X Y Z A B C, probe P, door D, hold H, reset R, start S
+
+
+def report(line: str) -> Report | None:
+    """A status report, or None if the line is none or damaged.
+
+    >>> report("<Hold:0|MPos:1.000,-2.500,0.000|Bf:15,128|Pn:X>").position
+    (1.0, -2.5, 0.0)
+    """
+    if not (line.startswith("<") and line.endswith(">")):
+        return None
+    head, *fields = line[1:-1].split("|")
+    state, _, detail = head.partition(":")
+    found: dict[str, str] = dict(field.partition(":")[::2] for field in fields)
+    try:
+        position = tuple(float(value) for value in found["MPos"].split(",")) if "MPos" in found else None
+        free = tuple(int(value) for value in found["Bf"].split(",")) if "Bf" in found else None
+        return Report(state, int(detail or 0), position, (free[0], free[1]) if free else None, found.get("Pn", ""))
+    except (ValueError, IndexError):
+        return None
+
+
+def setting(line: str) -> tuple[int, float] | None:
+    """A line of ``$$``: number and value.
+
+    >>> setting("$100=44.444")
+    (100, 44.444)
+    """
+    match = re.fullmatch(r"\$(\d{1,3})=(-?\d+(?:\.\d*)?)(?:\s.*)?", line)
+    return (int(match[1]), float(match[2])) if match else None
+
+
+def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
+    """A line of ``$#``: name and values.
+
+    >>> offset("[G92:1000.000,0.000,0.000]")
+    ('G92', (1000.0, 0.0, 0.0))
+    """
+    match = re.fullmatch(r"\[(G5[4-9]|G28|G30|G92):([-\d.,]+)\]", line)
+    if match is None:
+        return None
+    try:
+        return match[1], tuple(float(value) for value in _VALUES.findall(match[2]))
+    except ValueError:
+        return None
+
+
+def alarm(number: int) -> str:
+    """What an alarm means."""
+    return ALARMS.get(number, f"alarm {number}")
+
+
+def error(number: int) -> str:
+    """What an error means."""
+    return ERRORS.get(number, f"error {number}")

@@ -1,0 +1,154 @@
+"""A conversation with GRBL: lines with their answers, and commands that pass every queue.
+
+Lines are sent ahead as long as they fit GRBL's receive buffer (character counting); every line is answered by
+``ok`` or ``error:N`` in its order. GRBL has no checksum: what a damaged line did shows when the position is read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from armkin.board.grbl import lines
+from armkin.board.grbl.lines import Report
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+
+BAUD = 115_200
+_BOOT = 4.0  # [s] a board may take to greet after its port was opened
+_ANSWER = 2.0  # [s] a line may take that moves nothing
+_REPORT = 0.5  # [s] a status report may take
+_LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
+
+
+class GrblError(LinkError):
+    """GRBL has refused a line or is in an alarm."""
+
+    def __init__(self, message: str, *, alarm: int = 0, error: int = 0) -> None:
+        super().__init__(message)
+        self.alarm, self.error = alarm, error
+
+
+class Session:
+    """GRBL behind an open port."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.version = ""
+        self.was_reset = False  # a greeting was heard: all offsets and the position are gone
+        self.report: Report | None = None
+        self.buffer = lines.RX_BUFFER
+        self._text = ""
+        self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
+        self._other: list[str] = []  # what came between: settings, offsets, messages
+
+    def open(self) -> None:
+        """Wait until GRBL answers a status request. Raises LinkError if it does not."""
+        end = self.port.now() + _BOOT
+        while self.port.now() < end:
+            self.port.write(lines.STATUS)
+            if self._wait(lambda: self.report is not None, 0.25):
+                break
+        else:
+            raise LinkError(
+                f"{self.port.name} does not answer as GRBL does: is it the right port, and {BAUD} its --baud?"
+            )
+        for line in self.ask("$I"):
+            if match := re.match(r"\[VER:([^:\]]*)", line):
+                self.version = match[1]
+            if match := re.match(r"\[OPT:[^,\]]*,(\d+),(\d+)", line):
+                self.buffer = max(32, min(int(match[2]), 4096))
+
+    def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
+        """Send one line, wait for its ``ok``, and return what came before it."""
+        self._other.clear()
+        self._send(line)
+        if not self._wait(lambda: not self._sent, patience):
+            raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
+        return list(self._other)
+
+    def status(self, patience: float = _REPORT) -> Report:
+        """A fresh status report."""
+        for _ in range(6):  # a request or its answer may be lost
+            self.report = None
+            self.port.write(lines.STATUS)
+            if self._wait(lambda: self.report is not None, patience):
+                assert self.report is not None
+                return self.report
+        raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
+
+    def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
+        """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
+
+        Raises GrblError at the first line that is refused.
+        """
+        for line in work:
+            while sum(size for size, _ in self._sent) + len(line) + 1 > self.buffer - 1:
+                if tick():
+                    return False
+                self._pump(0.01)
+            self._send(line)
+        while self._sent:
+            if tick():
+                return False
+            self._pump(0.01)
+        return True
+
+    def reset(self) -> None:
+        """Soft reset: clears GRBL's queue and its offsets; at a standstill it keeps the machine position."""
+        self.port.write(lines.RESET)
+        self._sent.clear()
+        self.report = None
+        self._wait(lambda: self.was_reset, 1.0)
+        self.was_reset = False
+        self.status()
+
+    def realtime(self, command: bytes) -> None:
+        """Send a command that passes every queue."""
+        self.port.write(command)
+
+    def _send(self, line: str) -> None:
+        data = line.encode("ascii") + b"\n"
+        self._sent.append((len(data), line))
+        self.port.write(data)
+
+    def _wait(self, done: Callable[[], bool], seconds: float) -> bool:
+        end = self.port.now() + seconds
+        while not done():
+            if self.port.now() >= end:
+                return False
+            self._pump(0.01)
+        return True
+
+    def _pump(self, timeout: float) -> None:
+        self._text += self.port.read(timeout).decode("ascii", "replace")
+        *whole, self._text = self._text.split("\n")
+        if len(self._text) > _LONGEST:
+            raise LinkError(f"{self.port.name} does not answer as GRBL does: {_LONGEST} characters without a line end")
+        for line in whole:
+            self._hear(line.strip("\r "))
+
+    def _hear(self, line: str) -> None:
+        if line == "ok":
+            if self._sent:
+                self._sent.popleft()
+        elif match := re.fullmatch(r"error:(\d{1,3})", line):
+            what = self._sent.popleft()[1] if self._sent else ""
+            number = int(match[1])
+            raise GrblError(f"GRBL refused {what!r}: {lines.error(number)} (error {number})", error=number)
+        elif match := re.fullmatch(r"ALARM:(\d{1,3})", line):
+            number = int(match[1])
+            self._sent.clear()
+            raise GrblError(f"GRBL stopped: {lines.alarm(number)} (alarm {number})", alarm=number)
+        elif line.lower().startswith("grbl "):
+            self.was_reset = True
+            self._sent.clear()
+        elif (found := lines.report(line)) is not None:
+            self.report = found
+        elif line:
+            self._other.append(line)
+            del self._other[:-400]

@@ -1,0 +1,160 @@
+"""A bus of simulated STS3215 servos that speak the bus's bytes, in simulated time."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from armkin.board.feetech.packet import ALL, Instruction, Splitter, packet
+from armkin.board.feetech.registers import (
+    COUNTS,
+    GOAL_POSITION,
+    GOAL_SPEED,
+    LOAD,
+    MODEL,
+    MOVING,
+    POSITION,
+    SPEED,
+    TEMPERATURE,
+    TORQUE,
+    VOLTAGE,
+    Register,
+)
+
+STEP = 0.001  # [s] of simulated time
+PAUSE = 0.002  # [s] between the bytes of a packet at most
+FASTEST = 3400  # [counts/s] that a servo makes
+
+
+class Servo:
+    """One servo: its registers, and a shaft that follows the goal at the goal's speed."""
+
+    def __init__(self, number: int, at: float = COUNTS / 2) -> None:
+        self.number, self.at = number, at
+        self.speed = 0.0
+        self.errors = 0
+        self.memory = bytearray(80)
+        self.set(MODEL, 777)
+        self.set(VOLTAGE, 74)
+        self.set(TEMPERATURE, 31)
+        self.set(GOAL_POSITION, round(at))
+        self.advance(0.0)
+
+    def get(self, register: Register) -> int:
+        """A register's value."""
+        return register.unpack(bytes(self.memory), 0)
+
+    def set(self, register: Register, value: int) -> None:
+        """Set a register."""
+        self.memory[register.address : register.address + register.size] = register.pack(value)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass: with its torque on, the shaft moves towards the goal."""
+        before = self.at
+        if self.get(TORQUE) == 1 and seconds > 0:
+            fastest = (abs(self.get(GOAL_SPEED)) or FASTEST) * seconds
+            self.at += max(-fastest, min(fastest, self.get(GOAL_POSITION) - self.at))
+        self.speed = (self.at - before) / seconds if seconds > 0 else 0.0
+        self.set(POSITION, round(self.at))
+        self.set(SPEED, round(self.speed))
+        self.set(MOVING, int(self.speed != 0.0))
+        self.set(LOAD, 120 if self.speed else 30)
+
+    def write(self, address: int, data: bytes) -> None:
+        """Write registers."""
+        if address + len(data) > len(self.memory):
+            return  # registers that are not there are ignored
+        self.memory[address : address + len(data)] = data
+
+
+class Noise(NamedTuple):
+    """Shares of packets that are lost and damaged on their way."""
+
+    lost: float = 0.0
+    damaged: float = 0.0
+    seed: int = 1
+
+
+class ServoBus:
+    """The port of a bus of simulated servos; whatever the host writes echoes nowhere."""
+
+    simulated = True
+    baud = 1_000_000
+
+    def __init__(self, servos: Iterable[Servo], name: str = "sim", noise: Noise | None = None) -> None:
+        self.name = name
+        self.servos = {servo.number: servo for servo in servos}
+        self.log: list[tuple[float, dict[int, float]]] = []  # where the shafts stood: every millisecond of a motion
+        self._noise = noise or Noise()
+        self._random = random.Random(self._noise.seed)
+        self._splitter = Splitter()
+        self._out = bytearray()
+        self._now = self._heard = 0.0
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the bus; a servo forgets the beginning of a packet after a pause."""
+        if self._now - self._heard > PAUSE:
+            self._splitter.clear()
+        self._heard = self._now
+        for question in self._splitter.feed(self._spoilt(data)):
+            self._obey(question.id, question.errors, question.data)
+
+    def read(self, timeout: float) -> bytes:
+        """What servos have answered; simulated time passes while nothing has come."""
+        end = self._now + timeout
+        while not self._out and self._now < end:
+            self.advance(STEP)
+        data, self._out = bytes(self._out), bytearray()
+        return data
+
+    def now(self) -> float:
+        """Simulated seconds."""
+        return self._now
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def advance(self, seconds: float) -> None:
+        """Let simulated time pass."""
+        self._now += seconds
+        for servo in self.servos.values():
+            servo.advance(seconds)
+        if any(servo.speed for servo in self.servos.values()):
+            self.log.append((self._now, {number: servo.at for number, servo in self.servos.items()}))
+
+    def _obey(self, number: int, kind: int, data: bytes) -> None:
+        if number == ALL:
+            self._obey_all(kind, data)
+        elif number in self.servos:
+            servo = self.servos[number]
+            if kind == Instruction.PING:
+                self._answer(servo)
+            elif kind == Instruction.READ and len(data) == 2:
+                self._answer(servo, *data)
+            elif kind == Instruction.WRITE and data:
+                servo.write(data[0], data[1:])
+                self._answer(servo)
+
+    def _obey_all(self, kind: int, data: bytes) -> None:
+        if kind == Instruction.SYNC_READ and len(data) >= 2:
+            for number in data[2:]:
+                if number in self.servos:
+                    self._answer(self.servos[number], data[0], data[1])
+        elif kind == Instruction.SYNC_WRITE and len(data) >= 2:
+            size = data[1] + 1
+            for begin in range(2, len(data) - size + 1, size):
+                if data[begin] in self.servos:
+                    self.servos[data[begin]].write(data[0], data[begin + 1 : begin + size])
+
+    def _answer(self, servo: Servo, address: int = 0, size: int = 0) -> None:
+        answer = packet(servo.number, servo.errors, bytes(servo.memory[address : address + size]))
+        self._out += self._spoilt(answer)
+
+    def _spoilt(self, data: bytes) -> bytes:
+        if self._random.random() < self._noise.lost:
+            return b""
+        if self._random.random() < self._noise.damaged:
+            k = self._random.randrange(len(data))
+            return data[:k] + bytes([data[k] ^ 1 << self._random.randrange(8)]) + data[k + 1 :]
+        return data
