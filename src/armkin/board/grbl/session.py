@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BAUD = 115_200
 _BOOT = 4.0  # [s] a board may take to greet after its port was opened
 _ANSWER = 2.0  # [s] a line may take that moves nothing
+_POLL = 0.1  # [s] between status requests in motion
+_SILENCE = 2.0  # [s] without any line from GRBL, which is asked for reports all the time
 _REPORT = 0.5  # [s] a status report may take
 _LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
 
@@ -42,7 +44,7 @@ class Session:
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
         self.buffer = lines.RX_BUFFER
-        self._text = ""
+        self._text, self._heard = "", 0
         self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
         self._other: list[str] = []  # what came between: settings, offsets, messages
 
@@ -87,15 +89,26 @@ class Session:
         Raises GrblError at the first line that is refused.
         """
         for line in work:
-            while sum(size for size, _ in self._sent) + len(line) + 1 > self.buffer - 1:
-                if tick():
-                    return False
-                self._pump(0.01)
+            if not self._drain(self.buffer - 1 - len(line) - 1, tick):
+                return False
             self._send(line)
-        while self._sent:
+        return self._drain(0, tick)
+
+    def _drain(self, most: int, tick: Callable[[], bool]) -> bool:
+        """Wait until at most so many bytes have no answer; False if `tick` wanted a stop."""
+        quiet = asked = self.port.now()
+        while (waiting := sum(size for size, _ in self._sent)) > most:
             if tick():
                 return False
+            before, now = self._heard, self.port.now()
+            if now > asked + _POLL:
+                asked = now
+                self.port.write(lines.STATUS)
             self._pump(0.01)
+            if self._heard != before:
+                quiet = self.port.now()
+            if self.port.now() > quiet + _SILENCE:
+                raise LinkError(f"GRBL on {self.port.name} has left {waiting} bytes without an answer")
         return True
 
     def reset(self) -> None:
@@ -130,6 +143,7 @@ class Session:
         if len(self._text) > _LONGEST:
             raise LinkError(f"{self.port.name} does not answer as GRBL does: {_LONGEST} characters without a line end")
         for line in whole:
+            self._heard += 1
             self._hear(line.strip("\r "))
 
     def _hear(self, line: str) -> None:

@@ -149,8 +149,10 @@ class Grbl:
         left = block.length - block.done
         brake = self._holding or block.rate**2 / (2 * block.accel) >= left
         change = block.accel * seconds
-        block.rate = max(0.0 if self._holding else change, block.rate - change) if brake else min(
-            block.speed, block.rate + change
+        block.rate = (
+            max(0.0 if self._holding else change, block.rate - change)
+            if brake
+            else min(block.speed, block.rate + change)
         )
         block.done = min(block.length, block.done + block.rate * seconds)
         share = block.done / block.length if block.length else 1.0

@@ -58,7 +58,7 @@ class Servo:
         self.speed = (self.at - before) / seconds if seconds > 0 else 0.0
         self.set(POSITION, round(self.at))
         self.set(SPEED, round(self.speed))
-        self.set(MOVING, int(self.speed != 0.0))
+        self.set(MOVING, int(self.get(TORQUE) == 1 and self.at != self.get(GOAL_POSITION)))
         self.set(LOAD, 120 if self.speed else 30)
 
     def write(self, address: int, data: bytes) -> None:
@@ -66,6 +66,7 @@ class Servo:
         if address + len(data) > len(self.memory):
             return  # registers that are not there are ignored
         self.memory[address : address + len(data)] = data
+        self.advance(0.0)
 
 
 class Noise(NamedTuple):
