@@ -64,6 +64,7 @@ class Session:
                 self.version = match[1]
             if match := re.match(r"\[OPT:[^,\]]*,(\d+),(\d+)", line):
                 self.buffer = max(32, min(int(match[2]), 4096))
+        self.was_reset = False
 
     def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
         """Send one line, wait for its ``ok``, and return what came before it."""
@@ -100,6 +101,7 @@ class Session:
         while (waiting := sum(size for size, _ in self._sent)) > most:
             if tick():
                 return False
+            self._not_reset()
             before, now = self._heard, self.port.now()
             if now > asked + _POLL:
                 asked = now
@@ -109,7 +111,12 @@ class Session:
                 quiet = self.port.now()
             if self.port.now() > quiet + _SILENCE:
                 raise LinkError(f"GRBL on {self.port.name} has left {waiting} bytes without an answer")
+        self._not_reset()
         return True
+
+    def _not_reset(self) -> None:
+        if self.was_reset:
+            raise GrblError("GRBL was reset in motion")
 
     def reset(self) -> None:
         """Soft reset: clears GRBL's queue and its offsets; at a standstill it keeps the machine position."""

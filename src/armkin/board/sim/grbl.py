@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from armkin.board.grbl.lines import LETTERS, RX_BUFFER
 
-STEP = 0.001  # [s] of simulated time
+STEP = 0.004  # [s] of simulated time
 BLOCKS = 15  # planner blocks
 
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")

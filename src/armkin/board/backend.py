@@ -1,0 +1,86 @@
+"""What every kind of board can do for an arm. Our own firmware is one of several.
+
+A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
+becomes bytes is its own business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
+
+Position = Literal["known", "retained", "lost"]
+Progress = Callable[[float, float], None]  # seconds done, seconds in all
+
+
+class StoppedError(Exception):
+    """The operator asked to stop, and the arm stands."""
+
+
+class Planned(Protocol):
+    """A trajectory as one kind of board carries it out."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Joints and seconds."""
+
+    @property
+    def start(self) -> NDArray[np.int64]:
+        """Counts where it begins: (motors,)."""
+
+    @property
+    def end(self) -> NDArray[np.int64]:
+        """Counts where it ends: (motors,)."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+
+    @property
+    def segments(self) -> int:
+        """Pieces that are sent to the board."""
+
+    @property
+    def top_rate(self) -> Array:
+        """Greatest rate of every motor: (motors,) [counts/s]."""
+
+
+class Backend(Protocol):
+    """An arm on its board."""
+
+    arm: Arm
+    port: Port
+    differences: tuple[str, ...]  # what this kind of board cannot promise, for people
+
+    def position(self) -> Position:
+        """Whether the board knows where the arm stands."""
+
+    def counts(self) -> tuple[int, ...]:
+        """Counts of the arm's motors, as last read."""
+
+    def joints(self) -> Array:
+        """Joint values where it stands, as last read: (n,) [rad | mm]."""
+
+    def prepare(self, *, assume_home: bool = False) -> bool:
+        """Get ready to move; True if the arm is taken to stand at home from now on."""
+
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+
+    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
+        """Carry out plans, one after another; None in between: nothing to do yet."""
+
+    def standing(self) -> str:
+        """Where the arm has come to rest, and what that means for the next command."""
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""

@@ -1,0 +1,1 @@
+"""Bus servos: Feetech STS3215 and its kin."""

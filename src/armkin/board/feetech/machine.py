@@ -1,0 +1,303 @@
+"""An arm of bus servos, which know where they stand at all times.
+
+The host streams positions along the trajectory, each a little ahead of the moment it is meant for, to all servos
+at once; the servos' own regulators follow. A lost packet is made up for by the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.backend import Position, Progress, StoppedError
+from armkin.board.feetech import registers
+from armkin.board.feetech.bus import Bus
+from armkin.errors import LinkError, UsageError
+from armkin.motion.plan import plan as plan_joints
+from armkin.motors import joints as joints_of
+from armkin.motors import motor_names, pulses
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
+
+PERIOD = 0.02  # [s] between positions
+WATCH = 0.1  # [s] between readings of position and errors in motion
+LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
+SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
+SETTLING = 1.0  # [s] that it may take
+EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
+
+
+@dataclass(frozen=True)
+class Job:
+    """A trajectory that starts at counts `start` (motors,)."""
+
+    trajectory: Trajectory
+    start: NDArray[np.int64]
+
+    @property
+    def end(self) -> NDArray[np.int64]:
+        """Counts at the end: (motors,)."""
+        stretches = self.trajectory.stretches
+        return pulses(self.trajectory.arm, stretches[-1].end) if stretches else self.start
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.trajectory.duration
+
+    @property
+    def segments(self) -> int:
+        """Number of positions sent."""
+        return int(np.ceil(self.duration / PERIOD))
+
+    @property
+    def top_rate(self) -> Array:
+        """Greatest rate of every motor: (motors,) [counts/s]."""
+        return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
+
+
+def servo_ids(arm: Arm) -> list[int]:
+    """Numbers of the arm's servos on their bus, in the motors' order. Raises UsageError for other motors."""
+    where = arm.path or arm.name
+    motors = () if arm.file is None else arm.file.motor_list()
+    if not motors:
+        raise UsageError(f"{where}: no joint has a drive")
+    for motor, name in zip(motors, motor_names(arm), strict=True):
+        if motor.kind != "bus" or motor.id is None:
+            raise UsageError(
+                f"{where}: motor {name} is a {motor.kind}; a servo bus needs drive: {{kind: bus, id: ...}}"
+            )
+    ids = [motor.id for motor in motors if motor.id is not None]
+    for number in ids:
+        if ids.count(number) > 1:
+            raise UsageError(f"{where}: two servos have id {number}; every servo of a bus has its own")
+    return ids
+
+
+class ServoMachine:
+    """An arm of bus servos behind an open port."""
+
+    differences = (
+        "servos hold a position within about a degree; they count no steps",
+        "when the computer falls silent every servo goes to the last position it was sent, 20 ms ahead",
+        "the bus has an 8-bit checksum: one damaged packet in some hundred passes it, and the next puts it right",
+    )
+
+    def __init__(self, port: Port, arm: Arm, stop: Callable[[], bool] = lambda: False) -> None:
+        self.arm, self.port, self._stop = arm, port, stop
+        self.ids = servo_ids(arm)
+        self.bus = Bus(port)
+        missing = [str(number) for number in self.ids if not self.bus.ping(number)]
+        if missing:
+            raise LinkError(
+                f"no answer from servo{'s' * (len(missing) > 1)} {', '.join(missing)} on {port.name}: "
+                "is the bus powered, is every cable plugged in, has every servo its own id?"
+            )
+        self._counts = np.zeros(len(self.ids), dtype=np.int64)
+        self._states: dict[int, bytes] = {}
+        self._read()
+
+    # Where it stands
+
+    def position(self) -> Position:
+        """Always known: the servos' encoders are absolute."""
+        return "known"
+
+    def counts(self) -> tuple[int, ...]:
+        """Counts of the arm's motors, as last read."""
+        return tuple(int(count) for count in self._counts)
+
+    def joints(self) -> Array:
+        """Joint values where it stands, as last read: (n,) [rad | mm]."""
+        return joints_of(self.arm, self._counts)
+
+    def standing(self) -> str:
+        """Where the arm has come to rest, and what that means for the next command."""
+        return f"the arm stands at {list(self.counts())} counts: the next command starts there"
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""
+        self._read()
+        servos = []
+        for number, name in zip(self.ids, motor_names(self.arm), strict=True):
+            state = self._states[number]
+            servos.append(
+                {
+                    "name": name,
+                    "id": number,
+                    "torque": bool(self.bus.read(number, registers.TORQUE)),
+                    "load_percent": self._value(registers.LOAD, state) / 10,
+                    "voltage": self._value(registers.VOLTAGE, state) / 10,
+                    "temperature": self._value(registers.TEMPERATURE, state),
+                    "errors": registers.errors(self.bus.errors.get(number, 0)),
+                }
+            )
+        return {"firmware": "STS servo bus", "servos": servos}
+
+    # Getting ready
+
+    def prepare(self, *, assume_home: bool = False) -> bool:
+        """Switch the motors on where they stand; False: the position is always known."""
+        if assume_home:
+            raise LinkError("bus servos know their position: there is nothing to assume; leave it out")
+        self._read()
+        self._check()
+        self._send(self._counts, np.zeros(len(self.ids)))  # so that none jumps to an old goal
+        for number, count in zip(self.ids, self._counts, strict=True):
+            self.bus.write(number, registers.GOAL_POSITION, int(count))
+        self.bus.torque(self.ids, on=True)
+        return False
+
+    def relax(self) -> None:
+        """Switch the motors off: the arm can be moved by hand, and falls if nobody holds it."""
+        self.bus.torque(self.ids, on=False)
+
+    def read(self) -> Array:
+        """Joint values where the arm stands now: (n,) [rad | mm]."""
+        self._read()
+        return self.joints()
+
+    # Moving
+
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        counts = np.asarray(start, dtype=np.int64)
+        return Job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
+
+    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
+        """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
+        total = done = 0.0
+        for job in plans:
+            if job is None:
+                self._heed()
+                self.port.read(PERIOD)
+                continue
+            total += job.duration
+            self._follow(job.trajectory, partial(_tell, progress, done, total))
+            self._arrive(job.end)
+            done = total
+            progress(done, total)
+
+    def hold(self) -> None:
+        """Stay where the arm stands."""
+        self._read()
+        for number, count in zip(self.ids, self._counts, strict=True):
+            self.bus.write(number, registers.GOAL_POSITION, int(count))
+
+    def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
+        """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
+        begin = last = self.port.now()
+        watched, t, pace, stopping = begin, 0.0, 1.0, False
+        ramp = _ramp(trajectory)
+        while t < trajectory.duration and pace > 0.0:
+            now = self.port.now()
+            if now - last < PERIOD - 1e-4:
+                self.port.read(PERIOD - (now - last))
+                continue
+            stopping = stopping or self._stop()
+            if stopping:
+                pace = max(0.0, pace - (now - last) / ramp)
+            t = min(trajectory.duration, t + (now - last) * pace)
+            last = now
+            ahead = min(trajectory.duration, t + PERIOD * pace)
+            self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
+            tell(t)
+            if now - watched > WATCH:
+                watched = now
+                self._watch(pulses(self.arm, trajectory.q(t)))
+        if stopping:
+            self.hold()
+            raise StoppedError
+
+    def _arrive(self, end: NDArray[np.int64]) -> None:
+        """Wait until all servos are where the move ends, sending the goal again."""
+        limit = self.port.now() + SETTLING
+        while True:
+            self._send(end, np.zeros(len(self.ids)))
+            self.port.read(PERIOD)
+            self._read()
+            self._check()
+            off = np.abs(self._counts - end)
+            if off.max() <= SETTLED:
+                return
+            if self.port.now() > limit:
+                k = int(off.argmax())
+                self.hold()
+                raise LinkError(
+                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {off[k]} counts from its goal: is it "
+                    f"blocked or overloaded?\n{self.standing()}"
+                )
+            self._heed()
+
+    def _watch(self, expected: NDArray[np.int64]) -> None:
+        """Hold the arm if a servo reports an error or falls far behind."""
+        self._read()
+        off = np.abs(self._counts - expected)
+        if off.max() > LAG:
+            k = int(off.argmax())
+            self.hold()
+            raise LinkError(
+                f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) is {off[k]} counts behind: blocked or overloaded?\n"
+                f"{self.standing()}"
+            )
+        self._check()
+
+    def _check(self) -> None:
+        """Raise LinkError for a servo that reports an error."""
+        for number, name in zip(self.ids, motor_names(self.arm), strict=True):
+            if found := registers.errors(self.bus.errors.get(number, 0)):
+                raise LinkError(
+                    f"servo {number} ({name}) reports {', '.join(found)}: switch the power off, find the cause\n"
+                    f"{self.standing()}"
+                )
+
+    def _heed(self) -> None:
+        if self._stop():
+            self.hold()
+            raise StoppedError
+
+    def _send(self, counts: NDArray[np.int64], rates: Array) -> None:
+        """Goal positions for all servos at one moment, with the speed that reaches them; 0: as fast as it can."""
+        rows = {}
+        for number, count, rate in zip(self.ids, counts.tolist(), rates.tolist(), strict=True):
+            speed = 0 if rate == 0.0 else min(int(EAGER * rate) + 20, 32767)
+            rows[number] = b"".join(
+                (
+                    registers.ACCELERATION.pack(0),
+                    registers.GOAL_POSITION.pack(int(count)),
+                    registers.GOAL_TIME.pack(0),
+                    registers.GOAL_SPEED.pack(speed),
+                )
+            )
+        self.bus.write_all(registers.GOAL[0], rows)
+
+    def _read(self) -> None:
+        self._states = self.bus.states(self.ids)
+        self._counts = np.array(
+            [self._value(registers.POSITION, self._states[number]) for number in self.ids], dtype=np.int64
+        )
+
+    @staticmethod
+    def _value(register: registers.Register, state: bytes) -> int:
+        return register.unpack(state, registers.STATE[0])
+
+
+def _tell(progress: Progress, done: float, total: float, t: float) -> None:
+    progress(done + t, total)
+
+
+def _ramp(trajectory: Trajectory) -> float:
+    """Seconds in which the whole motion can be slowed down to a stop within the joints' max_accel."""
+    arm = trajectory.arm
+    with np.errstate(invalid="ignore", divide="ignore"):
+        needed = trajectory.top_speed / arm.max_accel
+    return max(float(np.nanmax(needed, initial=0.0)), PERIOD)

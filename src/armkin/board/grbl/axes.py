@@ -1,0 +1,49 @@
+"""An arm's motors as GRBL's axes: degrees or mm of what each motor turns, as GRBL's millimetres."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.grbl.lines import LETTERS
+from armkin.board.grbl.settings import COARSE, Axis
+from armkin.errors import UsageError
+from armkin.motors import motor_accel, motor_names
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def axes_of(arm: Arm) -> list[Axis]:
+    """One axis a motor, in the arm's order.
+
+    Raises UsageError, naming the motor, for what GRBL cannot drive: servos, more than six motors, an axis that is
+    none of its letters or is used twice, a step too fine for the three decimals of its reports.
+    """
+    where = arm.path or arm.name
+    if arm.file is None or not arm.file.motor_list():
+        raise UsageError(f"{where}: no joint has a drive")
+    speed = np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed)  # [counts/s] all joints at once
+    accel = motor_accel(arm)
+    found: list[Axis] = []
+    for k, (motor, name) in enumerate(zip(arm.file.motor_list(), motor_names(arm), strict=True)):
+        if motor.kind != "stepper":
+            raise UsageError(f"{where}: motor {name} is a {motor.kind}; GRBL drives steppers alone")
+        if motor.axis is None or motor.axis not in LETTERS or motor.axis in (axis.letter for axis in found):
+            raise UsageError(
+                f"{where}: motor {name} is on axis {motor.axis}; GRBL has {', '.join(LETTERS)}, one motor on each"
+            )
+        steps = motor.pulses_per_unit()
+        if steps > COARSE:
+            raise UsageError(
+                f"{where}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with three decimals, "
+                f"which tell up to {COARSE:g} apart"
+            )
+        found.append(Axis(motor.axis, name, steps, motor.invert, _finite(speed[k] / steps), _finite(accel[k] / steps)))
+    return found
+
+
+def _finite(value: float) -> float:
+    return float(value) if math.isfinite(value) else 0.0

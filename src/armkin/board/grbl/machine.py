@@ -1,0 +1,250 @@
+"""An arm on a GRBL board.
+
+GRBL counts steps from its last reset. Where the arm stands is kept in its volatile offset G92, shifted by `MARK`:
+a reset clears it, and a position that was lost is never taken for zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.board.backend import Position, Progress, StoppedError
+from armkin.board.grbl import lines, settings
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.gcode import Job
+from armkin.board.grbl.session import GrblError, Session
+from armkin.errors import LinkError
+from armkin.motion.plan import plan as plan_joints
+from armkin.motors import joints as joints_of
+from armkin.motors import pulses
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+MARK = 1000.0  # [units] added to G92: an offset of 0 means that nobody has said where the arm stands
+_REST = 30.0  # [s] that a hold may take
+
+
+class GrblMachine:
+    """An arm on the GRBL board behind an open port."""
+
+    differences = (
+        "GRBL has no checksum: a damaged line may move the arm wrongly until the position is read back",
+        "GRBL forgets its position at a reset, and an Arduino resets when its port is opened",
+        "when the computer falls silent GRBL finishes what it holds, up to 16 lines",
+    )
+
+    def __init__(self, port: Port, arm: Arm, stop: Callable[[], bool] = lambda: False) -> None:
+        self.arm, self.port, self._stop = arm, port, stop
+        self.axes = axes_of(arm)
+        self.session = Session(port)
+        self.session.open()
+        self._offset: np.ndarray[Any, np.dtype[np.int64]] | None = None  # machine steps less counts
+        self.settings = self._read_settings()
+        self._read()
+
+    # Where it stands
+
+    def position(self) -> Position:
+        """Known since somebody said it or the arm was homed, until a reset or an alarm."""
+        return "lost" if self._offset is None else "known"
+
+    def counts(self) -> tuple[int, ...]:
+        """Counts of the arm's motors, as last read."""
+        offset = np.zeros(len(self.axes), dtype=np.int64) if self._offset is None else self._offset
+        return tuple(int(steps) for steps in self._steps() - offset)
+
+    def joints(self) -> Array:
+        """Joint values where it stands, as last read: (n,) [rad | mm]."""
+        return joints_of(self.arm, self.counts())
+
+    def standing(self) -> str:
+        """Where the arm has come to rest, and what that means for the next command."""
+        if self._offset is None:
+            return "the arm's position is lost: home it, or put it in its home pose and say so"
+        return f"the arm stands at {list(self.counts())} steps, its position is known: the next command starts there"
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""
+        status = self.session.status()
+        return {
+            "firmware": f"GRBL {self.session.version}",
+            "state": status.state.lower(),
+            "inputs": status.pins,
+            "settings": [str(difference) for difference in self.wrong()],
+        }
+
+    # Getting ready
+
+    def wrong(self) -> list[settings.Difference]:
+        """Settings that are not as the robot file wants them."""
+        return settings.differences(self.axes, self.settings)
+
+    def setup(self) -> list[settings.Difference]:
+        """Write the settings that differ, read them back, and return what was written.
+
+        The position is lost: its steps may mean something else now. Raises LinkError if a setting did not take.
+        """
+        before = self.wrong()
+        for difference in before:
+            self.session.ask(f"${difference.number}={difference.wanted:.3f}")
+        self.settings = self._read_settings()
+        if before:
+            self._forget()
+        left = self.wrong()
+        if left:
+            raise LinkError(f"GRBL did not keep what was written: {left[0]}")
+        return before
+
+    def prepare(self, *, assume_home: bool = False) -> bool:
+        """Check settings and position; True if the arm is taken to stand at home from now on."""
+        serious = [difference for difference in self.wrong() if difference.serious]
+        if serious:
+            more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
+            raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
+        status = self.session.status()
+        if status.state not in ("Idle", "Jog"):
+            raise LinkError(f"GRBL is in state {status.state}, not Idle: home it, or unlock it once you know why")
+        self._read()
+        if assume_home and self._offset is not None:
+            raise LinkError("the position is known: to assume it is only for a lost one; leave it out")
+        if self._offset is not None:
+            return False
+        if not (assume_home or self.port.simulated):
+            raise LinkError("the arm's position is lost: home it, or put it in its home pose and say so")
+        self.vouch(np.asarray(pulses(self.arm, self.arm.home), dtype=np.int64))
+        return True
+
+    def vouch(self, counts: Any) -> None:
+        """Take somebody's word that the motors stand at these counts."""
+        self._offset = self._steps() - np.asarray(counts, dtype=np.int64)
+        words = "".join(
+            f"{axis.letter}{count / axis.steps - MARK:.5f}" for axis, count in zip(self.axes, counts, strict=True)
+        )
+        self.session.ask(f"G92{words}")
+
+    # Moving
+
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        made = joints_of(self.arm, np.asarray(start, dtype=np.int64))
+        return Job(plan_joints(self.arm, made, targets, speed=speed), np.asarray(start, dtype=np.int64))
+
+    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
+        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
+        total = done = 0.0
+        for job in plans:
+            if job is None:
+                if self._stop():
+                    self._hold()
+                self.port.read(0.01)
+                continue
+            assert self._offset is not None
+            total += job.duration
+            began = self.port.now()
+
+            def tick(done: float = done, total: float = total, began: float = began) -> bool:
+                progress(min(done + self.port.now() - began, total), total)
+                return self._stop()
+
+            try:
+                # the dwell is answered when all before it has been carried out
+                whole = self.session.stream([*job.lines(self.axes, self._offset), "G4P0.01"], tick)
+            except GrblError as error:
+                raise self._explain(error) from None
+            if not whole:
+                self._hold()
+            self._compare(job)
+            done = total
+            progress(done, total)
+
+    def hold(self) -> None:
+        """Stop along the path and clear what is queued; the position stays known."""
+        self.session.realtime(lines.HOLD)
+        end = self.port.now() + _REST
+        while (status := self.session.status()).state not in ("Idle", "Alarm") and (
+            status.state != "Hold" or status.detail
+        ):
+            if self.port.now() > end:
+                raise LinkError(f"GRBL does not come to rest: it says {status.state}; cut the motors' power")
+            self.port.read(0.02)
+        counts = None if self._offset is None or status.state == "Alarm" else self._counts_of(status)
+        self.session.reset()
+        self._read()
+        if counts is not None:
+            self.vouch(counts)  # the reset has cleared it, at a standstill
+
+    def _hold(self) -> None:
+        self.hold()
+        raise StoppedError
+
+    def _compare(self, job: Job) -> None:
+        self._read()
+        if self._offset is None or self.counts() != tuple(job.end.tolist()):
+            raise LinkError(
+                f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}: a line was "
+                f"damaged on its way\n{self.standing()}"
+            )
+
+    def _explain(self, error: GrblError) -> LinkError:
+        if error.error:
+            self.hold()
+            return LinkError(f"{error}; the arm was stopped\n{self.standing()}")
+        if error.alarm == 0 or error.alarm in lines.LOSES_POSITION:
+            self._forget()
+        return LinkError(f"{error}\n{self.standing()}")
+
+    def home(self, at: Sequence[float], upward: Sequence[bool]) -> None:
+        """Run GRBL's homing cycle; at: counts where each motor's switch closes, upward: which end it is at."""
+        try:
+            self.session.ask("$H", patience=180.0)
+        except GrblError as error:
+            raise self._explain(error) from None
+        pull = self.settings.get(27, 0.0)
+        away = [pull * axis.steps * (1 if up else -1) for axis, up in zip(self.axes, upward, strict=True)]
+        self.vouch(np.rint(np.asarray(at) - away).astype(np.int64))
+        self._read()
+
+    # What GRBL says
+
+    def _read_settings(self) -> dict[int, float]:
+        return dict(pair for line in self.session.ask("$$") if (pair := lines.setting(line)) is not None)
+
+    def _read(self) -> None:
+        """Read position and offset: what stands in G92 since the last reset tells where the arm stands."""
+        status = self.session.status()
+        if status.position is None:
+            raise LinkError("GRBL reports no machine position: armkin setup writes $10, which asks for it")
+        if max(axis.index for axis in self.axes) >= len(status.position):
+            raise LinkError(f"GRBL has {len(status.position)} axes; {self.arm.name} needs {self.axes[-1].letter}, too")
+        found = dict(pair for line in self.session.ask("$#") if (pair := lines.offset(line)) is not None)
+        g92, g54 = found.get("G92", ()), found.get("G54", ())
+        if status.state == "Alarm" or not g92 or all(g92[axis.index] == 0.0 for axis in self.axes):
+            self._offset = None
+            return
+        shift = [(g92[axis.index] + (g54[axis.index] if g54 else 0.0) - MARK) * axis.steps for axis in self.axes]
+        self._offset = np.rint(shift).astype(np.int64)
+
+    def _steps(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """GRBL's machine position in steps, as last reported."""
+        report = self.session.report
+        assert report is not None
+        assert report.position is not None
+        place = [report.position[axis.index] * axis.steps for axis in self.axes]
+        return np.rint(place).astype(np.int64)
+
+    def _counts_of(self, status: lines.Report) -> np.ndarray[Any, np.dtype[np.int64]]:
+        self.session.report = status
+        return np.asarray(self.counts(), dtype=np.int64)
+
+    def _forget(self) -> None:
+        self._offset = None
+        try:
+            self.session.reset()
+        except LinkError:
+            return  # in an alarm, or gone: forgotten all the same

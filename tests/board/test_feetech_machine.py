@@ -1,0 +1,137 @@
+"""An arm of bus servos: it follows its trajectory, stops on it, and tells what is wrong with a servo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.board.backend import StoppedError
+from armkin.board.feetech import registers
+from armkin.board.feetech.machine import LAG, SETTLED, ServoMachine
+from armkin.board.sim.servo_bus import Noise, Servo, ServoBus
+from armkin.errors import LinkError
+from armkin.model.build import build
+from armkin.robot_file import parse
+
+TEXT = """
+name: bus_arm
+convention: standard
+joints:
+""" + "".join(
+    f"  - {{name: j{k}, dh: {{alpha: {alpha}, a: {a}, d: {d}}}, limits: [-150, 150], max_speed: 90, max_accel: 300,\n"
+    f"     drive: {{kind: bus, id: {k}, counts: 4096, zero: {2048 + 10 * k}, invert: {str(k == 2).lower()}}}}}\n"
+    for k, alpha, a, d in ((1, 90, 0, 60), (2, 0, 110, 0), (3, 0, 100, 0))
+)
+ARM = build(parse(TEXT))
+HOME = armkin.pulses(ARM, ARM.home).tolist()
+
+
+def bus(noise: Noise | None = None) -> ServoBus:
+    return ServoBus((Servo(k + 1, at) for k, at in enumerate(HOME)), noise=noise)
+
+
+def machine(port: ServoBus, stop: Callable[[], bool] = lambda: False) -> ServoMachine:
+    one = ServoMachine(port, ARM, stop)
+    one.prepare()
+    return one
+
+
+def test_zero_and_invert_are_the_robot_files() -> None:
+    assert HOME == [2058, 2068, 2078]
+    assert armkin.pulses(ARM, np.deg2rad([90, 90, -90])).tolist() == [2058 + 1024, 2068 - 1024, 2078 - 1024]
+
+
+@pytest.mark.parametrize("noise", [None, Noise(0.01, 0.01, 5)])
+def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> None:
+    port = bus(noise)
+    one = machine(port)
+    rng = np.random.default_rng(1)
+    for _ in range(8 if noise else 20):
+        start, goal = np.array(one.counts()), rng.uniform(-2.4, 2.4, 3)
+        port.log.clear()
+        plan = one.plan(one.counts(), goal)
+        one.run([plan])
+        assert np.abs(np.array(one.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED
+        places = np.array([[at[k] for k in (1, 2, 3)] for _, at in port.log])
+        way = plan.end - start
+        share = ((places - start) @ way) / (way @ way)
+        aside = np.linalg.norm(places - start - share[:, None] * way, axis=1)
+        assert aside.max() < 0.03 * np.linalg.norm(way) + 8
+
+
+def test_nothing_moves_when_the_motors_go_on() -> None:
+    port = bus()
+    for servo in port.servos.values():
+        servo.set(registers.GOAL_POSITION, 100)  # an old goal
+    machine(port)
+    port.advance(0.5)
+    assert [round(servo.at) for servo in port.servos.values()] == HOME
+
+
+def test_a_stop_slows_down_on_the_line() -> None:
+    port = bus()
+    asked = iter(range(10_000))
+    one = machine(port, lambda: next(asked) > 40)
+    goal = np.deg2rad([120, 60, -90])
+    plan = one.plan(one.counts(), goal)
+    with pytest.raises(StoppedError):
+        one.run([plan])
+    gone = (np.array(one.counts()) - HOME) / (plan.end - HOME)
+    assert 0.05 < gone.mean() < 0.95
+    assert np.ptp(gone) < 0.03
+    port.advance(0.5)
+    assert np.abs(np.array([servo.at for servo in port.servos.values()]) - one.counts()).max() <= 1
+
+
+def test_a_blocked_servo_holds_the_arm() -> None:
+    port = bus()
+    one = machine(port)
+    port.servos[2].write = lambda address, data: None  # type: ignore[method-assign]
+    with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
+        one.run([one.plan(one.counts(), np.deg2rad([0, 120, 0]))])
+    assert abs(port.servos[2].at - HOME[1]) < 1
+    assert LAG < 1024
+
+
+def test_a_servos_errors_are_told() -> None:
+    port = bus()
+    one = machine(port)
+    port.servos[3].errors = 36
+    with pytest.raises(LinkError, match=r"servo 3 \(j3\) reports overheating, overload"):
+        one.run([one.plan(one.counts(), np.deg2rad([20, 20, 20]))])
+    found = one.report()["servos"][2]
+    assert found["errors"] == ["overheating", "overload"]
+    assert (found["voltage"], found["temperature"], found["torque"]) == (7.4, 31, True)
+
+
+def test_servos_that_are_missing_are_named() -> None:
+    with pytest.raises(LinkError, match="no answer from servos 2, 3 on sim: is the bus powered"):
+        ServoMachine(ServoBus([Servo(1)]), ARM)
+
+
+def test_a_cable_that_is_pulled_in_motion_is_told() -> None:
+    port = bus()
+    asked = iter(range(10_000))
+
+    def pull() -> bool:
+        if next(asked) == 20:
+            port.servos.clear()
+        return False
+
+    one = machine(port, pull)
+    with pytest.raises(LinkError, match="does not answer"):
+        one.run([one.plan(one.counts(), np.deg2rad([60, 60, 60]))])
+
+
+def test_relaxed_motors_can_be_moved_by_hand_and_read() -> None:
+    port = bus()
+    one = machine(port)
+    one.relax()
+    for k, servo in port.servos.items():
+        servo.at += 100 * k
+        servo.advance(0.0)
+    assert all(servo.get(registers.TORQUE) == 0 for servo in port.servos.values())
+    np.testing.assert_allclose(np.rad2deg(one.read()), np.array([100, -200, 300]) * 360 / 4096, atol=1e-9)

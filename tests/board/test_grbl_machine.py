@@ -1,0 +1,181 @@
+"""An arm on GRBL: exact positions, and the truth when something goes wrong."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import ROOT, THREE_DOF
+
+import armkin
+from armkin.board.backend import StoppedError
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.machine import GrblMachine
+from armkin.board.grbl.settings import wanted
+from armkin.board.sim.grbl import Grbl
+from armkin.errors import LinkError, UsageError
+from armkin.model.build import build
+from armkin.robot_file import parse
+
+ARM = armkin.load("three_dof")
+FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
+
+
+def board(**more: Any) -> Grbl:
+    found = Grbl(axes=4, settings={**FITS, **more.pop("settings", {})}, **more)
+    found.simulated = False  # so that nobody vouches for the position by itself
+    return found
+
+
+def machine(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
+    return GrblMachine(port, ARM, stop)
+
+
+def pins(port: Grbl) -> list[int]:
+    """Steps at the pins, counted from where the arm was taken to stand at home."""
+    return [port.steps[k] for k in range(3)]
+
+
+def test_200_random_moves_are_read_back_exact() -> None:
+    port = board()
+    one = machine(port)
+    assert one.prepare(assume_home=True)
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        goal = rng.uniform(ARM.lower, ARM.upper)
+        one.run([one.plan(one.counts(), goal)])
+        assert list(one.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+
+
+def test_the_published_pose_puts_the_published_steps_on_the_pins() -> None:
+    port = board()
+    one = machine(port)
+    one.prepare(assume_home=True)
+    one.run([one.plan(one.counts(), np.deg2rad([-30, 5, -5]))])
+    assert pins(port) == [-1067, -10144, 5667]
+
+
+def test_the_position_outlives_the_command_but_no_reset() -> None:
+    port = board()
+    one = machine(port)
+    one.prepare(assume_home=True)
+    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+    there = one.counts()
+    again = machine(port)
+    assert (again.position(), again.counts()) == ("known", there)
+    assert not again.prepare()
+    with pytest.raises(LinkError, match="position is known"):
+        again.prepare(assume_home=True)
+    port.boot()
+    lost = machine(port)
+    assert lost.position() == "lost"
+    with pytest.raises(LinkError, match="position is lost: home it"):
+        lost.prepare()
+
+
+def test_settings_that_do_not_fit_are_refused_and_setup_writes_them() -> None:
+    port = Grbl(axes=4)
+    port.simulated = False
+    one = machine(port)
+    with pytest.raises(LinkError, match=r"GRBL's settings do not fit three_dof: \$100 .* is 250.*, and 2 more"):
+        one.prepare(assume_home=True)
+    assert not port.history
+    written = {difference.number for difference in one.setup()}
+    assert {100, 101, 102, 110, 111, 112} <= written
+    assert one.setup() == []
+    assert one.prepare(assume_home=True)
+
+
+def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
+    port = board()
+    goal = np.deg2rad([60, 20, -60])
+    for after in (5, 30, 60, 90):
+        asked = iter(range(10_000))
+        port.boot()
+        one = machine(port, lambda asked=asked, after=after: next(asked) > after)  # type: ignore[misc]
+        one.prepare(assume_home=True)
+        plan = one.plan(one.counts(), goal)
+        with pytest.raises(StoppedError):
+            one.run([plan])
+        assert list(one.counts()) == pins(port)
+        share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True) if end]
+        assert max(share) - min(share) < 2e-3
+        again = machine(port)
+        assert again.position() == "known"
+        again.prepare()
+        again.run([again.plan(again.counts(), goal)])
+        assert pins(port) == plan.end.tolist()
+
+
+def during(port: Grbl, what: Callable[[], None]) -> Callable[[], bool]:
+    asked = iter(range(10_000))
+
+    def stop() -> bool:
+        if next(asked) == 40:
+            what()
+        return False
+
+    return stop
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        (lambda port: port.alarm(1), "a limit switch closed in motion"),
+        (lambda port: port.boot(), "GRBL was reset in motion"),
+        (lambda port: setattr(port, "dead", True), r"without an answer|does not answer"),
+    ],
+)
+def test_what_loses_the_position_is_told(fault: Callable[[Grbl], None], message: str) -> None:
+    port = board()
+    one = machine(port, during(port, lambda: fault(port)))
+    one.prepare(assume_home=True)
+    with pytest.raises(LinkError, match=message):
+        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]))])
+    if not port.dead:
+        assert machine(port).position() == "lost"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_noisy_line_never_gives_a_false_position(seed: int) -> None:
+    """GRBL has no checksum: a damaged line may move wrongly, but what is said of the position is true."""
+    rng = random.Random(seed)
+
+    class Noisy(Grbl):
+        def write(self, data: bytes) -> None:
+            spoilt = bytearray(data)
+            for k in range(len(spoilt)):
+                if rng.random() < 0.002:
+                    spoilt[k] ^= 1 << rng.randrange(7)
+            super().write(bytes(spoilt))
+
+    port = Noisy(axes=4, settings=FITS)
+    port.simulated = False
+    right = 0
+    for _ in range(12):
+        try:
+            one = machine(port)
+            one.prepare(assume_home=one.position() == "lost")
+            origin = np.array(pins(port)) - one.counts()
+            plan = one.plan(one.counts(), np.radians([rng.uniform(-90, 90), rng.uniform(0, 90), rng.uniform(-90, 0)]))
+            one.run([plan])
+        except (LinkError, armkin.UsageError, armkin.NoSolutionError):
+            continue
+        assert (np.array(pins(port)) - origin).tolist() == plan.end.tolist() == list(one.counts())
+        right += 1
+    assert right > 0
+
+
+def test_arms_that_grbl_cannot_drive_are_refused() -> None:
+    text = (ROOT / THREE_DOF).read_text().replace("board: {kind: uno_cnc_shield, driver: A4988}", "")
+    for old, new, message in (
+        ("axis: X", "axis: Q", "motor q1 is on axis Q; GRBL has X, Y, Z, A, B, C"),
+        ("microsteps: 16", "microsteps: 256", "which tell up to 500 apart"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            axes_of(build(parse(text.replace(old, new))))
+    with pytest.raises(UsageError, match="GRBL drives steppers alone"):
+        axes_of(armkin.load("ra02"))
