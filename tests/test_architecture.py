@@ -38,7 +38,10 @@ MAY_IMPORT: dict[str, str] = {
     "plot": "errors files formula model forward view reach",
     "board/ports": "errors",
     "board/firmware": "errors hardware formula model motors motion board/ports robot_file",
-    "board/sim": "errors hardware board/ports board/firmware",
+    "board/backend": "formula model motion board/ports",
+    "board/grbl": "errors formula model motors motion board/ports board/backend",
+    "board/feetech": "errors formula model motors motion board/ports board/backend",
+    "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",
     "board": "errors hardware formula model forward motors motion board/ports board/firmware board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion reach view board board/ports board/firmware",

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import ROOT, THREE_DOF
 
 import armkin
 from armkin.board.backend import StoppedError
@@ -19,6 +18,7 @@ from armkin.board.sim.grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build import build
 from armkin.robot_file import parse
+from command_line import ROOT, THREE_DOF
 
 ARM = armkin.load("three_dof")
 FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
