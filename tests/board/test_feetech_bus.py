@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import pytest
 import scservo_sdk as sdk
@@ -32,8 +33,9 @@ def test_the_makers_library_drives_the_simulated_servos() -> None:
         goals = sdk.GroupSyncWrite(port, maker, 42, 2)
         goals.addParam(3, [2000 & 0xFF, 2000 >> 8])
         goals.txPacket()
-        while maker.read1ByteTxRx(port, 3, 66)[0]:
-            pass
+        end = time.monotonic() + 10
+        while maker.read2ByteTxRx(port, 3, 56)[0] != 2000:
+            assert time.monotonic() < end
         places = sdk.GroupSyncRead(port, maker, 56, 2)
         for number in SIX:
             places.addParam(number)
