@@ -85,6 +85,18 @@ def test_a_room_imports_what_stands_above_it(module: str) -> None:
     assert not wrong
 
 
+def test_below_the_model_nothing_reads_the_robot_file() -> None:
+    """What arms do is in the arm's own fields; `Arm.file` is for the rooms that print the file itself."""
+    printing = {"cli", "export"}
+    readers = {
+        module
+        for module, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute) and node.attr == "file" and ast.unparse(node.value).endswith("arm")
+    }
+    assert not {module for module in readers if _room(module) not in printing}
+
+
 def test_no_row_of_the_table_contradicts_another() -> None:
     rows = {room: above.split() for room, above in MAY_IMPORT.items()}
     assert not {up for above in rows.values() for up in above} - rows.keys(), "a room without a row"

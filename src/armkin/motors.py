@@ -178,23 +178,19 @@ def motor_accel(arm: Arm) -> Array:
 
 def motor_names(arm: Arm) -> list[str]:
     """Names of the motors, in the order of the pulses."""
-    if arm.file is None:
-        return [f"M{k + 1}" for k in range(len(arm.motor_gain))]
-    return [motor.name for motor in arm.file.motor_list()]
+    return [motor.name for motor in arm.motors] or [f"M{k + 1}" for k in range(len(arm.motor_gain))]
 
 
 def pulse_units(arm: Arm) -> list[str]:
     """``"step"``, ``"us"`` (RC servos) or ``"count"`` (bus servos) for every motor."""
-    if arm.file is None:
-        return ["step"] * len(arm.motor_gain)
     units = {"stepper": "step", "servo": "us", "bus": "count"}
-    return [units[motor.kind] for motor in arm.file.motor_list()]
+    return [units[motor.kind] for motor in arm.motors] or ["step"] * len(arm.motor_gain)
 
 
 def pulse_range(arm: Arm) -> Array:
     """Lowest and highest pulse of every servo: (motors, 2) [us | count]; steppers -inf, inf."""
     allowed = np.tile([-np.inf, np.inf], (len(arm.motor_gain), 1))
-    for k, motor in enumerate(arm.file.motor_list() if arm.file is not None else ()):
+    for k, motor in enumerate(arm.motors):
         if motor.kind == "servo" and motor.pulse_us is not None:
             allowed[k] = motor.pulse_us
         elif motor.kind == "bus" and motor.counts is not None:

@@ -183,7 +183,7 @@ def test_nothing_to_send_and_a_terminal_as_input() -> None:
         ((THREE_DOF, *POSE, "--port", "sim", "--branch", "left"), 2, "belong to --target"),
         ((THREE_DOF, *POSE, "--port", "sim", "--from", "0,0,0"), 2, "belongs to --dry-run"),
         (("robots/planar_2dof.yaml", 10, 10, "--port", "sim"), 2, "joints q1, q2 have no max_speed"),
-        (("robots/puma560.yaml", 0, 0, 0, 0, 0, 0, "--port", "sim"), 2, "has no drives"),
+        (("robots/puma560.yaml", 0, 0, 0, 0, 0, 0, "--port", "sim"), 2, "have no drive"),
     ],
 )
 def test_refusals(words: Sequence[object], code: int, message: str) -> None:

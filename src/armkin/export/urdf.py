@@ -59,7 +59,7 @@ def urdf(arm: Arm) -> str:
 
 
 def _comment(arm: Arm) -> str:
-    source = f"; {arm.file.source}" if arm.file is not None and arm.file.source else ""
+    source = f"; {arm.source}" if arm.source else ""
     text = f"{arm.name}, written by armkin{source}"
     return text.replace("--", "- -").replace("\n", " ")
 

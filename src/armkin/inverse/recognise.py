@@ -53,8 +53,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             return task, geometry
     usual = default_task(arm)
     hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
-    locked = arm.file is not None and len(arm.file.joints) > arm.n
-    joints = f"the {arm.n} joints that are not held" if locked else f"its {arm.n} joints"
+    joints = f"the {arm.n} joints that are not held" if arm.held else f"its {arm.n} joints"
     raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}", robot=arm.name, task=task.name)
 
 

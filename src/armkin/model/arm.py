@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
-    from armkin.robot_file import RobotFile
+    from armkin.robot_file import Board, Gripper, Homing, Motor, RobotFile
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,9 +46,16 @@ class Arm:
     reach: float  # [mm] no point of the chain is farther from its first joint
     pose_names: tuple[str, ...]  # of the robot file's poses, besides home
     pose_joints: Array  # (poses, n)
+    held: tuple[str, ...] = ()  # names of joints that `lock` has folded into the links
+    motors: tuple[Motor, ...] = ()  # in the order of the pulses; () for an arm without a robot file
+    homing: tuple[Homing | None, ...] = ()  # of every joint
+    gripper: Gripper | None = None
+    board: Board | None = None
     path: str = ""  # of the robot file, as given
     sha256: str = ""  # of the robot file's bytes
-    file: RobotFile | None = None
+    description: str = ""
+    source: str = ""  # where the numbers come from
+    file: RobotFile | None = None  # for whoever prints the file itself; all that arms do is in the fields above
 
     @property
     def n(self) -> int:
@@ -107,11 +114,12 @@ def from_links(
     motor_gain: ArrayLike | None = None,
     motor_bias: ArrayLike | None = None,
     poses: Mapping[str, ArrayLike] | None = None,
-    path: str = "",
-    sha256: str = "",
-    file: RobotFile | None = None,
+    **rest: Any,
 ) -> Arm:
-    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the rest optional."""
+    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the rest optional.
+
+    rest: what is no array: motors, homing, gripper, board, path, sha256, description, source, file.
+    """
     n = len(prismatic)
     links = _frozen(link)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
@@ -139,9 +147,8 @@ def from_links(
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
         pose_names=tuple(poses or ()),
         pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
-        path=path,
-        sha256=sha256,
-        file=file,
+        homing=rest.pop("homing", (None,) * n),
+        **rest,
     )
 
 

@@ -69,8 +69,14 @@ def build(file: RobotFile) -> Arm:
         motor_gain=gain,
         motor_bias=bias,
         poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
+        motors=file.motor_list(),
+        homing=tuple(j.homing for j in file.joints),
+        gripper=file.gripper,
+        board=file.board,
         path=file.path,
         sha256=file.sha256,
+        description=file.description,
+        source=file.source,
         file=file,
     )
 

@@ -55,6 +55,8 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
         frame=np.array(frame),
         motor_gain=arm.motor_gain[:, kept],
         pose_joints=arm.pose_joints[:, kept],
+        homing=tuple(arm.homing[i] for i in kept),
+        held=(*arm.held, *held),
         **rest,
     )
 

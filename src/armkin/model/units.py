@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,23 +41,39 @@ def joints_out(arm: Arm, q: ArrayLike) -> Array:
 
 def limits_out(arm: Arm) -> list[tuple[float, float]]:
     """Limits of each joint [deg | mm], as the robot file has them: 120 and not 119.99999999999999."""
-    if arm.file is not None:
-        return [(-math.inf, math.inf) if j.limits is None else j.limits for j in arm.file.joints]
-    return list(zip(joints_out(arm, arm.lower).tolist(), joints_out(arm, arm.upper).tolist(), strict=True))
+    return list(_limits_out(arm))
 
 
 def home_out(arm: Arm) -> list[float]:
     """Home pose [deg | mm], as the robot file has it."""
-    if arm.file is not None:
-        return [joint.home for joint in arm.file.joints]
-    return [float(value) for value in joints_out(arm, arm.home)]
+    return poses_out(arm)["home"]
 
 
 def poses_out(arm: Arm) -> dict[str, list[float]]:
     """Named poses [deg | mm], home first, as the robot file has them."""
-    if arm.file is not None:
-        return {"home": home_out(arm), **{name: list(values) for name, values in (arm.file.poses or {}).items()}}
-    return {name: joints_out(arm, q).tolist() for name, q in arm.poses.items()}
+    return {name: list(values) for name, values in _poses_out(arm)}
+
+
+@lru_cache(maxsize=64)
+def _limits_out(arm: Arm) -> tuple[tuple[float, float], ...]:
+    return tuple(zip(_as_written(arm, arm.lower), _as_written(arm, arm.upper), strict=True))
+
+
+@lru_cache(maxsize=64)
+def _poses_out(arm: Arm) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    return tuple((name, _as_written(arm, q)) for name, q in arm.poses.items())
+
+
+def _as_written(arm: Arm, q: Array) -> tuple[float, ...]:
+    """Joint values [deg | mm] with the fewest digits that mean q: those of a file, which degrees of pi/180 lose."""
+    scale = _scale(arm).tolist()
+    return tuple(_shortest(value, one) for value, one in zip(q.tolist(), scale, strict=True))
+
+
+def _shortest(value: float, scale: float) -> float:
+    exact = value / scale + 0.0  # + 0.0: no -0.0
+    shorter = (float(f"{exact:.{digits}g}") for digits in range(6, 17))
+    return next((text for text in shorter if text * scale == value), exact)
 
 
 def angles_out(angles: ArrayLike) -> Array:

@@ -23,7 +23,7 @@ def scene(arm: Arm) -> dict[str, Any]:
     return {
         "robot": arm.name,
         "robot_file": arm.path,
-        "description": "" if arm.file is None else (arm.file.description or ""),
+        "description": arm.description,
         "reach": arm.reach,
         "base": arm.base.tolist(),
         "links": arm.link.tolist(),
@@ -79,7 +79,7 @@ def _motors(arm: Arm) -> dict[str, Any]:
 
 
 def _gripper(arm: Arm) -> dict[str, Any] | None:
-    file = None if arm.file is None else arm.file.gripper
+    file = arm.gripper
     if file is None:
         return None
     # It continues the last straight piece of the arm, which is not always along the tool's z axis.

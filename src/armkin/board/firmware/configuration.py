@@ -23,7 +23,7 @@ from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses, un
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.robot_file import Gripper, RobotFile
+    from armkin.robot_file import Gripper
 
 _FAR = 2**30  # counts: an axis without a limit
 _SERVO_RANGE = (400, 2600)  # [us] that the boards can make
@@ -73,25 +73,24 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
-    file = arm.file
     lacks = _without_rates(arm) + ([] if rehearsal else _without_board(arm))
-    if lacks or file is None:
-        said = ", ".join(words for words, _ in lacks) or "it has no robot file"
+    if lacks:
+        said = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]
         raise UsageError(
             "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)])
         )
     made_up = rehearsal and bool(_without_board(arm))
-    motors = file.motor_list()
+    motors = arm.motors
     if made_up:
-        board = _rehearsal_board(file)
+        board = _rehearsal_board(arm)
         names = [*(motor.name for motor in motors), "gripper"]
     else:
-        assert file.board is not None
-        board = BOARDS[file.board.kind]
-        names = [*(str(motor.axis) for motor in motors), str(file.gripper.axis) if file.gripper is not None else ""]
+        assert arm.board is not None
+        board = BOARDS[arm.board.kind]
+        names = [*(str(motor.axis) for motor in motors), str(arm.gripper.axis) if arm.gripper is not None else ""]
     axes = tuple(board.axes.index(name) for name in names[:-1])
-    grip = _grip(board.axes.index(names[-1]), file.gripper) if file.gripper is not None else None
+    grip = _grip(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
     low, high = _limits(arm)
     home = pulses(arm, arm.home)
@@ -109,14 +108,14 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
             _rate(board, rate[k]),
             _accel(accel[k]),
         )
-    if grip is not None and file.gripper is not None:
-        images[grip.axis] = _grip_image(board, file.gripper, grip)
-    driver = _driver(file)
+    if grip is not None and arm.gripper is not None:
+        images[grip.axis] = _grip_image(board, arm.gripper, grip)
+    driver = _driver(arm)
     image = Image(
         tuple(images),
         _rows(arm, board, axes, low, high),
-        abort_closed=file.board is not None and file.board.abort == "closed",
-        enable_high=file.board is not None and file.board.enable == "high",
+        abort_closed=arm.board is not None and arm.board.abort == "closed",
+        enable_high=arm.board is not None and arm.board.enable == "high",
         step_high=driver.step_high,
         step_low=driver.step_low,
         dir_setup=driver.dir_setup,
@@ -160,35 +159,32 @@ def _without_rates(arm: Arm) -> list[Lack]:
 
 def _without_board(arm: Arm) -> list[Lack]:
     """Missing board, driver, axes: what a board needs."""
-    file = arm.file
-    if file is None:
-        return [(f"{arm.name} has no board: an arm without a robot file cannot be sent", [])]
-    if file.board is None:
+    if arm.board is None:
         drivers = ", ".join(DRIVERS)
         add = f"board: {{kind: ..., driver: ...}}   # kinds: {', '.join(BOARDS)}; drivers: {drivers}"
         return [("it has no board", [add])]
-    board, lacks = BOARDS[file.board.kind], []
+    board, lacks = BOARDS[arm.board.kind], []
     steppers = False
-    for motor in [*file.motor_list(), *([] if file.gripper is None else [file.gripper])]:
+    for motor in [*arm.motors, *([] if arm.gripper is None else [arm.gripper])]:
         steppers = steppers or motor.kind == "stepper"
         if motor.axis is None:
-            what = "the gripper" if motor is file.gripper else f"motor {getattr(motor, 'name', '')}"
+            what = "the gripper" if motor is arm.gripper else f"motor {getattr(motor, 'name', '')}"
             free = board.servos if motor.kind == "servo" else board.steppers
             lacks.append((f"{what} has no axis", [f"axis: ...   # to the drive of {what} ({', '.join(free)})"]))
-    if steppers and file.board.driver is None:
+    if steppers and arm.board.driver is None:
         why = "its board has no driver: it sets the pulse timing"
         lacks.append((why, [f"driver: ...   # to board: ({', '.join(DRIVERS)})"]))
     return lacks
 
 
-def _rehearsal_board(file: RobotFile) -> Board:
+def _rehearsal_board(arm: Arm) -> Board:
     """A board that does not exist, with an axis for every motor and a switch for every joint's homing."""
-    motors = file.motor_list()
+    motors = arm.motors
     steppers = [motor.name for motor in motors if motor.kind == "stepper"]
     servos = [motor.name for motor in motors if motor.kind == "servo"]
-    if file.gripper is not None:
-        (servos if file.gripper.kind == "servo" else steppers).append("gripper")
-    switches = dict.fromkeys(joint.homing.switch for joint in file.joints if joint.homing is not None)
+    if arm.gripper is not None:
+        (servos if arm.gripper.kind == "servo" else steppers).append("gripper")
+    switches = dict.fromkeys(homing.switch for homing in arm.homing if homing is not None)
     return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 80)
 
 
@@ -293,9 +289,9 @@ def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
     return AxisImage(True, invert, low, high, grip.open, _rate(board, grip.top), _accel(grip.accel))
 
 
-def _driver(file: RobotFile) -> Driver:
+def _driver(arm: Arm) -> Driver:
     """Pulse timing; without steppers, or on a made-up board, any will do."""
-    name = None if file.board is None else file.board.driver
+    name = None if arm.board is None else arm.board.driver
     return Driver(1, 1, 1, 1) if name is None else DRIVERS[name]
 
 

@@ -58,13 +58,11 @@ def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) 
 
     Raises UsageError that names the joint which has no homing.
     """
-    assert arm.file is not None
-    joints = arm.file.joints
     for name in names:
         joint_index(arm, name)
-    wanted = [j for j, joint in enumerate(joints) if not names or joint.name in names]
+    wanted = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
     wanted = [j for group in _groups(arm, wanted) for j in group]
-    bare = [joints[j].name for j in wanted if joints[j].homing is None]
+    bare = [arm.joint_names[j] for j in wanted if arm.homing[j] is None]
     if bare:
         raise NoHomingError(
             f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home pose",
@@ -72,7 +70,7 @@ def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) 
             joints=bare,
             file=arm.path,
         )
-    orders = {j: joint.homing.order for j, joint in enumerate(joints) if joint.homing is not None}
+    orders = {j: homing.order for j, homing in enumerate(arm.homing) if homing is not None}
     wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))
     return [_search(arm, configuration, j) for j in wanted]
 
@@ -115,16 +113,13 @@ def _groups(arm: Arm, wanted: Sequence[int]) -> list[list[int]]:
 
 def _at(arm: Arm, joint: int) -> float:
     """Joint value at the switch's edge [rad | mm]."""
-    assert arm.file is not None
-    homing = arm.file.joints[joint].homing
+    homing = arm.homing[joint]
     assert homing is not None
     return homing.at * (1.0 if arm.prismatic[joint] else math.pi / 180)
 
 
 def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
-    assert arm.file is not None
-    joint, unit = arm.file.joints[j], 1.0 if arm.prismatic[j] else math.pi / 180
-    homing = joint.homing
+    name, unit, homing = arm.joint_names[j], 1.0 if arm.prismatic[j] else math.pi / 180, arm.homing[j]
     assert homing is not None
     board = configuration.board
     gain = arm.motor_gain[:, j]
@@ -136,15 +131,15 @@ def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
     fastest, slowest = max(map(abs, rate)), min((abs(r) for r in rate if r), default=0)
     if fastest > 32767 or slowest < 1:
         raise UsageError(
-            f"joint {joint.name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to 32767 can be"
+            f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to 32767 can be"
         )
     backoff = math.ceil(leader * homing.backoff * unit)
     if backoff > 65535:
-        raise UsageError(f"joint {joint.name}: homing.backoff {homing.backoff:g} is {backoff} counts; 65535 can be")
+        raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; 65535 can be")
     span = float(arm.upper[j] - arm.lower[j])
     if not math.isfinite(span):
         if arm.prismatic[j]:
-            raise UsageError(f"joint {joint.name} has no limits: homing would not know how far to look")
+            raise UsageError(f"joint {name} has no limits: homing would not know how far to look")
         span = 2 * math.pi
     travel = math.ceil(leader * (_MARGIN * span + homing.backoff * unit))
     seconds = 2 * _MARGIN * span / speed + 4 * backoff / (leader * speed * _SLOW / 256) + 5

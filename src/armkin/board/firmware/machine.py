@@ -169,7 +169,7 @@ class Machine:
         return self._lost(what)
 
     def _lost(self, message: str) -> PositionLostError:
-        homing = self.arm.file is not None and all(joint.homing for joint in self.arm.file.joints)
+        homing = all(self.arm.homing)
         put = "put the arm in its home pose and prepare(assume_home=True)"
         return PositionLostError(
             message,

@@ -41,7 +41,7 @@ def _without_drives(arm: Arm) -> list[str]:
 
 
 def _without_homing(arm: Arm) -> list[str]:
-    bare = [joint.name for joint in arm.file.joints if joint.homing is None] if arm.file is not None else []
+    bare = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
     return [_have(bare, "homing")] if bare else []
 
 

@@ -62,7 +62,7 @@ def grip(
 
 def _said(arm: Arm, gripper: Grip, count: int) -> str:
     """A count in words: ``29.97 deg (833 us)``."""
-    drive = None if arm.file is None else arm.file.gripper
+    drive = arm.gripper
     assert drive is not None
     unit = "deg" if drive.lead is None else "mm"
     return f"{render.short(gripper.value(count))} {unit} ({count} {'us' if drive.kind == 'servo' else 'steps'})"

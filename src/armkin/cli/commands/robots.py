@@ -32,7 +32,7 @@ def _entry(name: str) -> dict[str, Any]:
     lacks = needs(arm)
     return {
         **render.head(arm),
-        "description": "" if arm.file is None else arm.file.description,
+        "description": arm.description,
         "joints": list(arm.joint_names),
         "joint_types": ["prismatic" if sliding else "revolute" for sliding in arm.prismatic],
         "task": task,
