@@ -68,7 +68,7 @@ class Job:
 def servo_ids(arm: Arm) -> list[int]:
     """Numbers of the arm's servos on their bus, in the motors' order. Raises UsageError for other motors."""
     where = arm.path or arm.name
-    motors = () if arm.file is None else arm.file.motor_list()
+    motors = arm.motors
     if not motors:
         raise UsageError(f"{where}: no joint has a drive")
     for motor, name in zip(motors, motor_names(arm), strict=True):

@@ -23,12 +23,12 @@ def axes_of(arm: Arm) -> list[Axis]:
     none of its letters or is used twice, a step too fine for the three decimals of its reports.
     """
     where = arm.path or arm.name
-    if arm.file is None or not arm.file.motor_list():
+    if not arm.motors:
         raise UsageError(f"{where}: no joint has a drive")
     speed = np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed)  # [counts/s] all joints at once
     accel = motor_accel(arm)
     found: list[Axis] = []
-    for k, (motor, name) in enumerate(zip(arm.file.motor_list(), motor_names(arm), strict=True)):
+    for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
         if motor.kind != "stepper":
             raise UsageError(f"{where}: motor {name} is a {motor.kind}; GRBL drives steppers alone")
         if motor.axis is None or motor.axis not in LETTERS or motor.axis in (axis.letter for axis in found):
