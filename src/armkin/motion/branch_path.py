@@ -1,0 +1,294 @@
+"""A route in joint space: which branch carries it, as cubics in joint values with a law of time.
+
+    route --columns--> linked branches --chains--> runs --here--> joint values on a grid --time law--> stretches
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.forward import fk, jacobian, position
+from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.motion.chains import Chain, Run, chains, fewest, why_ended
+from armkin.motion.columns import Columns, Int, change, chord_bound, levers, linked
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.route import Route
+from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
+from armkin.motors import motor_accel
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+_GRID = 1000  # points of a route's grid, at least
+_EACH = 8  # of a piece's
+_MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
+_STEP = 1.0  # [mm] between the first samples, at most
+_SAMPLES = (200, 20_000)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast: fractions of the joints' limits, and what else bounds the motion."""
+
+    speed: float = 1.0
+    accel: float = 1.0
+    tool_speed: float | None = None  # [mm/s]
+    jerk: Array | None = None  # (n,) [rad/s3 | mm/s3]
+    hold: float | None = None  # on a hold, a joint's acceleration is at most this times its max_accel
+    tolerance: float = 0.05  # [mm]
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A route on branches: the runs, and what was found on the way."""
+
+    route: Route
+    columns: Columns
+    all: list[Chain]
+    runs: list[Run]
+
+    @property
+    def whole(self) -> bool:
+        """Whether one run carries everything."""
+        return len(self.runs) == 1 and self.runs[0].first == 0 and self.runs[0].last == len(self.columns.s) - 1
+
+    @property
+    def covered(self) -> bool:
+        """Whether the runs carry everything, with reconfigurations in between."""
+        if not self.runs or self.runs[0].first != 0 or self.runs[-1].last != len(self.columns.s) - 1:
+            return False
+        return all(a.last == b.first for a, b in zip(self.runs, self.runs[1:], strict=False))
+
+
+def samples(route: Route, count: int | None = None) -> Array:
+    """Where a route is solved first: evenly, and at the ends of its pieces."""
+    number = count or int(np.clip(np.ceil(route.length / _STEP), *_SAMPLES))
+    even = np.linspace(0.0, route.length, max(number, 2))
+    return np.asarray(_apart(np.sort(np.concatenate([even, route.ends])), 1e-7 * route.length))
+
+
+def carry(
+    arm: Arm,
+    route: Route,
+    *,
+    near: Array,
+    tolerance: float,
+    pace: Pace,
+    fixed: Array | None = None,
+    branch: str | None = None,
+    count: int | None = None,
+) -> Carried:
+    """The branches that carry a route, and the best way along them.
+
+    near: where the arm comes from; fixed: where it stands at the route's start, if it has no choice; branch: name
+    of the branch to start on.
+    """
+    name = route.task.name
+    columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
+    all_ = chains(arm, columns)
+    starts = [c for c in all_ if c.first == 0]
+    if fixed is not None:
+        apart = [float(np.abs(change(arm, c.q[0], fixed)).max()) for c in starts]
+        starts = [c for c, d in zip(starts, apart, strict=True) if d < 1e-4]
+    if branch is not None:
+        starts = [c for c in starts if c.labels[0] >= 0 and columns.names[c.labels[0]] == branch]
+    end = len(columns.s) - 1
+    complete = [c for c in starts if c.carries(0) == end]
+    if len(complete) == 1:
+        return Carried(route, columns, all_, [Run(complete[0], 0, end)])
+    if complete:
+        timed = [(_seconds(arm, route, columns, c, near, pace), _approach(c, end, near, fixed), k, c)
+                 for k, c in enumerate(complete)]  # fmt: skip
+        fastest = min(t for t, *_ in timed)
+        return Carried(route, columns, all_, [Run(min(x[1:] for x in timed if x[0] <= fastest * 1.0005)[2], 0, end)])
+    return Carried(route, columns, all_, fewest(all_, end + 1, starts))
+
+
+def _approach(chain: Chain, end: int, near: Array, fixed: Array | None) -> float:
+    """How far the joints are from where the arm comes from, in seconds at least."""
+    speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
+    return float((np.abs(chain.run(0, end, near, fixed)[0] - near) / speed).max())
+
+
+def _seconds(arm: Arm, route: Route, columns: Columns, chain: Chain, near: Array, pace: Pace) -> float:
+    """Time that a chain takes for the whole route, on its own samples."""
+    if np.isnan(arm.max_speed).any() or np.isnan(arm.max_accel).any():
+        return float(np.abs(np.diff(chain.q, axis=0)).sum())
+    run = Run(chain, 0, len(columns.s) - 1)
+    return sum(stretch.duration for stretch in stretches(arm, route, columns, run, near, pace, grid=300))
+
+
+def stretches(
+    arm: Arm,
+    route: Route,
+    columns: Columns,
+    run: Run,
+    near: Array,
+    pace: Pace,
+    *,
+    fixed: Array | None = None,
+    grid: int = _GRID,
+) -> list[Curve | Smoothed]:
+    """A run as curves from rest to rest, one between each two stops of the route."""
+    q = run.chain.run(run.first, run.last, near, fixed)
+    s = columns.s[run.first : run.last + 1]
+    stops = [float(route.ends[k]) for k in sorted(route.stops)]
+    edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
+    made: list[Curve | Smoothed] = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        if b - a <= 1e-9:
+            continue
+        number = max(int(grid * (b - a) / route.length), 60)
+        for _ in range(6):
+            path, breaks = _on_grid(arm, route, s, q, a, b, number)
+            if grid < _GRID or deviation(arm, route, path) <= pace.tolerance:
+                break
+            number *= 2
+        if made:  # the stop is the same to the last digit
+            path.q[0] = made[-1].end
+        made.append(_timed(arm, route, knots(path.s, path.q, breaks), pace))
+    return made
+
+
+def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Knots, Int]:
+    """Joint values on a grid from a to b that follows way and joints, exact to the inverse kinematics."""
+    inside = [float(x) for x in route.ends if a + 1e-9 < x < b - 1e-9]
+    moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
+    measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
+    at = np.interp([a, *inside, b], s, measure)
+    total = max(float(at[-1] - at[0]), 1e-12)
+    parts = []
+    for (x, y), (m, n) in zip(_pairs([a, *inside, b]), _pairs(at.tolist()), strict=True):
+        share = _MOTION * (n - m) / total + (1 - _MOTION) * (y - x) / (b - a)
+        count = max(int(number * share), _EACH)
+        here = s[(s > x) & (s < y)]
+        grid = np.concatenate([[x], here, [y]])
+        level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
+        parts.append(np.interp(np.linspace(level[0], level[-1], count + 1)[:-1], level, grid))
+    breaks = np.cumsum([len(part) for part in parts])[:-1]
+    where = np.append(np.concatenate(parts), b)
+    guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
+    exact = corrected(arm, route.task, guess, route.targets(where))
+    return knots(where, exact, breaks), breaks
+
+
+def corrected(arm: Arm, task: Task, q: Array, target: Array, steps: int = 4) -> Array:
+    """Joint values near the right ones, made exact by Newton steps; those of free joints stay: (N, n)."""
+    k, p = len(task.sums), task.position
+    scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
+    scale[:p] = 1 / arm.reach
+    for _ in range(steps):
+        T = fk(arm, q)
+        r = residual(task, T, q * arm.ratio, target) * scale
+        J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
+        J[:, p : p + k] *= arm.ratio
+        J = J * np.where(arm.prismatic, arm.reach, 1.0)
+        H = np.swapaxes(J, 1, 2) @ J + 1e-13 * np.eye(arm.n)
+        step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
+        size = np.abs(step).max(axis=1, keepdims=True)
+        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * np.where(
+            arm.prismatic, arm.reach, 1.0
+        )
+        if size.max() < 1e-12:
+            break
+    return np.asarray(q)
+
+
+def deviation(arm: Arm, route: Route, path: Knots) -> float:
+    """An upper bound of the distance between the tip and the route on a grid's cubics [mm].
+
+    Chord against tip: `chord_bound`; cubic against chord: h^2 / 8 |q''| times the levers; chord against route:
+    its sagitta in the middle of each interval, a third more for what is not symmetrical.
+    """
+    lever = levers(arm)
+    left, right = path.second()
+    h = path.h[:, None]
+    bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
+    tip = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
+    p = position(arm, path.q)
+    middle = route.targets((path.s[:-1] + path.s[1:]) / 2)
+    full = route.task.orientation == "full"
+    m = middle[:, :3, 3] if full else middle[:, : route.task.position]
+    sagitta = np.linalg.norm(m - ((p[:-1] + p[1:]) / 2)[:, : m.shape[1]], axis=1)
+    return float((tip + 4 / 3 * sagitta).max(initial=0.0))
+
+
+def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
+    """The fastest law of time on a grid."""
+    fraction, tool = route.limit(path.s, pace.speed, pace.tool_speed)
+    tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
+    with np.errstate(divide="ignore"):
+        each = (tool / np.maximum(tip, 1e-300)) ** 2
+    each = np.where(np.isfinite(tool), each, np.inf)
+    both = [np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (each, fraction)]
+    cap = both[0]
+    if pace.hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
+        cap = np.minimum(cap, hold_cap(arm, path, pace.hold))
+    accel = arm.max_accel * pace.accel
+    rows = coupled(arm, pace.accel)
+    window = 0.0
+    if pace.jerk is not None:
+        window = float((2 * accel / pace.jerk).max())
+        cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
+    curve = Curve(path, optimal(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
+    return Smoothed(curve, window) if window else curve
+
+
+def coupled(arm: Arm, share: float) -> tuple[Array, Array] | None:
+    """Motors that turn several joints: their weights and greatest accelerations, in counts; None: there is none."""
+    shared = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
+    return (arm.motor_gain[shared], motor_accel(arm)[shared] * share) if len(shared) else None
+
+
+def _narrow(arm: Arm, path: Knots, window: float, tolerance: float) -> Array:
+    """x at which the moving average shifts the tip by half the tolerance: (N,).
+
+    The average over T shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
+    """
+    left, right = path.second()
+    bend = np.concatenate([left[:1], (left[1:] + right[:-1]) / 2, right[-1:]])
+    J = jacobian(arm, path.q)[:, :3]
+    shift = np.linalg.norm((J @ bend[:, :, None])[..., 0], axis=1)
+    return np.asarray(12 * tolerance / window**2 / np.maximum(shift, 1e-12))
+
+
+def verdict(arm: Arm, carried: Carried, near: Array) -> list[dict[str, Any]]:
+    """Which branch carries how far from the start, and why it ends; the best first."""
+    out = []
+    for chain in carried.all:
+        if chain.first != 0:
+            continue
+        e = chain.carries(0)
+        label = int(chain.labels[0])
+        why, joint, value, beyond = why_ended(carried.columns, chain, 0)
+        out.append(
+            {
+                "name": carried.columns.names[label] if label >= 0 else "",
+                "start": chain.run(0, max(e, 0), near)[0] if e >= 0 else chain.q[0],
+                "carries": float(carried.columns.s[e]) if e >= 0 else 0.0,
+                "legal": e >= 0,
+                "why": why,
+                "joint": joint,
+                "value": value,
+                "beyond": beyond,
+            }
+        )
+    return sorted(out, key=lambda found: (-float(found["carries"]), not found["legal"]))
+
+
+def _apart(s: Array, least: float) -> Array:
+    """Sorted values without those that are closer than `least` to the one before; the last one stays."""
+    keep = np.concatenate([[True], np.diff(s) > least])
+    out = s[keep]
+    out[-1] = s[-1]
+    return out
+
+
+def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
+    return list(zip(values[:-1], values[1:], strict=True))

@@ -1,0 +1,183 @@
+"""Chains of linked branches, how far each carries within the limits, and the fewest runs that carry all.
+
+A chain is one branch over a range of samples, its joint values continuous. Within the limits it is one of its
+whole-turn copies, the same along a run; joints choose their copies one by one. A run ends where a joint meets its
+limit, or where the branch itself ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.inverse.solutions import Status
+from armkin.model.limits import SLACK
+from armkin.motion.columns import TURN, Columns, Int, change
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """One branch over samples first .. first + len(q) - 1, continuous in its joint values."""
+
+    arm: Arm
+    first: int
+    q: Array  # (len, n)
+    labels: Int  # (len,) number of the branch's name, -1: none
+
+    @property
+    def last(self) -> int:
+        """Its last sample."""
+        return self.first + len(self.q) - 1
+
+    @cached_property
+    def _copies(self) -> list[tuple[Array, Int]]:
+        """For every joint the offsets of its copies (k,), and the first illegal sample from each on: (k, len)."""
+        out = []
+        for j in range(self.arm.n):
+            lower, upper, value = self.arm.lower[j], self.arm.upper[j], self.q[:, j]
+            offsets = np.zeros(1)
+            if not self.arm.prismatic[j] and np.isfinite(lower) and np.isfinite(upper):
+                first = np.ceil((lower - SLACK - value.max()) / TURN)
+                last = np.floor((upper + SLACK - value.min()) / TURN)
+                offsets = TURN * np.arange(first, last + 1)
+            elif not self.arm.prismatic[j] and (np.isfinite(lower) or np.isfinite(upper)):
+                middle = np.rint((self.arm.home[j] - value[0]) / TURN)
+                offsets = TURN * (middle + np.arange(-2, 3))
+            moved = value + offsets[:, None]
+            illegal = (moved < lower - SLACK) | (moved > upper + SLACK)
+            end = np.where(illegal, np.arange(len(value)), len(value))
+            out.append((offsets, np.minimum.accumulate(end[:, ::-1], axis=1)[:, ::-1]))
+        return out
+
+    @cached_property
+    def _joint_reach(self) -> Int:
+        """The first sample that each joint cannot go on to, from every sample: (len, n) relative; own: illegal there."""
+        ends = [end.max(axis=0) if len(end) else np.arange(len(self.q)) for _, end in self._copies]
+        return np.stack(ends, axis=1)
+
+    @cached_property
+    def reach(self) -> Int:
+        """The last sample that each sample's run carries to, absolute; one less than itself: illegal. (len,)."""
+        return np.asarray(self._joint_reach.min(axis=1) - 1 + self.first)
+
+    def carries(self, i: int) -> int:
+        """Last sample of a run from sample i, i - 1 if there is none."""
+        return int(self.reach[i - self.first]) if self.first <= i <= self.last else i - 1
+
+    def stopper(self, i: int) -> int | None:
+        """The joint whose limit ends a run from sample i; None: the chain itself ends."""
+        ends = self._joint_reach[i - self.first]
+        return int(ends.argmin()) if ends.min() < len(self.q) else None
+
+    def run(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
+        """Joint values from sample i to e (e - i + 1, n), the legal copies nearest to `near` at i."""
+        offsets = np.zeros(self.arm.n)
+        for j, (choices, ends) in enumerate(self._copies):
+            here = self.q[i - self.first, j]
+            if not self.arm.prismatic[j] and not np.isfinite([self.arm.lower[j], self.arm.upper[j]]).any():
+                offsets[j] = TURN * np.rint((near[j] - here) / TURN)
+                continue
+            legal = choices[ends[:, i - self.first] > e - self.first]
+            wanted = near[j] if fixed is None else fixed[j]
+            offsets[j] = legal[np.abs(here + legal - wanted).argmin()]
+        return np.asarray(self.q[i - self.first : e - self.first + 1] + offsets)
+
+
+def chains(arm: Arm, columns: Columns) -> list[Chain]:
+    """All chains of linked columns."""
+    N, B = columns.q.shape[:2]
+    valid = columns.valid
+    identity = np.where(valid[:-1], np.arange(B), -1) == columns.partner
+    steady = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
+    events = np.append(np.flatnonzero(~steady), N - 1)
+    open_: dict[int, list[tuple[int, int, int]]] = {b: [] for b in np.flatnonzero(valid[0])}  # column -> blocks
+    done: list[list[tuple[int, int, int]]] = []
+    begin = 0
+    for event in events.tolist():
+        for b, blocks in open_.items():
+            blocks.append((begin, event, b))
+        if event == N - 1:
+            break
+        partner = columns.partner[event]
+        going = {int(partner[b]): blocks for b, blocks in open_.items() if partner[b] >= 0}
+        done += [blocks for b, blocks in open_.items() if partner[b] < 0]
+        open_ = {int(b): going.get(int(b), []) for b in np.flatnonzero(valid[event + 1])}
+        begin = event + 1
+    done += list(open_.values())
+    return [_assembled(arm, columns, blocks) for blocks in done]
+
+
+def _assembled(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
+    q = np.concatenate([columns.q[a : b + 1, c] for a, b, c in blocks])
+    labels = np.concatenate([columns.name[a : b + 1, c] for a, b, c in blocks])
+    steps = change(arm, q[:-1], q[1:])
+    return Chain(arm, blocks[0][0], np.concatenate([q[:1], q[:1] + np.cumsum(steps, axis=0)]), labels.astype(np.intp))
+
+
+@dataclass(frozen=True)
+class Run:
+    """A stretch of the route on one chain within the limits."""
+
+    chain: Chain
+    first: int
+    last: int
+
+
+def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
+    """Runs one after another, each carrying as far as any can; a gap where nothing carries.
+
+    allowed: the chains that may begin (those at the start's branch). Of runs that carry equally far the one with
+    the least motion: the sum over the samples of the greatest |dq| / max_speed.
+    """
+    runs: list[Run] = []
+    i = 0
+    while i < N:
+        choices = allowed if allowed is not None and i == 0 else all_
+        reach = {chain: chain.carries(i) for chain in choices}
+        far = max(reach.values(), default=i - 1)
+        if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
+            i += 1
+            continue
+        best = min((c for c, e in reach.items() if e == far), key=lambda c: least_time(c, i, far))
+        runs.append(Run(best, i, far))
+        if far >= N - 1:
+            break
+        i = far if any(c.carries(far) > far for c in all_) else far + 1
+    return runs
+
+
+def least_time(chain: Chain, i: int, e: int) -> float:
+    """A lower bound of the seconds from sample i to e: no joint faster than its max_speed."""
+    q = chain.q[i - chain.first : e - chain.first + 1]
+    speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
+    return float((np.abs(np.diff(q, axis=0)) / speed).max(axis=1, initial=0.0).sum())
+
+
+def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
+    """Why a run from sample i ends: words, the joint and its limit (or None), what is beyond."""
+    e = chain.carries(i)
+    beyond = min(max(e + 1, 0), len(columns.s) - 1)
+    status = Status(int(columns.status[beyond])).name.lower()
+    joint = chain.stopper(i)
+    arm = chain.arm
+    if joint is not None:
+        at = min(max(e + 1, chain.first), chain.last) - chain.first
+        # Over or under: compare the copy that carried farthest
+        q = chain.run(i, e, arm.home)[-1] if e >= i else chain.q[max(i - chain.first, 0)]
+        there = q[joint] + chain.q[at, joint] - chain.q[max(at - 1, 0), joint]
+        upper = abs(there - arm.upper[joint]) < abs(there - arm.lower[joint])
+        limit = float(arm.upper[joint] if upper else arm.lower[joint])
+        return "limit", joint, limit, status
+    if beyond == e:
+        return "end", None, None, status
+    count = columns.valid.sum(axis=1)
+    if columns.status[beyond] == Status.UNREACHABLE:
+        return "reach", None, None, status
+    return ("boundary" if count[beyond] < count[e] else "singularity"), None, None, status

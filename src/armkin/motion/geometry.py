@@ -1,0 +1,309 @@
+"""Paths of the tool: lines, arcs, helices, splines and blends as pieces, each passed at unit speed.
+
+A piece is a vector function y = (position, sums of angles, rotation vector) over its own length; the rotation
+vector turns the piece's first orientation, so that a linear one is a slerp. Length counts millimetres, and 30 mm
+for each radian of turning, so that a pure turn has a length, too:
+
+    ds^2 = |dp|^2 + (30 mm |dangles|)^2
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.inverse.tasks.task import Task
+from armkin.model.rotation import quaternion
+
+PER_RADIAN = 30.0  # [mm/rad]
+SMALL = 1e-9  # [mm] shorter pieces are no pieces
+_GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
+_TABLE = 96  # intervals of a curved span's table of lengths
+
+
+def turn(w: Array) -> Array:
+    """Rotation matrices of rotation vectors: (..., 3) [rad] -> (..., 3, 3) (Rodrigues)."""
+    angle = np.linalg.norm(w, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(w, -1, 0)
+    zero = np.zeros_like(x)
+    W = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*w.shape[:-1], 3, 3)
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * W + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (W @ W))
+
+
+def vector(R: Array) -> Array:
+    """Rotation vectors of rotation matrices, of at most half a turn: (..., 3, 3) -> (..., 3) [rad]."""
+    q = quaternion(R)
+    size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(size, q[..., :1])
+    return np.asarray(q[..., 1:] * np.where(size > 1e-12, angle / np.maximum(size, 1e-300), 2.0))
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A target taken apart: position, sums, and an orientation (3, 3) or a direction (3,) or nothing."""
+
+    p: Array
+    sums: Array
+    turned: Array | None
+
+
+def spot(task: Task, target: ArrayLike) -> Spot:
+    """A target (m,) or (4, 4) of a task, taken apart."""
+    values = np.asarray(target, dtype=float)
+    if task.orientation == "full":
+        return Spot(values[:3, 3], np.zeros(0), values[:3, :3])
+    p, rest = values[: task.position], values[task.position :]
+    k = len(task.sums)
+    axis = rest[k : k + 3] / np.linalg.norm(rest[k : k + 3]) if task.orientation == "axis" else None
+    return Spot(p, rest[:k], axis)
+
+
+def _between(task: Task, a: Spot, b: Spot) -> Array:
+    """Rotation vector from one orientation to another."""
+    if a.turned is None or b.turned is None:
+        return np.zeros(3)
+    if task.orientation == "full":
+        return vector(b.turned @ a.turned.T)
+    normal = np.cross(a.turned, b.turned)
+    sine = float(np.linalg.norm(normal))
+    if sine < 1e-12 and a.turned @ b.turned < 0:
+        raise UsageError("a move turns the tool's axis over, by half a turn: put a point in between")
+    return np.asarray(normal * (math.atan2(sine, float(a.turned @ b.turned)) / max(sine, 1e-300)))
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A smooth part of a path, passed at unit speed."""
+
+    task: Task
+    first: Spot
+    along: Callable[[Array], Array]  # s (N,) -> y (N, dim): position, sums, rotation vector
+    length: float
+    speed: float | None = None  # fraction of the joints' max_speed, of this move
+    tool_speed: float | None = None  # [mm/s] of this move
+
+    def targets(self, s: Array) -> Array:
+        """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""
+        y = self.along(np.clip(s, 0.0, self.length))
+        n, k = self.task.position, len(self.task.sums)
+        if self.first.turned is None:
+            return y[:, : n + k]
+        R = turn(y[:, n + k :])
+        if self.task.orientation == "axis":
+            return np.concatenate([y[:, : n + k], R @ self.first.turned], axis=1)
+        T = np.zeros((len(y), 4, 4))
+        T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = R @ self.first.turned, y[:, :3], 1.0
+        return T
+
+    @cached_property
+    def last(self) -> Spot:
+        """Where it ends."""
+        return spot(self.task, self.targets(np.array([self.length]))[0])
+
+    def direction(self, s: float) -> Array:
+        """d(position, sums, angle)/ds at s, angles in units of PER_RADIAN: a unit vector (dim,)."""
+        h = min(1e-5 * self.length, 1e-3)
+        a, b = max(s - h, 0.0), min(s + h, self.length)
+        here, there = (spot(self.task, t) for t in self.targets(np.array([a, b])))
+        w = _between(self.task, here, there)
+        change = np.concatenate([there.p - here.p, PER_RADIAN * (there.sums - here.sums), PER_RADIAN * w])
+        return np.asarray(change / (b - a))
+
+    def part(self, a: float, b: float) -> Piece:
+        """The part from length a to b."""
+        at = spot(self.task, self.targets(np.array([a]))[0])
+        n = self.task.position + len(self.task.sums)
+        turned = turn(self.along(np.array([a]))[:, n:])[0]
+
+        def along(s: Array) -> Array:
+            y = self.along(s + a)
+            if self.first.turned is None:
+                return y
+            w = vector(turn(y[:, n:]) @ turned.T)
+            return np.concatenate([y[:, :n], w], axis=1)
+
+        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed)
+
+
+def line(task: Task, a: Spot, b: Spot) -> Piece:
+    """A straight line; orientation by slerp, sums linearly."""
+    return _uniform(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), float(np.linalg.norm(b.p - a.p)))
+
+
+def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:
+    """An arc or a helix from `a` about `centre`, by `angle` [rad], rising by `rise` [mm] along the normal in all."""
+    n = normal / np.linalg.norm(normal)
+    out = a.p - centre
+    out = out - n * (n @ out) if len(a.p) == 3 else out
+    radius = float(np.linalg.norm(out))
+    if radius < 1e-6:
+        raise UsageError("the circle's centre lies on the point where the circle starts: it has no radius")
+    across = np.cross(n, out) if len(a.p) == 3 else np.array([-out[1], out[0]]) * n[-1]
+    base = a.p - out
+
+    def at(f: Array) -> Array:
+        t = (f * angle)[:, None]
+        flat = base + np.cos(t) * out + np.sin(t) * across
+        return np.asarray(flat + f[:, None] * rise * n if len(a.p) == 3 else flat)
+
+    length = math.hypot(radius * angle, rise)
+    b = end or Spot(at(np.ones(1))[0], a.sums, a.turned)
+    return _uniform(task, a, b, at, length)
+
+
+def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
+    """The arc of a circle from `a` through `via` to `b`. Raises UsageError if they are on one line."""
+    p, q, r = (np.append(x, 0.0)[:3] for x in (a.p, via, b.p))
+    u, v = q - p, r - p
+    n = np.cross(u, v)
+    area = float(n @ n)
+    if area < (1e-9 * float(np.linalg.norm(u) + 1) * float(np.linalg.norm(v) + 1)) ** 2 or area < 1e-12:
+        raise UsageError("the arc's start, via and to lie on one line, or two of them are the same: use line")
+    centre = p + (np.cross(n, u) * (v @ v) + np.cross(v, n) * (u @ u)) / (2 * area)
+    x, y = p - centre, r - centre
+    unit = n / math.sqrt(area)
+    angle = math.atan2(float(unit @ np.cross(x, y)), float(x @ y)) % (2 * math.pi)
+    normal = unit if len(a.p) == 3 else unit[2:]
+    return circle(task, a, centre[: len(a.p)], normal, angle, 0.0, b)
+
+
+def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
+    """A smooth curve through points: natural cubic in the root of the chord lengths (centripetal)."""
+    spots = [a, *points]
+    y = np.array([_relative(task, a, s) for s in spots])
+    chord = np.linalg.norm(np.diff(y * _weights(task), axis=0), axis=1)
+    if chord.min() < SMALL:
+        raise UsageError("a spline passes the same point twice in a row: leave one out")
+    u = np.concatenate([[0.0], np.cumsum(np.sqrt(chord))])
+    coefficients = _natural(u, y)
+
+    def at(v: Array) -> tuple[Array, Array]:
+        i = np.clip(np.searchsorted(u, v, side="right") - 1, 0, len(u) - 2)
+        w = (v - u[i])[:, None]
+        c0, c1, c2, c3 = (c[i] for c in coefficients)
+        return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
+
+    return _unit_speed(task, a, at, u)
+
+
+def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece]:
+    """Two pieces that meet at a corner, rounded within a sphere about it: first, blend, second.
+
+    side: the first piece's length before the blend at its other end.
+    """
+    cut_a = _leaves(a, b.first.p, radius, a.length, max(a.length - side / 2, 0.0), side)
+    cut_b = _leaves(b, b.first.p, radius, 0.0, b.length / 2, b.length)
+    before, after = a.part(0.0, cut_a), b.part(cut_b, b.length)
+    start, end = before.last, after.first
+    y0, y1 = _relative(task, start, start), _relative(task, start, end)
+    scale = _weights(task)
+    d0, d1 = a.direction(cut_a) / scale, b.direction(cut_b) / scale
+    k = task.position + len(task.sums)
+    d1[k:] = _into(y1[k:], d1[k:])
+    size = (a.length - cut_a) + cut_b
+    cubic = (y0, size * d0, 3 * (y1 - y0) - size * (2 * d0 + d1), 2 * (y0 - y1) + size * (d0 + d1))
+
+    def at(v: Array) -> tuple[Array, Array]:
+        w = v[:, None]
+        c0, c1, c2, c3 = cubic
+        return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
+
+    speeds = [x.speed for x in (a, b) if x.speed is not None]
+    tools = [x.tool_speed for x in (a, b) if x.tool_speed is not None]
+    made = _unit_speed(task, start, at, np.array([0.0, 1.0]))
+    slow = Piece(task, made.first, made.along, made.length, min(speeds, default=None), min(tools, default=None))
+    return before, slow, after
+
+
+def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: float, side: float) -> float:
+    """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
+
+    def away(s: float) -> float:
+        return float(np.linalg.norm(spot(piece.task, piece.targets(np.array([s]))[0]).p - corner))
+
+    if away(outer) < radius * (1 - 1e-9):
+        raise UsageError(
+            f"a blend of {radius:g} mm is longer than half of a side of {side:.4g} mm next to it: "
+            f"at most {away(outer):.4g} mm"
+        )
+    for _ in range(60):
+        middle = (inner + outer) / 2
+        inner, outer = (middle, outer) if away(middle) < radius else (inner, middle)
+    return outer
+
+
+def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length: float) -> Piece:
+    """A piece whose position, sums and turning all are passed at constant speed; at: fraction -> position."""
+    w = _between(task, a, b)
+    change = b.sums - a.sums
+    angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
+    whole = math.hypot(length, PER_RADIAN * angle)
+
+    def along(s: Array) -> Array:
+        f = s / whole if whole > 0 else np.zeros_like(s)
+        parts = [at(f), a.sums + f[:, None] * change, f[:, None] * w]
+        return np.concatenate(parts, axis=1)
+
+    return Piece(task, a, along, whole)
+
+
+def _unit_speed(task: Task, first: Spot, at: Callable[[Array], tuple[Array, Array]], u: Array) -> Piece:
+    """A piece from a curve over any parameter, given with its derivative, smooth between the values u."""
+    scale = _weights(task)
+    grid = np.concatenate([np.linspace(a, b, _TABLE, endpoint=False) for a, b in zip(u[:-1], u[1:], strict=True)])
+    grid = np.append(grid, u[-1])
+    step = np.diff(grid)
+    nodes = grid[:-1, None] + step[:, None] * _GAUSS
+    speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
+    s = np.concatenate([[0.0], np.cumsum(speed.mean(axis=1) * step)])
+    rate = 1.0 / np.maximum(np.linalg.norm(at(grid)[1] * scale, axis=1), 1e-12)  # du/ds
+
+    def along(x: Array) -> Array:
+        i = np.clip(np.searchsorted(s, x, side="right") - 1, 0, len(step) - 1)
+        h = s[i + 1] - s[i]
+        f = (x - s[i]) / h
+        chord = step[i]
+        d0, d1 = rate[i] * h, rate[i + 1] * h
+        v = grid[i] + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
+        return at(v)[0]
+
+    return Piece(task, first, along, float(s[-1]))
+
+
+def _relative(task: Task, a: Spot, b: Spot) -> Array:
+    """A spot as y of a piece that starts at `a`."""
+    return np.concatenate([b.p, b.sums, _between(task, a, b)])
+
+
+def _weights(task: Task) -> Array:
+    """What a unit of each component of y is worth in length."""
+    return np.concatenate([np.ones(task.position), np.full(len(task.sums) + 3, PER_RADIAN)])
+
+
+def _into(w: Array, omega: Array) -> Array:
+    """Rate of a rotation vector w whose rotation turns at omega (inverse of the left Jacobian of SO(3))."""
+    angle = float(np.linalg.norm(w))
+    factor = 1 / 12 if angle < 1e-4 else (1 - angle / 2 / math.tan(angle / 2)) / angle**2
+    return np.asarray(omega - np.cross(w, omega) / 2 + factor * np.cross(w, np.cross(w, omega)))
+
+
+def _natural(u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """Coefficients of the natural cubic spline through (u, y), a row for each span."""
+    h = np.diff(u)
+    n = len(u)
+    A, rhs = np.eye(n), np.zeros_like(y)
+    slope = np.diff(y, axis=0) / h[:, None]
+    for i in range(1, n - 1):
+        A[i, i - 1 : i + 2] = h[i - 1], 2 * (h[i - 1] + h[i]), h[i]
+        rhs[i] = 3 * (slope[i] - slope[i - 1])
+    c = np.linalg.solve(A, rhs)
+    hh = h[:, None]
+    second = np.asarray(c, dtype=float)
+    return y[:-1], slope - hh * (2 * second[:-1] + second[1:]) / 3, second[:-1], np.diff(second, axis=0) / (3 * hh)

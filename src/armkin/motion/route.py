@@ -1,0 +1,97 @@
+"""A route: pieces one after another, with rests between them where they meet at a corner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.inverse.tasks.task import Task
+from armkin.motion.geometry import SMALL, Piece, blend
+
+_SMOOTH = 1e-3  # [rad] between two directions that count as one
+
+
+@dataclass(frozen=True)
+class Route:
+    """Pieces in order; `rests`: numbers of the pieces before which the arm stands, and for how long."""
+
+    task: Task
+    pieces: tuple[Piece, ...]
+    stops: frozenset[int]  # piece numbers (and len(pieces)) at whose start the arm is at rest
+
+    @cached_property
+    def ends(self) -> Array:
+        """Where pieces begin, and the end: (pieces + 1,) [mm]."""
+        return np.concatenate([[0.0], np.cumsum([piece.length for piece in self.pieces])])
+
+    @property
+    def length(self) -> float:
+        """Whole length [mm, and 30 mm per rad]."""
+        return float(self.ends[-1])
+
+    def which(self, s: Array) -> Array:
+        """Number of the piece at lengths s (N,)."""
+        return np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, len(self.pieces) - 1)
+
+    def targets(self, s: Array) -> Array:
+        """Targets (N, m) or (N, 4, 4) at lengths s (N,), increasing or not."""
+        which = self.which(s)
+        out: Array | None = None
+        for k in np.unique(which):
+            here = which == k
+            values = self.pieces[k].targets(s[here] - self.ends[k])
+            if out is None:
+                out = np.empty((len(s), *values.shape[1:]))
+            out[here] = values
+        assert out is not None
+        return out
+
+    def limit(self, s: Array, speed: float, tool: float | None) -> tuple[Array, Array]:
+        """Fraction of the joints' speed and tool speed [mm/s] (inf: none) in the intervals between s: (N - 1,) each."""
+        which = self.which((s[:-1] + s[1:]) / 2)
+        parts = [p.speed if p.speed is not None else speed for p in self.pieces]
+        tools = [p.tool_speed if p.tool_speed is not None else tool for p in self.pieces]
+        return np.array(parts)[which], np.array([np.inf if t is None else t for t in tools])[which]
+
+
+def joined(task: Task, pieces: Sequence[Piece], blends: Sequence[float], pauses: frozenset[int]) -> Route:
+    """Pieces as a route: corners rounded by their blends (one for each piece's end), rests where there is none.
+
+    pauses: numbers of pieces before which the arm has to stand in any case.
+    """
+    made: list[Piece] = []
+    side = 0.0  # of the last piece, before it was cut
+    stops = {0}
+    for k, piece in enumerate(pieces):
+        if piece.length < SMALL:
+            continue
+        if not made or k in pauses:
+            stops.add(len(made))
+            made.append(piece)
+            side = piece.length
+            continue
+        before = made[-1]
+        a, b = before.direction(before.length), piece.direction(0.0)
+        angle = float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
+        radius = blends[k - 1]
+        if angle < _SMOOTH:
+            made.append(piece)
+        elif radius <= 0 or angle > np.pi - _SMOOTH or not (_moves(before) and _moves(piece)):
+            stops.add(len(made))
+            made.append(piece)
+        else:
+            first, middle, last = blend(task, before, piece, radius, side)
+            made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
+        side = piece.length
+    stops.add(len(made))
+    return Route(task, tuple(made), frozenset(stops))
+
+
+def _moves(piece: Piece) -> bool:
+    """Whether the position moves at all: a pure turn has no sphere to be blended in."""
+    p = [piece.along(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
+    return bool(max(np.linalg.norm(p[0] - p[1]), np.linalg.norm(p[1] - p[2])) > 1e-6)
