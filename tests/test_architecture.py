@@ -28,7 +28,8 @@ MAY_IMPORT: dict[str, str] = {
     "inverse": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
     " inverse/branches",
     "motors": "errors formula model forward",
-    "motion": "errors formula model forward motors",
+    "path_file": "errors robot_file",
+    "motion": "errors formula model forward inverse/tasks inverse motors path_file",
     "reach": "errors files formula model forward motors",
     "export": "errors formula robot_file model forward inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"

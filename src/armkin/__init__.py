@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armkin.errors import LinkError as LinkError
     from armkin.errors import MissingExtraError as MissingExtraError
     from armkin.errors import NoSolutionError as NoSolutionError
+    from armkin.errors import PathFileError as PathFileError
     from armkin.errors import RobotFileError as RobotFileError
     from armkin.errors import UsageError as UsageError
     from armkin.forward import condition as condition
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
     from armkin.model.build import load as load
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
+    from armkin.motion.law import time_law as time_law
+    from armkin.motion.path import path as path
+    from armkin.motion.path_plan import PathPlan as PathPlan
     from armkin.motors import best_pulses as best_pulses
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
@@ -55,6 +59,7 @@ _HOME = {
     "LinkError": "errors",
     "MissingExtraError": "errors",
     "NoSolutionError": "errors",
+    "PathFileError": "errors",
     "RobotFileError": "errors",
     "UsageError": "errors",
     "condition": "forward",
@@ -73,6 +78,9 @@ _HOME = {
     "load": "model.build",
     "lock": "model.lock",
     "unlock": "model.lock",
+    "path": "motion.path",
+    "time_law": "motion.law",
+    "PathPlan": "motion.path_plan",
     "best_pulses": "motors",
     "joints": "motors",
     "pulses": "motors",

@@ -4,6 +4,7 @@
     ├── FileError          a file that cannot be read or written
     ├── RobotFileError     a robot file that is not valid
     ├── UsageError         an argument that does not fit the arm or the command
+    │   └── PathFileError  a path file that is not valid
     │   ├── RedundantArmError   more joints than the task has constraints
     │   └── NoHomingError       joints without a limit switch
     ├── NoSolutionError    no pose reaches the target, or none within the limits
@@ -77,6 +78,10 @@ class RedundantArmError(UsageError):
 
 class NoHomingError(UsageError):
     """Joints have no limit switch to home by; fields: joints, file."""
+
+
+class PathFileError(UsageError):
+    """A path file is not valid; the message begins with ``file:line:`` where a line is known."""
 
 
 class NoSolutionError(ArmkinError):

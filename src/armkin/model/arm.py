@@ -36,6 +36,7 @@ class Arm:
     home: Array  # (n,)
     max_speed: Array  # (n,) rad/s | mm/s, nan where the file has none
     max_accel: Array  # (n,)
+    max_jerk: Array  # (n,)
     dh_sign: Array  # (n,) DH angle = dh_sign * joint value + dh_theta
     dh_theta: Array  # (n,)
     ratio: Array  # (n,) actual turn per commanded turn; joint values are commanded ones
@@ -89,6 +90,7 @@ def actual(arm: Arm) -> Arm:
         pose_joints=_frozen(arm.pose_joints * r),
         max_speed=_frozen(arm.max_speed * r),
         max_accel=_frozen(arm.max_accel * r),
+        max_jerk=_frozen(arm.max_jerk * r),
         ratio=_frozen(np.ones(arm.n)),
         motor_gain=_frozen(arm.motor_gain / r),
     )
@@ -106,6 +108,7 @@ def from_links(
     home: ArrayLike | None = None,
     max_speed: ArrayLike | None = None,
     max_accel: ArrayLike | None = None,
+    max_jerk: ArrayLike | None = None,
     dh_sign: ArrayLike | None = None,
     dh_theta: ArrayLike | None = None,
     ratio: ArrayLike | None = None,
@@ -137,6 +140,7 @@ def from_links(
         home=_frozen(np.zeros(n) if home is None else home),
         max_speed=_frozen(np.full(n, math.nan) if max_speed is None else max_speed),
         max_accel=_frozen(np.full(n, math.nan) if max_accel is None else max_accel),
+        max_jerk=_frozen(np.full(n, math.nan) if max_jerk is None else max_jerk),
         dh_sign=_frozen(np.ones(n) if dh_sign is None else dh_sign),
         dh_theta=_frozen(np.zeros(n) if dh_theta is None else dh_theta),
         ratio=_frozen(np.ones(n) if ratio is None else ratio),

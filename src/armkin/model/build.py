@@ -61,6 +61,7 @@ def build(file: RobotFile) -> Arm:
         home=np.array([j.home for j in file.joints]) * unit,
         max_speed=np.array([math.nan if j.max_speed is None else j.max_speed for j in file.joints]) * unit,
         max_accel=np.array([math.nan if j.max_accel is None else j.max_accel for j in file.joints]) * unit,
+        max_jerk=np.array([math.nan if j.max_jerk is None else j.max_jerk for j in file.joints]) * unit,
         dh_sign=[float(j.sign) for j in file.joints],
         dh_theta=[0.0 if j.dh is None else math.radians(j.dh.theta) for j in file.joints],
         ratio=[j.ratio for j in file.joints],

@@ -46,7 +46,18 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
             links.append(arm.link[i + 1])
     rest = {
         field: getattr(arm, field)[kept]
-        for field in ("prismatic", "lower", "upper", "home", "max_speed", "max_accel", "dh_sign", "dh_theta", "ratio")
+        for field in (
+            "prismatic",
+            "lower",
+            "upper",
+            "home",
+            "max_speed",
+            "max_accel",
+            "max_jerk",
+            "dh_sign",
+            "dh_theta",
+            "ratio",
+        )
     }
     return replace(
         arm,

@@ -1,21 +1,21 @@
 """A route in joint space: which branch carries it, as cubics in joint values with a law of time.
 
-    route --columns--> linked branches --chains--> runs --here--> joint values on a grid --time law--> stretches
+route --columns--> linked branches --chains--> runs --here--> joint values on a grid --time law--> stretches
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian, position
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
-from armkin.motion.chains import Chain, Run, chains, fewest, why_ended
-from armkin.motion.columns import Columns, Int, change, chord_bound, levers, linked
+from armkin.motion.chains import Chain, Run, chains, fewest
+from armkin.motion.columns import Columns, change, chord_bound, levers, linked
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
@@ -141,7 +141,7 @@ def stretches(
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     made: list[Curve | Smoothed] = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         if b - a <= 1e-9:
             continue
         number = max(int(grid * (b - a) / route.length), 60)
@@ -156,7 +156,7 @@ def stretches(
     return made
 
 
-def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Knots, Int]:
+def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Knots, list[int]]:
     """Joint values on a grid from a to b that follows way and joints, exact to the inverse kinematics."""
     inside = [float(x) for x in route.ends if a + 1e-9 < x < b - 1e-9]
     moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
@@ -164,14 +164,14 @@ def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, num
     at = np.interp([a, *inside, b], s, measure)
     total = max(float(at[-1] - at[0]), 1e-12)
     parts = []
-    for (x, y), (m, n) in zip(_pairs([a, *inside, b]), _pairs(at.tolist()), strict=True):
+    for (x, y), (m, n) in zip(pairwise([a, *inside, b]), pairwise(at.tolist()), strict=True):
         share = _MOTION * (n - m) / total + (1 - _MOTION) * (y - x) / (b - a)
         count = max(int(number * share), _EACH)
         here = s[(s > x) & (s < y)]
         grid = np.concatenate([[x], here, [y]])
         level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
         parts.append(np.interp(np.linspace(level[0], level[-1], count + 1)[:-1], level, grid))
-    breaks = np.cumsum([len(part) for part in parts])[:-1]
+    breaks: list[int] = np.cumsum([len(part) for part in parts])[:-1].tolist()
     where = np.append(np.concatenate(parts), b)
     guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
     exact = corrected(arm, route.task, guess, route.targets(where))
@@ -223,7 +223,7 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
     """The fastest law of time on a grid."""
     fraction, tool = route.limit(path.s, pace.speed, pace.tool_speed)
     tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
-    with np.errstate(divide="ignore"):
+    with np.errstate(over="ignore"):
         each = (tool / np.maximum(tip, 1e-300)) ** 2
     each = np.where(np.isfinite(tool), each, np.inf)
     both = [np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (each, fraction)]
@@ -243,7 +243,7 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
 def coupled(arm: Arm, share: float) -> tuple[Array, Array] | None:
     """Motors that turn several joints: their weights and greatest accelerations, in counts; None: there is none."""
     shared = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
-    return (arm.motor_gain[shared], motor_accel(arm)[shared] * share) if len(shared) else None
+    return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None
 
 
 def _narrow(arm: Arm, path: Knots, window: float, tolerance: float) -> Array:
@@ -253,33 +253,9 @@ def _narrow(arm: Arm, path: Knots, window: float, tolerance: float) -> Array:
     """
     left, right = path.second()
     bend = np.concatenate([left[:1], (left[1:] + right[:-1]) / 2, right[-1:]])
-    J = jacobian(arm, path.q)[:, :3]
+    J = np.asarray(jacobian(arm, path.q)[:, :3])
     shift = np.linalg.norm((J @ bend[:, :, None])[..., 0], axis=1)
     return np.asarray(12 * tolerance / window**2 / np.maximum(shift, 1e-12))
-
-
-def verdict(arm: Arm, carried: Carried, near: Array) -> list[dict[str, Any]]:
-    """Which branch carries how far from the start, and why it ends; the best first."""
-    out = []
-    for chain in carried.all:
-        if chain.first != 0:
-            continue
-        e = chain.carries(0)
-        label = int(chain.labels[0])
-        why, joint, value, beyond = why_ended(carried.columns, chain, 0)
-        out.append(
-            {
-                "name": carried.columns.names[label] if label >= 0 else "",
-                "start": chain.run(0, max(e, 0), near)[0] if e >= 0 else chain.q[0],
-                "carries": float(carried.columns.s[e]) if e >= 0 else 0.0,
-                "legal": e >= 0,
-                "why": why,
-                "joint": joint,
-                "value": value,
-                "beyond": beyond,
-            }
-        )
-    return sorted(out, key=lambda found: (-float(found["carries"]), not found["legal"]))
 
 
 def _apart(s: Array, least: float) -> Array:
@@ -287,8 +263,4 @@ def _apart(s: Array, least: float) -> Array:
     keep = np.concatenate([[True], np.diff(s) > least])
     out = s[keep]
     out[-1] = s[-1]
-    return out
-
-
-def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
-    return list(zip(values[:-1], values[1:], strict=True))
+    return np.asarray(out)

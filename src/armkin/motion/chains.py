@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.columns import TURN, Columns, Int, change
+from armkin.motion.columns import ENDS, TURN, Columns, Int, change
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -58,7 +58,7 @@ class Chain:
 
     @cached_property
     def _joint_reach(self) -> Int:
-        """The first sample that each joint cannot go on to, from every sample: (len, n) relative; own: illegal there."""
+        """The first sample, counted from `first`, that each joint cannot go on to, from every sample: (len, n)."""
         ends = [end.max(axis=0) if len(end) else np.arange(len(self.q)) for _, end in self._copies]
         return np.stack(ends, axis=1)
 
@@ -97,7 +97,7 @@ def chains(arm: Arm, columns: Columns) -> list[Chain]:
     identity = np.where(valid[:-1], np.arange(B), -1) == columns.partner
     steady = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
     events = np.append(np.flatnonzero(~steady), N - 1)
-    open_: dict[int, list[tuple[int, int, int]]] = {b: [] for b in np.flatnonzero(valid[0])}  # column -> blocks
+    open_: dict[int, list[tuple[int, int, int]]] = {int(b): [] for b in np.flatnonzero(valid[0])}  # column -> blocks
     done: list[list[tuple[int, int, int]]] = []
     begin = 0
     for event in events.tolist():
@@ -178,6 +178,8 @@ def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, 
     if beyond == e:
         return "end", None, None, status
     count = columns.valid.sum(axis=1)
-    if columns.status[beyond] == Status.UNREACHABLE:
-        return "reach", None, None, status
+    # Two branches that meet at the edge of the reach end a sample or two before it.
+    soon = (columns.s > columns.s[e]) & (columns.s < columns.s[e] + 10 * ENDS)
+    if (columns.status[soon] == Status.UNREACHABLE).any():
+        return "reach", None, None, Status.UNREACHABLE.name.lower()
     return ("boundary" if count[beyond] < count[e] else "singularity"), None, None, status

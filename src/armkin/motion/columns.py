@@ -97,7 +97,13 @@ class _Linking:
     """The samples so far, and which steps are still open."""
 
     def __init__(
-        self, arm: Arm, targets: Callable[[Array], Array], task: str | None, tolerance: float, near: Array, length: float
+        self,
+        arm: Arm,
+        targets: Callable[[Array], Array],
+        task: str | None,
+        tolerance: float,
+        near: Array,
+        length: float,
     ) -> None:
         self.arm, self.targets, self.task, self.tolerance, self.near = arm, targets, task, tolerance, near
         self.lever = levers(arm)

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -257,7 +258,7 @@ def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length:
 def _unit_speed(task: Task, first: Spot, at: Callable[[Array], tuple[Array, Array]], u: Array) -> Piece:
     """A piece from a curve over any parameter, given with its derivative, smooth between the values u."""
     scale = _weights(task)
-    grid = np.concatenate([np.linspace(a, b, _TABLE, endpoint=False) for a, b in zip(u[:-1], u[1:], strict=True)])
+    grid = np.concatenate([np.linspace(a, b, _TABLE, endpoint=False) for a, b in pairwise(u)])
     grid = np.append(grid, u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.model.limits import fields, outside, said
-from armkin.motion.profile import at_rest, trapezoid
+from armkin.motion.profile import at_rest, seven_phases, trapezoid
 from armkin.motion.trajectory import Straight, Trajectory
 from armkin.motors import motor_accel
 
@@ -46,8 +46,12 @@ def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) 
     return Trajectory(arm, np.asarray(start, dtype=float), tuple(stretches))
 
 
-def straight(arm: Arm, start: Array, end: Array, speed: float = 1.0) -> Straight:
+def straight(
+    arm: Arm, start: Array, end: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
+) -> Straight:
     """The fastest straight line in joint space from rest to rest: (n,), (n,) [rad | mm].
+
+    speed, share: fractions of max_speed and max_accel; jerk: (n,) [rad/s3 | mm/s3].
 
     A motor that turns several joints keeps to `motor_accel`, so that a hold, of which a board knows motors
     only, is within the joints' max_accel.
@@ -61,7 +65,10 @@ def straight(arm: Arm, start: Array, end: Array, speed: float = 1.0) -> Straight
     turned = np.abs(arm.motor_gain @ (end - start))
     if turned.any():
         accel = min(accel, float((motor_accel(arm)[turned > 0] / turned[turned > 0]).min()))
-    return Straight(start, end, trapezoid(1.0, top, accel))
+    accel *= share
+    if jerk is None:
+        return Straight(start, end, trapezoid(1.0, top, accel))
+    return Straight(start, end, seven_phases(1.0, top, accel, float((jerk[moving] / change[moving]).min())))
 
 
 def missing_rates(arm: Arm) -> dict[str, list[str]]:

@@ -66,6 +66,40 @@ def trapezoid(length: float, speed: float, accel: float) -> Profile:
     return Profile(times, states, np.zeros(3), length, accel)
 
 
+def seven_phases(length: float, speed: float, accel: float, jerk: float) -> Profile:
+    """The fastest way over `length` from rest to rest with bounded speed, acceleration and jerk.
+
+    The closed form of seven phases (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and
+    Robots, 2008, section 3.4), of which those that are not needed are of no length.
+
+    >>> round(seven_phases(1.0, 1.0, 1.0, 1.0).duration, 6), round(seven_phases(10.0, 1.0, 2.0, 8.0).duration, 6)
+    (3.174802, 10.75)
+    """
+    if length <= 0:
+        return at_rest(0.0)
+    bend = min(accel / jerk, math.sqrt(speed / jerk))  # of changing acceleration
+    rise = bend + speed / (bend * jerk)  # of speeding up, all in all
+    cruise = length / speed - rise
+    if cruise < 0:
+        cruise = 0.0
+        bend = accel / jerk
+        if length >= 2 * accel * bend**2:
+            rise = bend / 2 + math.sqrt(bend**2 / 4 + length / accel)
+        else:
+            bend = (length / (2 * jerk)) ** (1 / 3)
+            rise = 2 * bend
+    spans = np.array([bend, rise - 2 * bend, bend, cruise, bend, rise - 2 * bend, bend])
+    signs = np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0]) * jerk
+    spans = np.maximum(spans, 0.0)
+    state, states = np.zeros(3), []
+    for h, j in zip(spans, signs, strict=True):
+        states.append(state)
+        x, v, a = state
+        state = np.array([x + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j])
+    times = np.concatenate([[0.0], np.cumsum(spans)])
+    return Profile(times, np.array(states), signs, length, jerk * bend)
+
+
 def at_rest(seconds: float) -> Profile:
     """A profile that stays where it is for so many seconds."""
     return Profile(np.array([0.0, seconds]), np.zeros((1, 3)), np.zeros(1), 0.0, 0.0)

@@ -58,18 +58,23 @@ class Route:
         return np.array(parts)[which], np.array([np.inf if t is None else t for t in tools])[which]
 
 
-def joined(task: Task, pieces: Sequence[Piece], blends: Sequence[float], pauses: frozenset[int]) -> Route:
+def joined(
+    task: Task, pieces: Sequence[Piece], blends: Sequence[float], pauses: frozenset[int]
+) -> tuple[Route, dict[int, int]]:
     """Pieces as a route: corners rounded by their blends (one for each piece's end), rests where there is none.
 
-    pauses: numbers of pieces before which the arm has to stand in any case.
+    pauses: numbers of pieces before which the arm has to stand in any case. Returns the route, and for each of
+    them the number of the piece in it.
     """
     made: list[Piece] = []
     side = 0.0  # of the last piece, before it was cut
-    stops = {0}
+    stops, order = {0}, {}
     for k, piece in enumerate(pieces):
+        if k in pauses:
+            order[k] = len(made)
         if piece.length < SMALL:
             continue
-        if not made or k in pauses:
+        if not made or order.get(k) == len(made) or len(made) in order.values():
             stops.add(len(made))
             made.append(piece)
             side = piece.length
@@ -88,7 +93,7 @@ def joined(task: Task, pieces: Sequence[Piece], blends: Sequence[float], pauses:
             made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
         side = piece.length
     stops.add(len(made))
-    return Route(task, tuple(made), frozenset(stops))
+    return Route(task, tuple(made), frozenset(stops)), order
 
 
 def _moves(piece: Piece) -> bool:

@@ -15,7 +15,9 @@ points keeps to the limits, too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,16 +63,16 @@ class Knots:
         return left, right
 
 
-def knots(s: Array, q: Array, breaks: Array | None = None) -> Knots:
+def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
     """Slopes of samples from five neighbours each, none of them beyond a break (indices where q'' jumps).
 
     s: (N,) increasing; q: (N, n). The slopes are exact to the fourth order of the spacing; at a break it is the
     mean of both sides'.
     """
     N = len(s)
-    edges = sorted({0, N - 1, *(int(b) for b in (breaks if breaks is not None else ()))})
+    edges = sorted({0, N - 1, *breaks})
     total, count = np.zeros_like(q), np.zeros(N)
-    for lo, hi in zip(edges[:-1], edges[1:], strict=True):
+    for lo, hi in pairwise(edges):
         part = slice(lo, hi + 1)
         total[part] += _slopes(s[part], q[part])
         count[part] += 1
@@ -109,12 +111,12 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     h = path.h
     N = len(path.s)
     speed, accel = (np.broadcast_to(b, path.q.shape) for b in (bounds.speed, bounds.accel))
-    with np.errstate(divide="ignore"):
+    with np.errstate(over="ignore"):
         cap = np.minimum(((speed / np.maximum(np.abs(path.d), _TINY)) ** 2).min(axis=1), bounds.cap)
     cap = np.minimum(cap, _MOST)
     cap[0] = cap[-1] = 0.0
     if N < 2:
-        return cap
+        return np.asarray(cap)
     P, R, C = _rows(path, accel, rows)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         slope, level = R / P, C / P  # u between -level - slope x and level - slope x
@@ -149,7 +151,7 @@ def _rows(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> tuple[
         C += [np.broadcast_to(most, (len(h), len(most)))] * 2
     p, r, c = (np.concatenate(part, axis=1) for part in (P, R, C))
     sign = np.where(p < 0, -1.0, 1.0)
-    return np.maximum(np.abs(p), 1e-12 * np.abs(p).max(initial=0.0) + _TINY), r * sign, c
+    return np.asarray(np.maximum(np.abs(p), 1e-12 * np.abs(p).max(initial=0.0) + _TINY)), r * sign, c
 
 
 def _meeting(cap: Array, slope: Array, level: Array) -> Array:

@@ -233,6 +233,7 @@ class Joint(_Model):
     home: Value = Field(0.0, description="The pose from which pulses are counted, in degrees or mm.")
     max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2; needed to send motion.")
+    max_jerk: Rate | None = Field(None, description="deg/s3 or mm/s3; absent: acceleration may change at once.")
     drive: Drive | None = Field(None, description="The joint's own motor; coupled joints use motors.")
     homing: Homing | None = Field(None, description="The limit switch; absent: `armkin home` refuses.")
 

@@ -6,6 +6,7 @@ every schema version knows.
 
 from typing import Any
 
+from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -83,6 +84,12 @@ def json_schema() -> dict[str, Any]:
         "examples": EXAMPLES,
         **made,
     }
+
+
+def made_from(model: type[BaseModel], title: str) -> dict[str, Any]:
+    """The schema of another kind of file."""
+    made = _tidied(model.model_json_schema(schema_generator=_Generator))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **made}
 
 
 def _tidied(part: Any) -> Any:

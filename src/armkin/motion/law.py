@@ -1,0 +1,67 @@
+"""`armkin.time_law`: the fastest law of time along joint values that are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.forward import as_joints, position
+from armkin.motion.branch_path import coupled
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.plan import check_rates
+from armkin.motion.time_optimal import Bounds, hold_cap, knots, optimal
+from armkin.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def time_law(
+    arm: Arm,
+    q: ArrayLike,
+    s: ArrayLike | None = None,
+    *,
+    speed: float = 1.0,
+    accel: float = 1.0,
+    tool_speed: float | None = None,
+    jerk: ArrayLike | None = None,
+    hold: float | None = None,
+) -> Trajectory:
+    """The fastest motion from rest to rest through joint values that are samples of a smooth way.
+
+    q: (N, n) [rad | mm], N at least 5; s: (N,) the parameter of the samples, increasing, by default their numbers.
+    speed, accel: fractions of max_speed and max_accel; tool_speed: [mm/s]; jerk: [rad/s3 | mm/s3], by a moving
+    average; hold: see `armkin.path`. The result is sampled at will: `duration`, `q(t)`, `qd(t)`, `qdd(t)`.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("three_dof")
+    >>> turned = np.linspace(0, np.pi / 2, 500)
+    >>> q = np.stack([turned, 1.2 + 0.1 * np.sin(turned), -1.0 + 0 * turned], axis=1)
+    >>> round(armkin.time_law(arm, q).duration, 3)
+    2.0
+    """
+    check_rates(arm)
+    values = as_joints(arm, q)
+    way = np.arange(len(values), dtype=float) if s is None else np.asarray(s, dtype=float)
+    if values.ndim != 2 or len(values) < 5 or way.shape != values.shape[:1]:
+        raise UsageError(f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {way.shape}")
+    if not (np.isfinite(values).all() and np.isfinite(way).all() and (np.diff(way) > 0).all()):
+        raise UsageError("samples must be finite, and s must increase from each to the next")
+    path = knots(way, values)
+    cap = np.full(len(way), np.inf)
+    if tool_speed is not None:
+        tip = np.linalg.norm(np.diff(position(arm, values), axis=0), axis=1) / path.h
+        tip = np.maximum(np.append(tip, 0.0), np.append(0.0, tip))
+        cap = (tool_speed / np.maximum(tip, 1e-150)) ** 2
+    if hold is not None:
+        cap = np.minimum(cap, hold_cap(arm, path, hold))
+    limits: Array = arm.max_accel * accel
+    curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled(arm, accel)))
+    made: Curve | Smoothed = curve
+    if jerk is not None:
+        made = Smoothed(curve, float((2 * limits / np.asarray(jerk, dtype=float)).max()))
+    return Trajectory(arm, values[0], (made,))

@@ -1,0 +1,355 @@
+"""`armkin.path`: moves of the tool and the joints as one plan in time, on the right branch, within all limits."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import NoSolutionError, UsageError
+from armkin.formula.arrays import Array
+from armkin.forward import condition, fk
+from armkin.inverse.solve import ik
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.model import units
+from armkin.model.limits import outside, said
+from armkin.motion import geometry, readings, report
+from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.geometry import Piece, Spot
+from armkin.motion.path_plan import Marker, PathPlan
+from armkin.motion.plan import check_rates, straight
+from armkin.motion.profile import at_rest
+from armkin.motion.route import joined
+from armkin.motion.trajectory import Straight, Stretch
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.path_file import Move, PathFile
+
+TOLERANCE = 0.05  # [mm]
+HOLD = 1.5  # of max_accel, on a hold
+
+
+def path(
+    arm: Arm,
+    moves: str | os.PathLike[str] | PathFile | Mapping[str, Any] | ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    near: ArrayLike | None = None,
+    branch: str | None = None,
+    task: str | None = None,
+    tolerance: float | None = None,
+    blend: float | None = None,
+    speed: float = 1.0,
+    accel: float = 1.0,
+    tool_speed: float | None = None,
+    jerk: ArrayLike | None = None,
+    hold: float | None = HOLD,
+    split: bool = False,
+    samples: int | None = None,
+) -> PathPlan:
+    """A plan through moves: time-optimal, on the branch that carries the whole way.
+
+    moves: a path file's name, its model or its data (millimetres, degrees), or targets (w, m) or (w, 4, 4)
+    [mm, rad] to pass on straight lines. start: (n,) where the arm stands, by default home; near: (n,) which
+    branches are preferred, by default the start. speed, accel: fractions of the joints' limits; tool_speed:
+    [mm/s]; jerk: [rad/s3 | mm/s3] for all joints or each; hold: how many times max_accel a joint may be asked for
+    when the board holds on the path, None: no matter. split: change the branch, by a joint move, where none
+    carries on. Raises UsageError for moves that make no sense, NoSolutionError if some part is not carried:
+    its `plan` then tells how far every branch goes.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("three_dof")
+    >>> plan = armkin.path(arm, [[390, 80, 300], [390, -80, 300]], tool_speed=100.0)
+    >>> armkin.fk(arm, plan.q(plan.duration))[:3, 3].round(6).tolist()
+    [390.0, -80.0, 300.0]
+    """
+    check_rates(arm)
+    file = read_moves(arm, moves, task)
+    for name, value, top in (("speed", speed, 1.0), ("accel", accel, 1.0)):
+        if not 0 < value <= top:
+            raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from above 0 to 100 percent")
+    limit = None if jerk is None else np.broadcast_to(np.asarray(jerk, dtype=float), (arm.n,))
+    if limit is None and np.isfinite(arm.max_jerk).all():
+        limit = arm.max_jerk
+    if limit is not None and not (np.isfinite(limit).all() and (limit > 0).all()):
+        raise UsageError("jerk must be above 0 and finite")
+    pace = Pace(
+        (file.speed or 100.0) / 100 * speed,
+        accel,
+        tool_speed if tool_speed is not None else file.tool_speed,
+        limit,
+        hold,
+        tolerance or file.tolerance or TOLERANCE,
+    )
+    here = arm.home if start is None else np.asarray(start, dtype=float)
+    walk = _Walk(arm, file, pace, task, blend, here, None if near is None else np.asarray(near, dtype=float))
+    walk.branch, walk.split, walk.samples = branch, split, samples
+    return walk.walked()
+
+
+def read_moves(arm: Arm, moves: Any, task: str | None = None) -> PathFile:
+    """Whatever `armkin.path` takes as the model of a path file."""
+    from armkin import path_file
+
+    if isinstance(moves, path_file.PathFile):
+        return moves
+    if isinstance(moves, str | os.PathLike):
+        return path_file.read(os.fspath(moves))
+    if isinstance(moves, Mapping):
+        return path_file.validated(dict(moves))
+    definition = task_for(arm, task)
+    rows = np.asarray(moves, dtype=float)
+    if definition.orientation == "full" and rows.ndim == 3:
+        from armkin.model.rotation import rpy
+
+        rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
+    elif rows.ndim == 2:
+        unit = [units.DEGREE if u == "deg" else 1.0 for u in units.label_units(definition.labels)]
+        rows = rows / np.array(unit)[: rows.shape[-1]]
+    if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
+        raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
+    listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
+    return path_file.validated({"moves": listed, "task": definition.name})
+
+
+class _Walk:
+    """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
+
+    split = False
+    branch: str | None = None
+    samples: int | None = None
+
+    def __init__(
+        self,
+        arm: Arm,
+        file: PathFile,
+        pace: Pace,
+        task: str | None,
+        blend: float | None,
+        here: Array,
+        near: Array | None,
+    ) -> None:
+        self.arm, self.file, self.pace = arm, file, pace
+        self.task = task_for(arm, task or file.task)
+        self.blend = file.blend if blend is None else blend
+        self.q = here  # where the joints are when all so far is done
+        self.near = near
+        self.made: list[Stretch] = []
+        self.markers: list[Marker] = []  # what happens between stretches
+        self.plan = PathPlan(arm, self.task, pace.tolerance)
+        self._clear(None)
+
+    def _clear(self, goal: Spot | None, branch: str | None = None) -> None:
+        """Begin a group: at a target whose branch is free, or where the joints are."""
+        self.goal, self.goal_branch = goal, branch
+        self.spot = goal or geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+        self.pieces: list[Piece] = []
+        self.blends: list[float] = []
+        self.pauses: dict[int, list[tuple[str, Any]]] = {}
+
+    def walked(self) -> PathPlan:
+        """The plan of all moves."""
+        start = self._start()
+        if start is not None:
+            self.q = start
+            self._clear(None)
+        self.begun = self.q
+        for number, move in enumerate(self.file.moves, 1):
+            try:
+                getattr(self, f"_{move.kind}")(move, getattr(move, move.kind))
+            except (UsageError, NoSolutionError) as error:
+                raise error.within(f"move {number}", move=number) if len(self.file.moves) > 1 else error from None
+        self._close()
+        return self.plan.finished(self.begun, self.made, self.markers)
+
+    def _start(self) -> Array | None:
+        start = self.file.start
+        if start is None:
+            return None
+        if isinstance(start, str):
+            return readings.joints(self.arm, self.q, start)
+        if start.joints is not None:
+            return readings.joints(self.arm, self.q, start.joints)
+        assert start.point is not None
+        return self._reached(self._target(start.point), None)
+
+    # Moves
+
+    def _joint(self, move: Move, value: Any) -> None:
+        goal = readings.joints(self.arm, self.q, value)
+        self._close()
+        self._go(goal, move)
+        self._clear(None)
+
+    def _point(self, move: Move, value: list[float]) -> None:
+        goal = self._target(value)
+        self._close()
+        self.approach = move
+        self._clear(goal, move.branch)
+
+    def _line(self, move: Move, value: list[float]) -> None:
+        self._add(move, geometry.line(self.task, self.spot, self._target(value)))
+
+    def _polyline(self, move: Move, value: list[list[float]]) -> None:
+        for target in value:
+            self._line(move, target)
+
+    def _arc(self, move: Move, value: Any) -> None:
+        self._add(
+            move,
+            geometry.arc(
+                self.task,
+                self.spot,
+                readings.place(self.task, value.via),
+                self._target(value.to),
+            ),
+        )
+
+    def _circle(self, move: Move, value: Any) -> None:
+        if value.turns == 0:
+            raise UsageError("circle: turns 0 is no circle")
+        flat = self.task.position == 2
+        normal = np.array([0.0, 0.0, 1.0]) if flat else readings.place(self.task, value.normal)
+        if np.linalg.norm(normal) < 1e-9:
+            raise UsageError("circle: its normal has no length")
+        angle = 2 * np.pi * value.turns
+        self._add(
+            move,
+            geometry.circle(
+                self.task, self.spot, readings.place(self.task, value.centre), normal, angle, value.rise, None
+            ),
+        )
+
+    def _spline(self, move: Move, value: list[list[float]]) -> None:
+        self._add(
+            move,
+            geometry.spline(self.task, self.spot, [self._target(target) for target in value]),
+        )
+
+    def _offset(self, move: Move, value: Any) -> None:
+        d = readings.place(self.task, value.xyz)
+        if value.frame == "tool":
+            if self.task.orientation == "full":
+                assert self.spot.turned is not None
+                d = self.spot.turned @ d
+            else:  # the tool's axes are known once the joints are
+                self._close()
+                self._clear(None)
+                d = (fk(self.arm, self.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
+        self._add(move, geometry.line(self.task, self.spot, replace(self.spot, p=self.spot.p + d)))
+
+    def _wait(self, move: Move, value: float) -> None:
+        self._between("wait", value)
+
+    def _grip(self, move: Move, value: Any) -> None:
+        if self.arm.file is not None and self.arm.file.gripper is None:
+            raise UsageError(f"{self.arm.name} has no gripper; add gripper: to its robot file")
+        self._between("grip", value)
+
+    def _between(self, kind: str, value: Any) -> None:
+        if self.goal is None and not self.pieces:
+            self._mark(kind, value)
+        else:
+            self.pauses.setdefault(len(self.pieces), []).append((kind, value))
+
+    def _mark(self, kind: str, value: Any) -> None:
+        if kind == "wait":
+            self.made.append(Straight(self.q, self.q, at_rest(float(value))))
+        else:
+            self.markers.append(Marker(len(self.made), kind, value))
+
+    def _add(self, move: Move, piece: Piece) -> None:
+        speed = None if move.speed is None else move.speed / 100 * self.pace.speed
+        self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
+        self.blends.append(self.blend if move.blend is None else move.blend)
+        self.spot = piece.last
+
+    def _target(self, value: list[float]) -> Spot:
+        return readings.target(self.task, self.spot, value)
+
+    # Groups
+
+    def _close(self) -> None:
+        """Plan the group of tool moves that has gathered."""
+        if not self.pieces:
+            if self.goal is not None:
+                self._go(self._reached(self.goal, self.goal_branch), self.approach)
+                for kind, value in self.pauses.get(0, ()):
+                    self._mark(kind, value)
+            self.goal = None
+            return
+        route, order = joined(self.task, self.pieces, self.blends, frozenset(self.pauses))
+        if route.length < geometry.SMALL:
+            raise UsageError("the tool's way has no length: its points are all the same")
+        free = self.goal is not None
+        near = self.q if self.near is None else self.near
+        carried = carry(
+            self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
+            fixed=None if free else self.q, branch=(self.goal_branch or self.branch) if free else None,
+            count=self.samples,
+        )  # fmt: skip
+        report.note(self.plan, carried, near)
+        if not carried.whole and not (self.split and carried.covered):
+            raise report.refused(self.plan, carried)
+        for k, run in enumerate(carried.runs):
+            fixed = self.q if not free and k == 0 else None
+            curves = stretches(self.arm, route, carried.columns, run, near, self.pace, fixed=fixed)
+            if free or k:
+                self._go(curves[0].start, self.approach if k == 0 else None)
+            self._lay(carried, curves, order)
+            near = self.q
+        for kind, value in self.pauses.get(len(self.pieces), ()):
+            self._mark(kind, value)
+        self.plan.length += route.length
+        self.goal = None
+        self.pieces, self.blends, self.pauses = [], [], {}
+
+    def _lay(self, carried: Carried, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
+        """Put a run's curves into the plan, with the pauses where they begin."""
+        at = {round(float(carried.route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
+        for curve in curves:
+            path_ = curve.path if isinstance(curve, Curve) else curve.curve.path
+            for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
+                self._mark(kind, value)
+            self.plan.along(len(self.made), curve, self.plan.length)
+            self.made.append(curve)
+            self.q = curve.end
+            self.plan.deviation = max(self.plan.deviation, deviation(self.arm, carried.route, path_))
+            self._singularity(path_.q, path_.s)
+
+    def _singularity(self, q: Array, s: Array) -> None:
+        worst = condition(self.arm, q)
+        k = int(np.argmax(worst))
+        if self.plan.nearest_singularity is None or worst[k] > self.plan.nearest_singularity[1]:
+            self.plan.nearest_singularity = (self.plan.length + float(s[k]), float(worst[k]), q[k])
+
+    # Joint moves
+
+    def _go(self, goal: Array, move: Move | None) -> None:
+        """A joint move to joint values."""
+        bad = np.flatnonzero(outside(self.arm, goal))
+        if len(bad):
+            raise NoSolutionError(f"{said(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
+        speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)
+        one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
+        if one.duration > 0:
+            self.made.append(one)
+        self.q = goal
+
+    def _reached(self, goal: Spot, branch: str | None) -> Array:
+        """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
+        found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
+        wanted = branch or self.branch
+        for b in found.order:
+            named = wanted is None or (found.branch[b] >= 0 and found.names[found.branch[b]] == wanted)
+            if found.valid[b] and found.within_limits[b] and named:
+                return np.asarray(found.q[b])
+        what = f" on branch '{wanted}'" if wanted else ""
+        raise NoSolutionError(f"a point has no solution within the limits{what}: nothing was moved")

@@ -1,0 +1,150 @@
+"""A planned path: its motion in time, and what was found about its branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula.arrays import Array
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.trajectory import Stretch, Trajectory
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+
+@dataclass(frozen=True)
+class PathRun:
+    """A part of the path on one branch."""
+
+    begin: float  # [mm]
+    end: float
+    names: list[tuple[float, str]]  # where a branch's name begins, and the name
+    start_joints: Array
+    end_joints: Array
+
+
+@dataclass(frozen=True)
+class Reconfiguration:
+    """Where a run ends before the path does."""
+
+    s: float  # [mm]
+    why: str  # limit, reach, boundary, singularity
+    joint: str | None
+    index: int | None
+    value: float | None  # [rad | mm] the limit
+    beyond: str  # the inverse kinematics' status just behind
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A branch at the path's start: how far it carries, and why no farther."""
+
+    name: str
+    start_joints: Array
+    carries: float  # [mm]
+    ends_because: str
+
+
+@dataclass(frozen=True)
+class Marker:
+    """Something that happens between two stretches: the gripper."""
+
+    before: int  # number of the stretch that follows
+    kind: str
+    value: Any
+
+
+@dataclass
+class PathPlan:
+    """What `armkin.path` returns: joint values over time, and how they came about.
+
+    length: [mm] of the tool's way; runs, branches, reconfigurations: see their classes; deviation: [mm] a bound of
+    the distance between plan and path; nearest_singularity: [mm] where, the condition there, the joint values.
+    """
+
+    arm: Arm
+    task: Task
+    tolerance: float
+    length: float = 0.0
+    samples: int = 0
+    complete: bool = True
+    deviation: float = 0.0
+    runs: list[PathRun] = field(default_factory=list)
+    branches: list[Branch] = field(default_factory=list)
+    reconfigurations: list[Reconfiguration] = field(default_factory=list)
+    nearest_singularity: tuple[float, float, Array] | None = None
+    markers: list[Marker] = field(default_factory=list)
+    trajectory: Trajectory | None = None
+    on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
+
+    def along(self, number: int, stretch: Stretch, base: float) -> None:
+        """Note that a stretch is on the tool's way."""
+        self.on_path[number] = (stretch, base)
+
+    def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
+        """The same with its motion."""
+        self.trajectory, self.markers = Trajectory(self.arm, start, tuple(made)), markers
+        return self
+
+    @property
+    def _motion(self) -> Trajectory:
+        assert self.trajectory is not None, "the path was not planned to its end"
+        return self.trajectory
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self._motion.duration
+
+    def q(self, t: ArrayLike) -> Array:
+        """Joint values at times t [s]: (...,) -> (..., n) [rad | mm]."""
+        return self._motion.q(t)
+
+    def qd(self, t: ArrayLike) -> Array:
+        """Joint speeds: (...,) -> (..., n) [rad/s | mm/s]."""
+        return self._motion.qd(t)
+
+    def qdd(self, t: ArrayLike) -> Array:
+        """Joint accelerations: (...,) -> (..., n) [rad/s2 | mm/s2]."""
+        return self._motion.qdd(t)
+
+    def s(self, t: ArrayLike) -> Array:
+        """Way of the tool along its path at times t: (...,) [mm]; before, between and behind it stays."""
+        when = np.atleast_1d(np.asarray(t, dtype=float))
+        out = np.zeros(len(when))
+        begins = self._motion.begins
+        for k, (stretch, base) in sorted(self.on_path.items()):
+            if isinstance(stretch, Curve | Smoothed):
+                late = when >= begins[k]
+                out[late] = base + stretch.way(when[late] - begins[k])
+        return out.reshape(np.shape(t))
+
+    @cached_property
+    def limits(self) -> dict[str, Array]:
+        """Greatest shares of the joints' limits that the motion takes: speed, accel (and jerk): (n,) each."""
+        speed, accel = np.zeros(self.arm.n), np.zeros(self.arm.n)
+        jerk = np.zeros(self.arm.n)
+        for stretch in self._motion.stretches:
+            if isinstance(stretch, Smoothed):
+                t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / 0.001), 2))
+            elif isinstance(stretch, Curve):
+                t = np.concatenate([stretch.times, stretch.times[1:] * (1 - 1e-12)])
+            else:
+                t = np.linspace(0.0, stretch.duration, 200)
+            a = np.abs(stretch.at(t, 2))
+            speed = np.maximum(speed, np.abs(stretch.at(t, 1)).max(axis=0))
+            accel = np.maximum(accel, a.max(axis=0))
+            if isinstance(stretch, Smoothed):
+                now = stretch.at(t, 2)
+                jerk = np.maximum(jerk, np.abs(np.diff(now, axis=0)).max(axis=0) / (t[1] - t[0]))
+        shares = {"speed": speed / self.arm.max_speed, "accel": accel / self.arm.max_accel}
+        if np.isfinite(self.arm.max_jerk).all() and jerk.any():
+            shares["jerk"] = jerk / self.arm.max_jerk
+        return shares

@@ -1,0 +1,56 @@
+"""The numbers of a path file, in millimetres and degrees, as joint values and targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.model import units
+from armkin.motion.geometry import Spot, spot
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+
+def joints(arm: Arm, now: Array, value: Any) -> Array:
+    """Joint values (n,) [rad | mm]: a list, a pose's name, or {name: value} with the others as they are now."""
+    if isinstance(value, str):
+        if value not in arm.poses:
+            raise UsageError(f"there is no pose '{value}'; {arm.name} has {', '.join(arm.poses)}")
+        return np.asarray(arm.poses[value])
+    if isinstance(value, Mapping):
+        wrong = [name for name in value if name not in arm.joint_names]
+        if wrong:
+            raise UsageError(f"there is no joint {wrong[0]}; {arm.name} has {', '.join(arm.joint_names)}")
+        old = units.joints_out(arm, now).tolist()
+        value = [value.get(name, before) for name, before in zip(arm.joint_names, old, strict=True)]
+    if len(value) != arm.n:
+        raise UsageError(f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}); got {len(value)} values")
+    return np.asarray(units.joints_in(arm, value))
+
+
+def target(task: Task, now: Spot, value: Sequence[float]) -> Spot:
+    """A target; with the position alone the sums and the orientation stay as they are now."""
+    labels = task.labels
+    if len(value) == task.position < len(labels):
+        return replace(now, p=np.asarray(value, dtype=float))
+    if len(value) != len(labels):
+        short = f", or {' '.join(labels[: task.position])} alone" if len(labels) > task.position else ""
+        raise UsageError(f"a target of task {task.name} is {' '.join(labels)}{short}; got {len(value)} numbers")
+    if task.orientation == "axis" and not np.linalg.norm(value[-3:]) > 1e-9:
+        raise UsageError("a target's axis ax ay az has no length")
+    [made] = units.targets_in(labels, [value])
+    return spot(task, made)
+
+
+def place(task: Task, value: Sequence[float]) -> Array:
+    """A position or a direction, with as many coordinates as the task has."""
+    if len(value) < task.position:
+        raise UsageError(f"x y z are needed; got {len(value)} numbers")
+    return np.asarray(value[: task.position], dtype=float)

@@ -1,0 +1,104 @@
+"""What was found about a path's branches: noted in the plan, and in words where the path is not carried."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import NoSolutionError
+from armkin.formula.arrays import Array
+from armkin.model import units
+from armkin.motion.chains import Chain, why_ended
+from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.motion.branch_path import Carried
+    from armkin.motion.chains import Run
+    from armkin.motion.columns import Columns
+
+_WHY = {
+    "end": "carries all",
+    "reach": "the path leaves the reach",
+    "boundary": "two branches meet on a boundary",
+    "singularity": "the joints would jump at a singularity",
+}
+
+
+def note(plan: PathPlan, carried: Carried, near: Array) -> None:
+    """Add runs, branches and breaks of a group of moves to the plan."""
+    c, base, arm = carried.columns, plan.length, plan.arm
+    plan.samples += len(c.s)
+    plan.complete = plan.complete and c.complete
+    if not plan.branches:
+        plan.branches = _branches(arm, carried, near)
+    for k, run in enumerate(carried.runs):
+        q = run.chain.run(run.first, run.last, near)
+        begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
+        plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0], q[-1]))
+        if run.last < len(c.s) - 1 or k + 1 < len(carried.runs):
+            plan.reconfigurations.append(_break(arm, c, run.chain, run.first, base))
+
+
+def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
+    """Where each branch name begins on a run."""
+    labels = run.chain.labels[run.first - run.chain.first : run.last - run.chain.first + 1]
+    changes = [0, *(1 + np.flatnonzero(np.diff(labels))).tolist()]
+    return [(base + float(c.s[run.first + i]), _name(c, int(labels[i]))) for i in changes]
+
+
+def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
+    """The branches at the start, the one that carries farthest first."""
+    c, found = carried.columns, []
+    for chain in carried.all:
+        if chain.first == 0:
+            e = chain.carries(0)
+            q = chain.run(0, e, near)[0] if e >= 0 else chain.q[0]
+            far = float(c.s[e]) if e >= 0 else 0.0
+            why = words(arm, _break(arm, c, chain, 0, 0.0))
+            found.append((e, Branch(_name(c, int(chain.labels[0])), q, far, why)))
+    return [branch for _, branch in sorted(found, key=lambda one: -round(one[1].carries, 2))]
+
+
+def _name(c: Columns, label: int) -> str:
+    return c.names[label] if 0 <= label < len(c.names) else ""
+
+
+def _break(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
+    """Where and why a run from a sample ends."""
+    why, joint, value, beyond = why_ended(c, chain, first)
+    e = max(chain.carries(first), 0)
+    return Reconfiguration(
+        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond
+    )
+
+
+def words(arm: Arm, where: Reconfiguration) -> str:
+    """Why a branch carries no farther."""
+    if where.index is None or where.value is None:
+        return _WHY[where.why]
+    size, unit = (1.0, "mm") if arm.prismatic[where.index] else (units.DEGREE, "deg")
+    return f"{where.joint} meets its limit {where.value / size:.6g} {unit}"
+
+
+def refused(plan: PathPlan, carried: Carried) -> NoSolutionError:
+    """The error of a path that is not carried; `plan` of it tells the rest."""
+    best = plan.branches[0] if plan.branches else None
+    length = carried.route.length
+    if best is None:
+        text = "the path's first point is out of reach"
+    elif not carried.runs or carried.runs[0].first > 0:
+        text = f"no branch is within the limits at the path's start: {best.ends_because}"
+    else:
+        far = float(carried.columns.s[carried.runs[0].last])
+        text = f"no branch carries the whole path: {far:.3f} of {length:.3f} mm, then "
+        text += words(plan.arm, plan.reconfigurations[0])
+        changes = len(carried.runs) - 1
+        if carried.covered:
+            text += f"; with {changes} change{'s' * (changes > 1)} of branch it can be done"
+    plan.length += length
+    fields: dict[str, Any] = {"splittable": carried.covered}
+    error = NoSolutionError(f"{text}: nothing was moved", **fields)
+    error.plan = plan  # type: ignore[attr-defined]
+    return error

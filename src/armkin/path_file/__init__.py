@@ -1,0 +1,81 @@
+"""Path files: YAML or CSV in, one validated path out, or an error with its line.
+
+    model.py   keys, types, bounds       words.py   errors in the file's own words
+    table.py   CSV: one row a corner, columns chosen by the header
+
+This package imports pydantic and yaml, and is itself imported only when a path is read.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+
+from armkin.errors import FileError, PathFileError
+from armkin.path_file.model import Move, PathFile
+from armkin.robot_file import strict_yaml
+
+__all__ = ["Move", "PathFile", "json_schema", "parse", "read", "validated"]
+
+
+def read(name: str) -> PathFile:
+    """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
+    try:
+        with open(name, "rb") as file:
+            raw = file.read()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(f"{name}: cannot read the path file: {reason}", file=name) from None
+    return parse(raw, name)
+
+
+def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
+    """Validate the text of a path; `name` is what messages call it. Text without a colon in its head is CSV."""
+    data = raw.encode() if isinstance(raw, str) else raw
+    if name.endswith(".csv") or not (name.endswith((".yaml", ".yml")) or _is_yaml(data)):
+        from armkin.path_file import table
+
+        return table.parse(data, name)
+    try:
+        document = strict_yaml.loads(data)
+    except strict_yaml.StrictYamlError as error:
+        raise _invalid(name, [(error.line, error.problem)]) from None
+    try:
+        return PathFile.model_validate(document.data)
+    except ValidationError as error:
+        from armkin.path_file import words
+
+        raise _invalid(name, [(document.line(at), text) for at, text in words.told(error)]) from None
+
+
+def validated(data: dict[str, Any], name: str = "path") -> PathFile:
+    """Validate a path that is data already, as the page or a program has it."""
+    try:
+        return PathFile.model_validate(data)
+    except ValidationError as error:
+        from armkin.path_file import words
+
+        raise _invalid(name, [(0, text) for _, text in words.told(error)]) from None
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a path file, for editors (`robots/path.schema.json`)."""
+    from armkin.robot_file.schema import made_from
+
+    return made_from(PathFile, "armkin path file")
+
+
+def _is_yaml(data: bytes) -> bool:
+    """Whether the first line that says something has a colon: a mapping's key."""
+    for line in data[:4096].splitlines():
+        text = line.strip()
+        if text and not text.startswith(b"#"):
+            return b":" in text
+    return True
+
+
+def _invalid(name: str, problems: list[tuple[int, str]]) -> PathFileError:
+    told = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in sorted(problems)]
+    more = f"\n{len(told) - 2} more problems" if len(told) > 2 else ""
+    return PathFileError("\n".join(told[:2]) + more, problems=told, file=name)

@@ -1,0 +1,124 @@
+"""The path file as pydantic sees it: every key, its unit, its bounds and its help text. Degrees and millimetres."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+Number = Annotated[float, Field(ge=-1e7, le=1e7)]
+Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
+Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
+Percent = Annotated[float, Field(gt=0, le=100)]
+Speed = Annotated[float, Field(gt=0, le=1e6)]
+Joints = Values | dict[str, Number] | str
+
+KINDS = ("joint", "point", "line", "polyline", "arc", "circle", "spline", "offset", "wait", "grip")
+EXAMPLES = {
+    "joint": "joint: [0, 90, -90]",
+    "point": "point: [390, 80, 300]",
+    "line": "line: [390, 160, 300]",
+    "polyline": "polyline: [[390, 160, 300], [390, 80, 300]]",
+    "arc": "arc: {via: [420, 190, 300], to: [450, 160, 300]}",
+    "circle": "circle: {centre: [450, 120, 300], normal: [0, 0, 1]}",
+    "spline": "spline: [[400, 120, 300], [420, 100, 320]]",
+    "offset": "offset: {xyz: [0, 0, -30], frame: tool}",
+    "wait": "wait: 0.5",
+    "grip": "grip: closed",
+}
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Arc(_Model):
+    """An arc of a circle."""
+
+    via: Triple = Field(description="A point on the arc, in mm.")
+    to: Values = Field(description="Its end: a target.")
+
+
+class Circle(_Model):
+    """A circle, or with a rise a helix, from where the tool is."""
+
+    centre: Triple = Field(description="Centre in mm.")
+    normal: Triple = Field(
+        default_factory=lambda: [0.0, 0.0, 1.0], description="Axis; positive turns are right-handed about it."
+    )
+    turns: Annotated[float, Field(ge=-1000, le=1000)] = Field(1.0, description="Turns; negative: the other way.")
+    rise: Number = Field(0.0, description="mm along the normal, over all turns.")
+
+
+class Offset(_Model):
+    """A line to a place beside the present one."""
+
+    xyz: Triple = Field(description="mm.")
+    frame: Literal["tool", "base"] = Field("base", description="Whose axes: tool or base.")
+
+
+class Start(_Model):
+    """Where a path begins."""
+
+    joints: Joints | None = Field(None, description="Joint values, or a pose's name.")
+    point: Values | None = Field(None, description="A target.")
+
+    @model_validator(mode="after")
+    def _one(self) -> Start:
+        if (self.joints is None) == (self.point is None):
+            raise PydanticCustomError("problem", "give joints: or point:, one of them")
+        return self
+
+
+class Move(_Model):
+    """One move: exactly one of joint, point, line, polyline, arc, circle, spline, offset, wait, grip."""
+
+    joint: Joints | None = Field(None, description="A joint move: values, a pose's name, or {q1: 30}.")
+    point: Values | None = Field(None, description="A target, reached by a joint move.")
+    line: Values | None = Field(None, description="A straight line to a target.")
+    polyline: Annotated[list[Values], Field(min_length=1)] | None = Field(None, description="Lines through targets.")
+    arc: Arc | None = Field(None, description="An arc through via, to to.")
+    circle: Circle | None = Field(None, description="A circle or helix.")
+    spline: Annotated[list[Values], Field(min_length=1, max_length=1000)] | None = Field(
+        None, description="A smooth curve through targets."
+    )
+    offset: Offset | None = Field(None, description="A line by an offset.")
+    wait: Annotated[float, Field(ge=0, le=86400)] | None = Field(None, description="Seconds at rest.")
+    grip: Literal["open", "closed"] | Number | None = Field(None, description="open, closed, or the drive's value.")
+    branch: str | None = Field(None, description="With point: the branch's name.")
+    blend: Annotated[float, Field(ge=0, le=1e6)] | None = Field(
+        None, description="mm: radius of the sphere that rounds the corner at the move's end; 0 = stop."
+    )
+    speed: Percent | None = Field(None, description="Percent of the joints' max_speed.")
+    tool_speed: Speed | None = Field(None, description="mm/s.")
+
+    @property
+    def kind(self) -> str:
+        """Which move it is."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
+
+    @model_validator(mode="after")
+    def _one(self) -> Move:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(given) != 1:
+            text = f"has {' and '.join(given)}: one of them" if given else f"is none of {', '.join(KINDS)}"
+            raise PydanticCustomError("problem", "{text}", {"text": text})
+        if self.branch is not None and given != ["point"]:
+            raise PydanticCustomError("problem", "branch: belongs to point:")
+        return self
+
+
+class PathFile(_Model):
+    """A path: moves one after another."""
+
+    robot: str | None = Field(None, description="Name or file of the robot.")
+    task: str | None = Field(None, description="What targets prescribe; by default the arm's task.")
+    tolerance: Annotated[float, Field(gt=0, le=1000)] | None = Field(
+        None, description="mm between plan and path; 0.05 by default."
+    )
+    tool_speed: Speed | None = Field(None, description="mm/s, for all moves.")
+    speed: Percent | None = Field(None, description="Percent of the joints' max_speed, for all moves.")
+    blend: Annotated[float, Field(ge=0, le=1e6)] = Field(0.0, description="mm, for all corners; 0 = stop.")
+    start: str | Start | None = Field(None, description="A pose's name, joints: or point:. Absent: where the arm is.")
+    moves: Annotated[list[Move], Field(min_length=1, max_length=1_000_000)] = Field(description="The moves, in order.")

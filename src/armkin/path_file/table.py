@@ -1,0 +1,91 @@
+"""Paths as CSV: one row a corner, lines between them; columns are chosen by the names in the header."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import Any
+
+from armkin.errors import PathFileError
+from armkin.path_file.model import Move, PathFile
+
+_OPTIONS = ("blend", "tool_speed")
+_TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
+_UNITS = ("_mm", "_deg", "/mm", "/deg")
+MOST = 200_000  # rows
+
+
+def parse(raw: bytes, name: str) -> PathFile:
+    """Rows as moves: a point first, then lines (targets), or joint moves (joint names).
+
+    The header names the columns: x,y,z[,roll,pitch,yaw] or whatever the task's labels are, or joint names, plus
+    optional blend and tool_speed. Without a header the columns are a target's, in the task's order.
+    """
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise PathFileError(f"{name}: is not UTF-8 text", file=name) from None
+    rows = [
+        (number, row)
+        for number, row in enumerate(csv.reader(io.StringIO(text)), 1)
+        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
+    ]
+    if not rows:
+        raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
+    if len(rows) > MOST:
+        raise PathFileError(f"{name}: has {len(rows)} rows; a path takes up to {MOST}", file=name)
+    header: list[str] | None = None
+    if any(_value(cell) is None for cell in rows[0][1]):
+        header = [_bare(cell) for cell in rows.pop(0)[1]]
+        doubled = sorted({key for key in header if header.count(key) > 1})
+        if doubled:
+            raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
+    moves: list[Move] = []
+    for number, row in rows:
+        values = [_value(cell) for cell in row]
+        if any(v is None for v in values) or len(values) != len(header or values):
+            wrong = next((cell for cell, v in zip(row, values, strict=True) if v is None), None)
+            what = (
+                f"'{wrong[:40]}' is no number"
+                if wrong is not None
+                else f"{len(values)} cells, {len(header or [])} columns"
+            )
+            raise PathFileError(f"{name}:{number}: {what}", file=name, line=number)
+        moves.append(_move(header, [float(v) for v in values if v is not None], first=not moves, where=(name, number)))
+    if not moves:
+        raise PathFileError(f"{name}: has a header and no rows", file=name)
+    return PathFile.model_construct(moves=moves)
+
+
+def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:
+    named = dict(zip(header, values, strict=True)) if header else {}
+    extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
+    if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) <= 0:
+        raise PathFileError(f"{where[0]}:{where[1]}: blend is at least 0 and tool_speed above 0", file=where[0])
+    if header and not set(named) & set(_TARGETS):
+        return Move.model_construct(None, joint=named, **extra)
+    # The header's order is kept; the planner puts a target's labels in place.
+    target = [named[key] for key in sorted(named, key=_order)] if header else values
+    return Move.model_construct(None, **{"point" if first else "line": target}, **extra)
+
+
+def _order(key: str) -> int:
+    return _TARGETS.index(key) if key in _TARGETS else len(_TARGETS)
+
+
+def _bare(cell: str) -> str:
+    text = cell.strip()
+    for unit in _UNITS:
+        text = text.removesuffix(unit)
+    return text
+
+
+def _value(cell: str) -> float | None:
+    if len(cell) > 100:
+        return None
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

@@ -1,0 +1,97 @@
+"""What is wrong with a path file, in its own words."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from armkin.path_file.model import EXAMPLES, KINDS, Arc, Circle, Move, Offset, PathFile, Start
+from armkin.robot_file.messages import shown
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+
+Place = tuple[str | int, ...]
+_OWNERS: dict[str, type[BaseModel]] = {"moves": Move, "arc": Arc, "circle": Circle, "offset": Offset, "start": Start}
+_SYNONYMS = {
+    "center": "centre", "lin": "line", "ptp": "joint", "joints": "joint", "circ": "arc", "mid": "via", "end": "to",
+    "target": "point", "goto": "point", "move": "line", "pause": "wait", "dwell": "wait", "gripper": "grip",
+    "radius": "blend", "velocity": "speed", "name": "robot", "points": "polyline", "waypoints": "moves",
+}  # fmt: skip
+
+
+def told(error: ValidationError) -> Iterator[tuple[Place, str]]:
+    """Places and texts, each place once: of a key that takes several shapes, the shape that came nearest."""
+    best: dict[Place, Any] = {}
+    for one in error.errors(include_url=False):
+        at = _place(one["loc"])
+        if at not in best or len(one["loc"]) > len(best[at]["loc"]):
+            best[at] = one
+    for at in list(best):  # what is wrong inside a value says more than that the value is wrong
+        if any(len(other) > len(at) and other[: len(at)] == at for other in best):
+            del best[at]
+    for at, one in best.items():
+        yield at, f"{_where(at)}{_text(at, one)}"
+
+
+def _place(loc: tuple[str | int, ...]) -> Place:
+    """pydantic's location without the names of the shapes it has tried: only our keys, and item numbers."""
+    owners: list[type[BaseModel]] = [PathFile, *_OWNERS.values()]
+    keys = {*KINDS, *(key for owner in owners for key in owner.model_fields)}
+    out: list[str | int] = []
+    for k, part in enumerate(loc):
+        if isinstance(part, int) or part in keys or (k == len(loc) - 1 and not _is_shape(part)):
+            out.append(part)
+    return tuple(out)
+
+
+def _is_shape(part: str) -> bool:
+    return any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
+
+
+def _where(at: Place) -> str:
+    words = []
+    if at[:1] == ("moves",) and len(at) > 1 and isinstance(at[1], int):
+        words.append(f"move {at[1] + 1}")
+        at = at[2:]
+    while at and isinstance(at[-1], int):
+        at = at[:-1]
+    if at:
+        words.append(".".join(str(part) for part in at if not isinstance(part, int)))
+    return "".join(f"{word}: " for word in words)
+
+
+def _text(at: Place, one: Any) -> str:
+    kind, context = one["type"], one.get("ctx", {})
+    names = [part for part in at if isinstance(part, str)]
+    key = names[-1] if names else ""
+    if kind == "extra_forbidden":
+        owner = _OWNERS.get(names[-2], PathFile) if len(names) > 1 else PathFile
+        near = _nearest(key, list(owner.model_fields))
+        hint = f"did you mean {near}?" if near else f"the keys here are {', '.join(owner.model_fields)}"
+        return f"unknown key; {hint}"
+    if kind == "missing":
+        return "is required: a list of moves, for example - line: [390, 160, 300]" if key == "moves" else "is required"
+    if kind == "problem":
+        return str(one["msg"])
+    if kind in ("greater_than", "less_than_equal", "greater_than_equal", "less_than"):
+        sign = {"greater_than": "above", "greater_than_equal": "at least", "less_than_equal": "at most"}
+        bound = context.get("gt", context.get("ge", context.get("le", context.get("lt"))))
+        return f"must be {sign.get(kind, 'below')} {bound:g}, not {shown(one['input'])}"
+    if kind in ("too_short", "too_long"):
+        return (
+            f"has {context['actual_length']} items; {context.get('min_length', context.get('max_length'))} are needed"
+        )
+    if kind == "finite_number":
+        return "must be a finite number"
+    example = next((EXAMPLES[name] for name in reversed(names) if name in EXAMPLES), None)
+    return f"is {shown(one['input'])}" + (f"; for example {example}" if example else f": {one['msg'].lower()}")
+
+
+def _nearest(word: str, choices: list[str]) -> str | None:
+    low = word.strip().lower().replace("-", "_")
+    if _SYNONYMS.get(low) in choices:
+        return _SYNONYMS[low]
+    near = difflib.get_close_matches(low, choices, n=1, cutoff=0.6)
+    return near[0] if near else None

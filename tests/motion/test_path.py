@@ -1,0 +1,106 @@
+"""`armkin.path`: what is executed keeps to the path and to every limit; what is not carried is refused in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model.arm import Arm
+from armkin.motion.path_plan import PathPlan
+
+CIRCLE = {"circle": {"centre": [340, 80, 300], "normal": [0, 0, 1]}}
+
+
+@pytest.fixture(scope="module")
+def three_dof() -> Arm:
+    return armkin.load("robots/three_dof.yaml")
+
+
+def executed(plan: PathPlan, step: float = 0.001) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, joint values and what their differences make of speed and acceleration, as shares of the limits."""
+    t = np.arange(0.0, plan.duration, step)
+    q = plan.q(t)
+    v = np.diff(q, axis=0) / step
+    a = np.diff(v, axis=0) / step
+    return q, np.abs(v) / plan.arm.max_speed, np.abs(a) / plan.arm.max_accel
+
+
+def test_a_circle_is_followed_within_every_limit(three_dof: Arm) -> None:
+    plan = armkin.path(three_dof, {"moves": [{"point": [390, 80, 300]}, CIRCLE]}, start=three_dof.home)
+    q, v, a = executed(plan)
+    assert v.max() <= 1.002
+    assert a.max() <= 1.002
+    assert max(v.max(), a.max()) > 0.99  # and nothing is left unused
+    tip = armkin.fk(three_dof, q)[:, :3, 3]
+    on = plan.s(np.arange(0.0, plan.duration, 0.001)) > 0
+    off = np.hypot(np.hypot(*(tip[on, :2] - [340, 80]).T) - 50, tip[on, 2] - 300)
+    assert off.max() < plan.deviation + 1e-9 < plan.tolerance
+    assert plan.length == pytest.approx(100 * np.pi)
+    assert [run.end for run in plan.runs] == [pytest.approx(100 * np.pi)]
+
+
+@pytest.mark.parametrize("jerk", [None, np.deg2rad(2000.0)])
+def test_all_moves_together_end_where_they_shall(three_dof: Arm, jerk: float | None) -> None:
+    moves: list[dict[str, Any]] = [
+        {"joint": [0, 90, -90]},
+        {"point": [390, 80, 300]},
+        {"line": [390, 140, 300]},
+        {"arc": {"via": [380, 160, 300], "to": [360, 160, 300]}},
+        {"wait": 0.5},
+        {"spline": [[340, 140, 310], [330, 100, 300], [300, 120, 280]]},
+        {"grip": "closed"},
+        {"offset": {"xyz": [0, 0, -30]}, "tool_speed": 50},
+        {"offset": {"xyz": [10, 0, 0], "frame": "tool"}},
+        {"circle": {"centre": [290, 60, 250], "turns": -0.5, "rise": 20}},
+        {"joint": "home"},
+    ]
+    plan = armkin.path(three_dof, {"moves": moves, "blend": 5, "start": "home"}, jerk=jerk)
+    q, v, a = executed(plan)
+    assert v.max() <= 1.002
+    assert a.max() <= 1.002
+    assert np.abs(np.diff(q, axis=0)).max() < 0.01
+    if jerk is not None:
+        # executed at 5 ms: third differences of what is sent
+        t = np.arange(0, plan.duration, 0.002)
+        j = np.abs(np.diff(plan.qdd(t), axis=0)) / 0.002
+        assert j.max() <= 1.02 * jerk
+    assert plan.q(plan.duration) == pytest.approx(three_dof.home)
+    assert [(marker.kind, marker.value) for marker in plan.markers] == [("grip", "closed")]
+
+
+def test_a_path_beyond_the_reach_is_refused_with_what_each_branch_carries(three_dof: Arm) -> None:
+    with pytest.raises(NoSolutionError, match=r"275\.256 of 480\.000 mm, then the path leaves the reach") as refused:
+        armkin.path(three_dof, [[390, 80, 300], [390, -400, 300]])
+    plan: PathPlan = refused.value.plan  # type: ignore[attr-defined]
+    # Where the horizontal distance makes the arm straight: its reach from the shoulder is 455, offset 10.
+    edge = 80 + np.sqrt(455**2 + 10**2 - 130**2 - 390**2)
+    assert plan.branches[0].carries == pytest.approx(edge, abs=0.01)
+    assert [branch.name for branch in plan.branches][:2] in (
+        ["left, elbow up", "left, elbow down"],
+        ["left, elbow down", "left, elbow up"],
+    )
+
+
+@pytest.mark.parametrize(
+    ("moves", "words"),
+    [
+        ([{"line": [258, 10, 367]}], "no length"),
+        ([{"arc": {"via": [300, 10, 367], "to": [340, 10, 367]}}], "on one line"),
+        ([{"circle": {"centre": [258, 10, 400], "normal": [0, 0, 1]}}], "no radius"),
+        ([{"line": [300, 10, 367]}, {"line": [300, 30, 367]}, {"line": [200, 30, 367]}], "longer than half of a side"),
+        ([{"joint": [0, 90]}], "got 2 values"),
+        ([{"joint": "parked"}], "no pose 'parked'"),
+        ([{"joint": {"q9": 3}}], "no joint q9"),
+        ([{"line": [1, 2]}], "got 2 numbers"),
+        ([{"lin": [300, 10, 367]}], "unknown key; did you mean line"),
+        ([{"line": [300, 10, float("nan")]}], "finite"),
+        ([{"spline": [[300, 10, 367], [300, 10, 367]]}], "same point twice"),
+    ],
+)
+def test_moves_that_make_no_sense_are_refused_in_words(three_dof: Arm, moves: list[Any], words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        armkin.path(three_dof, {"moves": moves, "blend": 15, "start": "home"})
