@@ -249,8 +249,6 @@ class _Walk:
         self._between("wait", value)
 
     def _grip(self, move: Move, value: Any) -> None:
-        if self.arm.file is not None and self.arm.file.gripper is None:
-            raise UsageError(f"{self.arm.name} has no gripper; add gripper: to its robot file")
         self._between("grip", value)
 
     def _between(self, kind: str, value: Any) -> None:
