@@ -6,11 +6,12 @@ import queue
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.board.firmware.cutting import Cut, plan
+from armkin.board.told import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
@@ -52,7 +53,7 @@ class Planner:
                 self.done.append(made)
             yield made
 
-    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> dict[str, Any]:
+    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> Summary:
         """JSON: what the plans come to."""
         arm = self.arm
         first = list(start) if start is not None else plans[0].start.tolist()
@@ -138,7 +139,7 @@ class Stream:
         return plans
 
 
-def where(machine: Machine) -> dict[str, Any]:
+def where(machine: Machine) -> Where:
     """Where the arm stands, as JSON [deg | mm]."""
     arm = machine.arm
     known = machine.position() != "lost"

@@ -6,7 +6,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from armkin.cli import output
 from armkin.cli.numbers import LARGEST, numbers
@@ -15,6 +15,8 @@ from armkin.errors import FileError, NoSolutionError, UsageError
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
+
+Answer = TypeVar("Answer", bound=Mapping[str, Any])
 
 ROWS = 4096  # rows in memory at a time
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
@@ -107,9 +109,9 @@ def run_batch(
     chunks: Iterable[Chunk],
     out: str | None,
     as_json: bool,
-    answers: Callable[[Chunk], Iterable[dict[str, Any]]],
+    answers: Callable[[Chunk], Iterable[Answer]],
     heading: Sequence[str],
-    records: Callable[[int, dict[str, Any]], Iterable[Sequence[Any]]],
+    records: Callable[[int, Answer], Iterable[Sequence[Any]]],
 ) -> Tally:
     """Answer all chunks: each row's answer as a line of JSON, or its `records` as CSV under a `heading`."""
     tally = Tally()

@@ -1,12 +1,12 @@
 """`armkin info` for people: the tables as papers print them, from the same object as the JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from armkin.cli.render import short, table, wrapped
 
 
-def text(answer: dict[str, Any]) -> str:
+def text(answer: Mapping[str, Any]) -> str:
     """The whole summary."""
     joints = answer["joints"]
     kinds = "".join("P" if joint["type"] == "prismatic" else "R" for joint in joints)
@@ -72,7 +72,7 @@ def _triple(values: Sequence[float]) -> str:
     return f"({', '.join(map(short, values))})"
 
 
-def _frames(answer: dict[str, Any]) -> str:
+def _frames(answer: Mapping[str, Any]) -> str:
     """Base, tool and zero pose, where they are not the identity."""
     lines = []
     for key in ("base", "tool", "zero_pose"):
@@ -83,7 +83,7 @@ def _frames(answer: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _ranges(answer: dict[str, Any]) -> str:
+def _ranges(answer: Mapping[str, Any]) -> str:
     rows = [["joint", "limits", "home", "max speed", "max accel", "", "homing"]]
     for joint, unit in zip(answer["joints"], answer["joint_units"], strict=True):
         limits = joint["limits"]
@@ -104,7 +104,7 @@ def _ranges(answer: dict[str, Any]) -> str:
     return table(rows, left=(0, 5, 6))
 
 
-def _poses(answer: dict[str, Any]) -> str:
+def _poses(answer: Mapping[str, Any]) -> str:
     """Named poses; home alone stands in the table of ranges."""
     if len(answer["poses"]) == 1:
         return ""
@@ -113,7 +113,7 @@ def _poses(answer: dict[str, Any]) -> str:
     return table(rows)
 
 
-def _steppers(answer: dict[str, Any]) -> str:
+def _steppers(answer: Mapping[str, Any]) -> str:
     heading = ["stepper", "axis", "full steps", "x micro", "x gear", "x pulley", "= pulses/turn", "one pulse"]
     rows = [[*heading, "", ""]]
     for motor in answer["motors"]:
@@ -140,7 +140,7 @@ def _remarks(motor: dict[str, Any]) -> str:
     return ", ".join(lead + ["inverted"] * motor["invert"])
 
 
-def _servos(answer: dict[str, Any]) -> str:
+def _servos(answer: Mapping[str, Any]) -> str:
     rows = [["servo", "axis", "travel/deg", "pulse/us", "zero/deg", "us/deg", ""]]
     for motor in answer["motors"]:
         if motor["kind"] == "servo":
@@ -158,7 +158,7 @@ def _servos(answer: dict[str, Any]) -> str:
     return table(rows, left=(0, 1, 6)) if len(rows) > 1 else ""
 
 
-def _bus_servos(answer: dict[str, Any]) -> str:
+def _bus_servos(answer: Mapping[str, Any]) -> str:
     rows = [["bus servo", "id", "counts/turn", "zero/count", "counts/deg", ""]]
     for motor in answer["motors"]:
         if motor["kind"] == "bus":
@@ -168,7 +168,7 @@ def _bus_servos(answer: dict[str, Any]) -> str:
     return table(rows, left=(0, 5)) if len(rows) > 1 else ""
 
 
-def _matrix(answer: dict[str, Any]) -> str:
+def _matrix(answer: Mapping[str, Any]) -> str:
     """Motors as sums of joints, where they are not one to one."""
     if answer["one_to_one"]:
         return ""
@@ -183,7 +183,7 @@ def _matrix(answer: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _hardware(answer: dict[str, Any]) -> str:
+def _hardware(answer: Mapping[str, Any]) -> str:
     lines = []
     if gripper := answer["gripper"]:
         where = f" on {gripper['axis']}" if "axis" in gripper else ""
@@ -194,7 +194,7 @@ def _hardware(answer: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _solver(answer: dict[str, Any]) -> str:
+def _solver(answer: Mapping[str, Any]) -> str:
     lines = [f"  reach    at most {answer['reach_mm']:.4f} mm from the first joint"]
     if answer["task"] is not None:
         pairs = zip(answer["target_labels"], answer["target_units"], strict=True)

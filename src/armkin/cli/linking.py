@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,7 +92,7 @@ def configured(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     return configure(arm, rehearsal=rehearsal)
 
 
-def where_text(arm: Arm, found: dict[str, Any]) -> str:
+def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
     """The same for people."""
     from armkin.motors import motor_names, pulse_units
 

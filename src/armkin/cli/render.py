@@ -9,16 +9,17 @@ from armkin.cli import output
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Head, Violation
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
 
-def head(arm: Arm) -> dict[str, Any]:
+def head(arm: Arm) -> Head:
     """What every JSON object begins with: the robot, its file as given and the file's hash."""
     return {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
 
 
-def violations(arm: Arm, values: Array, q: Array) -> list[list[dict[str, Any]]]:
+def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
     """For each row, the joints outside their limits: values (N, n) [deg | mm], q the same in [rad | mm]."""
     from armkin.model.limits import outside
 
@@ -28,7 +29,7 @@ def violations(arm: Arm, values: Array, q: Array) -> list[list[dict[str, Any]]]:
     ]
 
 
-def violation(arm: Arm, joint: int, value: float) -> dict[str, Any]:
+def violation(arm: Arm, joint: int, value: float) -> Violation:
     """A joint outside its limits, for JSON; value: [deg | mm]."""
     lower, upper = map(finite, units.limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": value, "lower": lower, "upper": upper}
@@ -39,7 +40,7 @@ def finite(value: float) -> float | None:
     return float(value) if abs(value) < float("inf") else None
 
 
-def said(arm: Arm, violation: dict[str, Any]) -> str:
+def said(arm: Arm, violation: Violation) -> str:
     """One violation in words: ``q2 = 130 deg is outside -20 to 120 deg``."""
     from armkin.model import limits
 
@@ -113,7 +114,7 @@ def joint_headings(arm: Arm) -> list[str]:
     return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
 
 
-def warn_of_limits(arm: Arm, found: list[dict[str, Any]]) -> None:
+def warn_of_limits(arm: Arm, found: list[Violation]) -> None:
     """Say which joints of a pose are outside their limits."""
     if found:
         output.warn("; ".join(said(arm, violation) for violation in found))

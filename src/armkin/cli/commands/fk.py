@@ -14,6 +14,7 @@ from armkin.cli.render import fixed
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Fk
     from armkin.model.arm import Arm
 
 
@@ -46,7 +47,7 @@ def fk(
     render.warn_of_limits(arm, answer["violations"])
 
 
-def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[dict[str, Any]]:
+def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[Fk]:
     import armkin
     from armkin.model import rotation
 
@@ -57,10 +58,12 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[dict[str, An
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations = render.violations(arm, chunk.values, q)
     joints = chunk.values.tolist()
-    joint_units = units.names(arm)
+    joint_units, head = units.names(arm), render.head(arm)
     for i, pose in enumerate(T):
-        answer = {
-            **render.head(arm),
+        answer: Fk = {
+            "robot": head["robot"],
+            "robot_file": head["robot_file"],
+            "robot_sha256": head["robot_sha256"],
             "joints": joints[i],
             "joint_units": joint_units,
             "position_mm": pose[:3, 3].tolist(),
@@ -78,7 +81,7 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[dict[str, An
         yield answer
 
 
-def _text(arm: Arm, answer: dict[str, Any]) -> str:
+def _text(arm: Arm, answer: Fk) -> str:
     xyz, rpy, R = answer["position_mm"], answer["rpy_deg"], answer["rotation"]
     rows = [
         ["position", *_labelled("xyz", xyz), "mm"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,7 @@ from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Grip
+    from armkin.cli.answers import Grip as Answer
     from armkin.model.arm import Arm
 
 
@@ -50,7 +51,7 @@ def grip(
     if at != target:
         there, wanted = _said(arm, gripper, at), _said(arm, gripper, target)
         raise LinkError(f"the gripper stands at {there} instead of {wanted}: please report this as a bug")
-    found: dict[str, Any] = {
+    found: Answer = {
         **render.head(arm),
         "port": machine.session.port.name,
         "gripper": gripper.value(at),

@@ -26,6 +26,7 @@ from armkin.cli.render import fixed
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Branch, Closest, Ik
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
     from armkin.inverse.tasks.task import Task
@@ -96,13 +97,13 @@ def ik(
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-    if answer["best"] is None:
+    if answer["best"] is None and answer["closest"] is not None:
         raise choose.refusal(request, found, answer["closest"]["distance_mm"])
 
 
 def _answers(
     request: choose.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Ik]:
     from armkin.inverse import choose
 
     targets = units.targets_in(task.labels, chunk.values)
@@ -121,7 +122,7 @@ def _answer(
     turns: bool,
     *,
     with_closest: bool,
-) -> dict[str, Any]:
+) -> Ik:
     arm = request.arm
     listed, best = found.branches, found.best
     if not all_branches:
@@ -130,7 +131,7 @@ def _answer(
         **render.head(arm),
         "task": task.name,
         "target": values,
-        "target_labels": task.labels,
+        "target_labels": list(task.labels),
         "near": request.near_out,
         "status": found.status,
         "method": found.method,
@@ -146,7 +147,7 @@ def _answer(
     }
 
 
-def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> dict[str, Any]:
+def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Closest:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for."""
     import armkin
     from armkin.inverse import choose
@@ -173,9 +174,9 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> dict
     }
 
 
-def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> dict[str, Any]:
+def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Branch:
     arm = request.arm
-    row = {
+    row: Branch = {
         "joints": branch.joints,
         "name": branch.name,
         "within_limits": branch.within_limits,
@@ -191,7 +192,7 @@ def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> dict
     return row
 
 
-def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
+def _records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:
     """CSV: one line a branch, or one line without joints."""
     for branch in answer["branches"]:
         rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
@@ -200,7 +201,7 @@ def _records(arm: Arm, row: int, answer: dict[str, Any]) -> Iterator[list[Any]]:
         yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]
 
 
-def _text(arm: Arm, answer: dict[str, Any]) -> str:
+def _text(arm: Arm, answer: Ik) -> str:
     headings = render.joint_headings(arm)
     goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]
@@ -222,7 +223,7 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
     return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
 
 
-def _summary(answer: dict[str, Any]) -> str:
+def _summary(answer: Ik) -> str:
     """What the table does not show: how many branches there are, and by which method."""
     count, legal = answer["branch_count"], answer["branches_within_limits"]
     text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"

@@ -10,6 +10,7 @@ from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Info, Solving
     from armkin.model.arm import Arm
     from armkin.robot_file import Joint, Motor, RobotFile
 
@@ -31,7 +32,7 @@ def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = Non
             write(text(answer))
 
 
-def _answer(arm: Arm, task: str | None) -> dict[str, Any]:
+def _answer(arm: Arm, task: str | None) -> Info:
     from armkin.board.firmware.needs import needs
 
     file = arm.file
@@ -84,7 +85,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
     return entry
 
 
-def _task(arm: Arm, name: str | None) -> dict[str, Any]:
+def _task(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
     import armkin
     from armkin.inverse.tasks.fitting import task_for
@@ -94,11 +95,10 @@ def _task(arm: Arm, name: str | None) -> dict[str, Any]:
     except UsageError as error:
         if name is not None:
             raise
-        nothing: dict[str, Any] = {"task": None, "target_labels": [], "target_units": [], "solver": None}
-        return {**nothing, "ik_refuses": str(error)}
-    found: dict[str, Any] = {
+        return {"task": None, "target_labels": [], "target_units": [], "solver": None, "ik_refuses": str(error)}
+    found: Solving = {
         "task": task.name,
-        "target_labels": task.labels,
+        "target_labels": list(task.labels),
         "target_units": units.label_units(task.labels),
         "solver": None,
         "ik_refuses": None,

@@ -14,6 +14,7 @@ from armkin.cli.render import fixed
 from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Pulses
     from armkin.model.arm import Arm
 
 
@@ -64,7 +65,7 @@ def pulses(
         output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
 
 
-def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[dict[str, Any]]:
+def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
     import armkin
     from armkin.motors import motor_names, outside_travel, pulse_units, resolution
 
@@ -77,17 +78,18 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     violations = render.violations(arm, chunk.values, q)
     too_far = outside_travel(arm, r.pulses)
     names = motor_names(arm)
-    constant = {
-        **render.head(arm),
-        "motors": names,
-        "pulse_units": pulse_units(arm),
-        "joint_units": units.names(arm),
-        "resolution": units.joints_out(arm, resolution(arm)).tolist(),
-        "from": origin,
-    }
+    head, kinds, joint_units = render.head(arm), pulse_units(arm), units.names(arm)
+    steps = units.joints_out(arm, resolution(arm)).tolist()
     for i, joints in enumerate(chunk.values.tolist()):
-        answer = {
-            **constant,
+        answer: Pulses = {
+            "robot": head["robot"],
+            "robot_file": head["robot_file"],
+            "robot_sha256": head["robot_sha256"],
+            "motors": names,
+            "pulse_units": kinds,
+            "joint_units": joint_units,
+            "resolution": steps,
+            "from": origin,
             "joints": joints,
             "pulses": r.pulses[i].tolist(),
             "moves": moves[i],
@@ -109,12 +111,12 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         yield answer
 
 
-def _record(answer: dict[str, Any]) -> list[Any]:
+def _record(answer: Pulses) -> list[Any]:
     motion = [*answer["joints"], *answer["pulses"], *answer["actual_joints"]]
     return [*motion, *answer["position_mm"]["actual"], answer["error_mm"], answer["within_limits"]]
 
 
-def _text(arm: Arm, answer: dict[str, Any]) -> str:
+def _text(arm: Arm, answer: Pulses) -> str:
     motors = [["motor", "pulses", "move", ""]]
     columns = (answer["motors"], answer["pulses"], answer["moves"], answer["pulse_units"])
     for name, count, move, unit in zip(*columns, strict=True):

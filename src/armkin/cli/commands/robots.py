@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armkin.cli import output, render
 from armkin.cli.options import Json, Out
+
+if TYPE_CHECKING:
+    from armkin.cli.answers import ShippedRobot
 
 _CAN = ("ik", "pulses", "simulate", "send", "home")
 
@@ -23,7 +26,7 @@ def robots(json: Json = False, out: Out = None) -> None:
         write(render.to_json({"robots": found}) + "\n" if json else _text(found))
 
 
-def _entry(name: str) -> dict[str, Any]:
+def _entry(name: str) -> ShippedRobot:
     import armkin
     from armkin.board.firmware.needs import needs
 
@@ -56,7 +59,7 @@ def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
     return task.name, list(task.labels), [f"hold {free} joint{'s' * (free > 1)} with --lock"] if free > 0 else []
 
 
-def _text(found: list[dict[str, Any]]) -> str:
+def _text(found: list[ShippedRobot]) -> str:
     rows = [["robot", "joints", "task", "target", *_CAN]]
     for entry in found:
         kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])

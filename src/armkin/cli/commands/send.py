@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -84,8 +84,10 @@ def send(
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
         _write_trace(arm, plans, trace)
         with output.destination(None) as write:
-            found = planner.summary(plans)
-            write(render.to_json({**render.head(arm), "dry_run": True, **found}) + "\n" if json else _text(arm, found))
+            summed = planner.summary(plans)
+            write(
+                render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
+            )
         return
     with linking.machine(arm, configuration, port, baud) as machine:
         if machine.prepare(assume_home=assume_home) and assume_home:
@@ -102,7 +104,7 @@ def send(
         with output.progress("ms of motion", whole) as tick:
             machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
         planned = planner.summary(planner.done, began)
-        found = {**planned, "port": machine.session.port.name, **where(machine)}
+        found: dict[str, Any] = {**planned, "port": machine.session.port.name, **where(machine)}
     with output.destination(None) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
@@ -141,7 +143,7 @@ def _write_trace(arm: Arm, plans: Sequence[Cut], path: str | None) -> None:
             began += plan.duration
 
 
-def _arrived(arm: Arm, planned: dict[str, Any], found: dict[str, Any]) -> str:
+def _arrived(arm: Arm, planned: Mapping[str, Any], found: Mapping[str, Any]) -> str:
     """Where the arm stands, and whether that is where the plan ends."""
     text = linking.where_text(arm, found)
     if found["pulses"] is None:
@@ -157,7 +159,7 @@ def _arrived(arm: Arm, planned: dict[str, Any], found: dict[str, Any]) -> str:
     return f"{text}read back: {differs}, {found['duration_s']:.3f} s\n"
 
 
-def _text(arm: Arm, found: dict[str, Any]) -> str:
+def _text(arm: Arm, found: Mapping[str, Any]) -> str:
     """A dry run for people."""
     headings = render.joint_headings(arm)
     speeds = [f"{name}/s" for name in headings]

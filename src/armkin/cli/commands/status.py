@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
@@ -10,6 +10,7 @@ from armkin.cli.options import Json, Robot
 
 if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine
+    from armkin.cli.answers import StatusOfBoard
 
 
 def status(robot: Robot, port: PortName = None, baud: Baud = linking.BAUD, json: Json = False) -> None:
@@ -28,7 +29,7 @@ def status(robot: Robot, port: PortName = None, baud: Baud = linking.BAUD, json:
         write(render.to_json(found) + "\n" if json else linking.where_text(arm, found) + _text(found))
 
 
-def _found(machine: Machine) -> dict[str, Any]:
+def _found(machine: Machine) -> StatusOfBoard:
     from armkin.board.firmware.protocol import Error, Flag, State
     from armkin.board.moving import where
 
@@ -52,7 +53,7 @@ def _found(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _text(found: dict[str, Any]) -> str:
+def _text(found: StatusOfBoard) -> str:
     high = [name for name, level in found["switches"].items() if level]
     low = [name for name, level in found["switches"].items() if not level]
     on = {True: "on", False: "off"}

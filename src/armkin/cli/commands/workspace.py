@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -13,6 +14,7 @@ from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
+    from armkin.cli.answers import Workspace as Answer
     from armkin.reach import Workspace
 
 _MOST = 10**15
@@ -108,21 +110,32 @@ def _points(grid: str) -> list[int]:
     return [whole(word, "--grid", 1, _MOST) for word in words]
 
 
-def _answer(found: Workspace) -> dict[str, Any]:
-    answer: dict[str, Any] = {**render.head(found.arm), "samples": found.samples}
-    for axis, low, high in zip("xyz", (found.low + 0.0).tolist(), (found.high + 0.0).tolist(), strict=True):
-        answer[f"{axis}_mm"] = [low, high]
-    answer["reach_mm"] = list(found.reach)
+def _answer(found: Workspace) -> Answer:
+    x, y, z = ([low, high] for low, high in zip((found.low + 0.0).tolist(), (found.high + 0.0).tolist(), strict=True))
+    head = render.head(found.arm)
+    answer: Answer = {
+        "robot": head["robot"],
+        "robot_file": head["robot_file"],
+        "robot_sha256": head["robot_sha256"],
+        "samples": found.samples,
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+        "reach_mm": list(found.reach),
+        "measures": {name: list(ends) for name, ends in found.measures.items()},
+        "seconds": found.seconds,
+    }
     if found.extent is not None:
         size = found.extent
-        key = "volume_mm3" if size.dimensions == 3 else "area_mm2"
-        answer |= {key: size.value, f"{key.replace('_', '_error_')}": size.error, "method": size.method}
-    answer["measures"] = {name: list(ends) for name, ends in found.measures.items()}
-    answer["seconds"] = found.seconds
+        answer["method"] = size.method
+        if size.dimensions == 3:
+            answer["volume_mm3"], answer["volume_error_mm3"] = size.value, size.error
+        else:
+            answer["area_mm2"], answer["area_error_mm2"] = size.value, size.error
     return answer
 
 
-def _text(answer: dict[str, Any]) -> str:
+def _text(answer: Mapping[str, Any]) -> str:
     rows = [["", "least", "greatest", ""]]
     for name in ("x", "y", "z", "reach"):
         low, high = answer[f"{name}_mm"]

@@ -1,0 +1,322 @@
+"""The JSON of every command: keys, types and what they mean.
+
+`docs/json.md` is written from this file (scripts/json_docs.py); a test holds the two equal, and the
+commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
+"""
+
+# No annotations as text here: a key that may be absent is known by NotRequired at run time.
+from typing import Annotated, Any, Literal, NotRequired, TypedDict
+
+from armkin.board.told import Summary, Where
+
+
+class Head(TypedDict):
+    """What every answer about a robot begins with, so that one command's output can be piped into the next."""
+
+    robot: Annotated[str, "the arm's name"]
+    robot_file: Annotated[str, "as given: a path, or the name of a shipped robot"]
+    robot_sha256: Annotated[str, "of the file's bytes: a changed file is noticed"]
+
+
+class Violation(TypedDict):
+    """A joint outside its limits."""
+
+    joint: str
+    value: Annotated[float, "[deg or mm]"]
+    lower: Annotated[float | None, "null: unlimited"]
+    upper: Annotated[float | None, "null: unlimited"]
+
+
+class Frame(TypedDict):
+    """A frame of the arm."""
+
+    name: Annotated[str, "base, the joint's name, or tool"]
+    position_mm: list[float]
+    rotation: Annotated[list[list[float]], "3 x 3, row by row"]
+
+
+class Fk(Head):
+    """Where the tool is."""
+
+    joints: Annotated[list[float], "as given [deg or mm]"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    position_mm: Annotated[list[float], "of the tool, in the base frame"]
+    rotation: Annotated[list[list[float]], "3 x 3, row by row"]
+    rpy_deg: Annotated[list[float], "roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll)"]
+    quaternion_wxyz: list[float]
+    within_limits: bool
+    violations: list[Violation]
+    frames: Annotated[NotRequired[list[Frame]], "with --frames: base first, tool last"]
+
+
+class Branch(TypedDict):
+    """One branch, modulo whole turns: the legal copy nearest to --near."""
+
+    joints: Annotated[list[float], "[deg or mm]"]
+    name: str
+    within_limits: bool
+    violations: list[Violation]
+    residual_mm: Annotated[float, "distance between the tool and the target"]
+    residual_deg: Annotated[float, "angle between them, where the task has one"]
+    motion: Annotated[float, "sum of |change| from --near in joint units"]
+    turns: Annotated[NotRequired[list[list[float]]], "with --turns: all copies within limits, the nearest first"]
+
+
+class Closest(TypedDict):
+    """The nearest pose within limits."""
+
+    joints: Annotated[list[float], "[deg or mm]"]
+    position_mm: Annotated[list[float], "of the tool"]
+    distance_mm: float
+    angle_deg: float
+    converged: Annotated[bool, "false: the search ended at its bound"]
+    branch: Annotated[str | None, "the branch it is, where only the branch asked for will not do"]
+
+
+class Ik(Head):
+    """All joint values that reach a target."""
+
+    task: str
+    target: Annotated[list[float], "as given [mm, deg]"]
+    target_labels: Annotated[list[str], "names of its numbers"]
+    near: Annotated[list[float], "the pose to stay close to [deg or mm]"]
+    status: Annotated[str, "exact, boundary, singular or unreachable: geometry alone, limits apart"]
+    method: Annotated[str, "the class of solution used"]
+    why: Annotated[str, "why that class applies"]
+    complete: Annotated[bool, "every isolated real branch is guaranteed to be found"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    branch_count: Annotated[int, "found, listed or not"]
+    branches_within_limits: int
+    branches: Annotated[list[Branch], "within limits first, then by motion; all of them with --all-branches"]
+    best: Annotated[int | None, "index of the default answer in `branches`"]
+    closest: Annotated[Closest | None, "whenever `best` is null"]
+    free_joints: Annotated[list[str], "joints whose value does not matter here (a self-motion)"]
+
+
+class PulsePositions(TypedDict):
+    """The tool with and without rounding."""
+
+    theoretical: Annotated[list[float], "for the joint values as given"]
+    actual: Annotated[list[float], "for whole pulses"]
+    difference: Annotated[list[float], "along each axis, without sign"]
+
+
+class Rounded(TypedDict):
+    """Plain rounding, beside --best."""
+
+    pulses: list[int]
+    error_mm: float
+
+
+_From = TypedDict("_From", {"from": Annotated[list[float], "where `moves` begin [deg or mm]"]})
+
+
+class Pulses(Head, _From):
+    """Motor pulses of a pose."""
+
+    motors: Annotated[list[str], "names"]
+    pulse_units: Annotated[list[str], "step, us (RC servos) or count (bus servos)"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    resolution: Annotated[list[float], "what one pulse is worth at each joint [deg or mm]"]
+    joints: Annotated[list[float], "as given [deg or mm]"]
+    pulses: list[int]
+    moves: Annotated[list[int], "signed, from --from"]
+    actual_joints: Annotated[list[float], "where the pulses put the joints [deg or mm]"]
+    position_mm: PulsePositions
+    error_mm: Annotated[float, "distance between the two positions"]
+    within_limits: bool
+    violations: list[Violation]
+    outside_travel: Annotated[list[str], "motors whose servo cannot turn that far"]
+    rounded: Annotated[NotRequired[Rounded], "with --best"]
+    gain_mm: Annotated[NotRequired[float], "with --best: how much nearer the tool is"]
+    tried: Annotated[NotRequired[int], "with --best: pulse vectors compared"]
+
+
+class Workspace(Head):
+    """Where the tip can reach."""
+
+    samples: int
+    x_mm: Annotated[list[float], "[least, greatest]"]
+    y_mm: Annotated[list[float], "[least, greatest]"]
+    z_mm: Annotated[list[float], "[least, greatest]"]
+    reach_mm: Annotated[list[float], "[least, greatest] distance from the base"]
+    volume_mm3: Annotated[NotRequired[float], "an arm that moves in space"]
+    volume_error_mm3: Annotated[NotRequired[float], "bound or estimate, see method"]
+    area_mm2: Annotated[NotRequired[float], "an arm that moves in a plane"]
+    area_error_mm2: Annotated[NotRequired[float], "bound or estimate, see method"]
+    method: Annotated[NotRequired[str], "how volume or area were found"]
+    measures: Annotated[dict[str, list[float]], "each of --measure: [least, greatest]"]
+    seconds: float
+
+
+class Solver(TypedDict):
+    """How targets are solved."""
+
+    method: str
+    why: str
+    complete: bool
+
+
+class Solving(TypedDict):
+    """What `ik` solves for, and how."""
+
+    task: Annotated[str | None, "what ik solves for"]
+    target_labels: list[str]
+    target_units: list[str]
+    solver: Solver | None
+    ik_refuses: Annotated[str | None, "why there is no solver"]
+
+
+class Info(Head, Solving):
+    """What a robot file says."""
+
+    description: str
+    source: str
+    convention: Literal["standard", "modified", "screws"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    joints: Annotated[list[dict[str, Any]], "as in the robot file, with all defaults"]
+    poses: Annotated[dict[str, list[float]], "named joint values, home first [deg or mm]"]
+    base: Annotated[dict[str, list[float]], "xyz, rpy"]
+    tool: Annotated[dict[str, list[float]], "xyz, rpy"]
+    zero_pose: Annotated[dict[str, list[float]] | None, "xyz, rpy; convention screws"]
+    pitch_offset: float
+    reach_mm: Annotated[float, "no point of the chain is farther from its first joint"]
+    motors: Annotated[list[dict[str, Any]], "as in the robot file, with what the chain multiplies to"]
+    one_to_one: Annotated[bool, "each joint has a motor of its own"]
+    resolution: Annotated[list[float] | None, "what one pulse is worth at each joint; null without drives"]
+    gripper: Annotated[dict[str, Any] | None, "as in the robot file"]
+    board: Annotated[dict[str, Any] | None, "as in the robot file"]
+    lacks: Annotated[dict[str, list[str]], "what the file lacks for pulses, simulate, send, home; empty: nothing"]
+
+
+class ShippedRobot(Head):
+    """A robot that comes with armkin."""
+
+    description: str
+    joints: list[str]
+    joint_types: Annotated[list[str], "revolute or prismatic"]
+    task: str | None
+    target_labels: list[str]
+    can: Annotated[dict[str, bool], "ik, pulses, simulate, send, home: as its file stands"]
+    lacks: Annotated[dict[str, list[str]], "what each of them lacks, in words"]
+
+
+class Robots(TypedDict):
+    """The robots that come with armkin."""
+
+    robots: list[ShippedRobot]
+
+
+class Export(Head):
+    """`export --json`: the arm in numbers."""
+
+    length_unit: Literal["mm"]
+    angle_unit: Literal["deg"]
+    joints: Annotated[list[dict[str, Any]], "name, type, unit, screw {w, q or v}, sign, ratio, limits, home, rates"]
+    base: Annotated[list[list[float]], "4 x 4"]
+    zero_pose: Annotated[dict[str, list[float]], "xyz, rpy of the end frame when all joints are 0"]
+    tool: Annotated[dict[str, list[float]], "xyz, rpy after it"]
+    links: Annotated[list[list[list[float]]], "the tool's pose is links[0] Z1(q1) links[1] ... Zn(qn) links[n]"]
+    dh_standard: Annotated[dict[str, Any] | None, "base, rows, tool; null where there is none"]
+    dh_modified: Annotated[dict[str, Any] | None, "base, rows, tool; null where there is none"]
+
+
+class Found(TypedDict):
+    """A serial port."""
+
+    device: str
+    description: str
+    hardware: str
+    board: Annotated[str, "what it looks like; empty if unknown"]
+
+
+class Ports(TypedDict):
+    """Serial ports of this computer."""
+
+    ports: list[Found]
+
+
+class DryRun(Head, Summary):
+    """`send --dry-run`."""
+
+    dry_run: Literal[True]
+
+
+class Send(Head):
+    """`send`: the plan, and where the arm stands after it."""
+
+    port: str
+    waypoints: int
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    joints: Annotated[list[float] | None, "where the board says that it stands [deg or mm]"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    motors: list[str]
+    pulse_units: Annotated[list[str], "step, us or count"]
+    start_pulses: list[int]
+    pulses: Annotated[list[int] | None, "as the board counts"]
+    moves: Annotated[list[int], "planned"]
+    position_mm: list[float] | None
+    position: Annotated[str, "known, retained or lost"]
+    duration_s: float
+    segments: int
+    top_speed: Annotated[list[float], "greatest speed of every joint [deg/s or mm/s]"]
+    top_rate: Annotated[list[float], "greatest rate of every motor [pulses/s]"]
+
+
+class Stands(Head, Where):
+    """`home` and `jog`: where the arm stands after it."""
+
+    port: str
+
+
+class StatusOfBoard(Stands):
+    """`status`: what the board says."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    configured: Annotated[bool, "for this robot file"]
+    state: str
+    error: Annotated[str | None, "why the last session ended"]
+    drivers_on: bool
+    servo_pulses_on: bool
+    abort_input: bool
+    switches: Annotated[dict[str, bool], "levels of the limit inputs"]
+    boots: int
+    reset_cause: int
+
+
+class Grip(Head):
+    """Where the gripper stands."""
+
+    port: str
+    gripper: Annotated[float, "in its drive's degrees (mm with a lead)"]
+    counts: int
+
+
+class Error(TypedDict):
+    """An error under --json, on stderr; besides these keys it has the fields of its kind."""
+
+    error: Annotated[str, "the message, as without --json"]
+    kind: Annotated[str, "usage, file, robot_file, no_solution, no_branch, link, position_lost, ..."]
+    exit_code: Annotated[int, "1 runtime or file, 2 usage, 3 no solution, 4 robot file, 5 link or device"]
+    next: Annotated[NotRequired[str], "what to do, where there is a next step"]
+    notes: Annotated[NotRequired[list[str]], "said before the error"]
+    warnings: Annotated[NotRequired[list[str]], "said before the error"]
+
+
+# Command -> its answers; a command that is not here has no --json.
+ANSWERS: dict[str, tuple[type, ...]] = {
+    "fk": (Fk,),
+    "ik": (Ik,),
+    "pulses": (Pulses,),
+    "workspace": (Workspace,),
+    "info": (Info,),
+    "robots": (Robots,),
+    "export": (Export,),
+    "send": (DryRun, Send),
+    "status": (StatusOfBoard,),
+    "home": (Stands,),
+    "jog": (Stands,),
+    "grip": (Grip,),
+    "ports": (Ports,),
+}

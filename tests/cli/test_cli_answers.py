@@ -1,0 +1,125 @@
+"""The JSON of the commands: what they print is what answers.py says, and docs/json.md says the same."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import types
+from pathlib import Path
+from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
+
+import pytest
+
+from armkin.cli import answers
+from armkin.cli.app import load
+from armkin.cli.commands import COMMANDS
+from command_line import ROOT, run
+
+DOF = "three_dof"
+
+
+def check(value: Any, hint: Any, where: str) -> None:
+    """Hold a JSON value to a type: no key more, none less, no number that is not finite."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if is_typeddict(hint):
+        hints = get_type_hints(hint)
+        assert isinstance(value, dict), where
+        assert not value.keys() - hints.keys(), f"{where}: keys without a type"
+        assert not hint.__required_keys__ - value.keys(), f"{where}: keys missing"
+        for key, inner in value.items():
+            check(inner, hints[key], f"{where}.{key}")
+    elif origin is NotRequired:
+        check(value, parts[0], where)
+    elif origin is Literal:
+        assert value in parts, where
+    elif origin in (Union, types.UnionType):
+        kinds = [part for part in parts if _fits(value, part)]
+        assert kinds, f"{where}: {value!r}"
+        check(value, kinds[0], where)
+    elif origin is list:
+        assert isinstance(value, list), where
+        for i, inner in enumerate(value):
+            check(inner, parts[0], f"{where}[{i}]")
+    elif origin is dict:
+        assert isinstance(value, dict), where
+        for key, inner in value.items():
+            check(inner, parts[1], f"{where}.{key}")
+    elif hint is not Any:
+        assert _fits(value, hint), f"{where}: {value!r}"
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    if hint is type(None):
+        return value is None
+    if hint is float:
+        return type(value) in (int, float) and math.isfinite(value)
+    if hint in (int, str, bool):
+        return type(value) is hint
+    return isinstance(value, dict if is_typeddict(hint) or get_origin(hint) is dict else list)
+
+
+CASES: list[tuple[type, tuple[object, ...]]] = [
+    (answers.Fk, ("fk", DOF, -30, 5, -5)),
+    (answers.Fk, ("fk", DOF, 0, 130, 0, "--frames")),
+    (answers.Ik, ("ik", DOF, 390, 80, 300, "--all-branches", "--turns")),
+    (answers.Ik, ("ik", DOF, 900, 0, 0)),
+    (answers.Ik, ("ik", DOF, 390, 80, 300, "--branch", "right")),
+    (answers.Ik, ("ik", "ur5e", 300, -200, 400, 180, 0, 0)),
+    (answers.Pulses, ("pulses", DOF, -30, 5, -5)),
+    (answers.Pulses, ("pulses", DOF, 0, 130, 0, "--best")),
+    (answers.Workspace, ("workspace", DOF, "--samples", 100, "--measure", "step_error")),
+    (answers.Workspace, ("workspace", "planar_2dof", "--samples", 100)),
+    (answers.Robots, ("robots",)),
+    *((answers.Export, ("export", name)) for name in ("three_dof", "stanford", "ra02_screws", "panda")),
+    (answers.Ports, ("ports",)),
+    (answers.DryRun, ("send", DOF, 10, 20, 30, "--dry-run")),
+    (answers.Send, ("send", DOF, 10, 20, 30, "--port", "sim")),
+    (answers.StatusOfBoard, ("status", DOF, "--port", "sim")),
+    (answers.Stands, ("jog", DOF, "q1", 5, "--seconds", 0.2, "--port", "sim")),
+    (answers.Grip, ("grip", DOF, "closed", "--port", "sim")),
+    *((answers.Info, ("info", path.stem)) for path in sorted((ROOT / "robots").glob("*.yaml"))),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), CASES, ids=lambda part: " ".join(map(str, part)) if type(part) is tuple else ""
+)
+def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...]) -> None:
+    result = run(*words, "--json")
+    assert result.code in (0, 3), result.err
+    check(result.json, kind, kind.__name__)
+    if result.code:
+        error = json.loads(result.err)
+        check({key: error[key] for key in get_type_hints(answers.Error) if key in error}, answers.Error, "Error")
+
+
+def test_a_batch_has_one_a_row() -> None:
+    for line in run("ik", DOF, "--batch", "-", "--json", stdin=b"390,80,300\n900,0,0\n").lines:
+        check(line, answers.Ik, "Ik")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [{}, {"robot": "a", "robot_file": "b"}, {"robot": 1, "robot_file": "b", "robot_sha256": "c"}, [], None],
+)
+def test_a_wrong_answer_is_noticed(value: Any) -> None:
+    with pytest.raises(AssertionError):
+        check(value, answers.Head, "Head")
+
+
+def test_every_command_with_json_has_a_type_and_a_case() -> None:
+    with_json = {name for name in COMMANDS if any("--json" in p.opts for p in load(name).params)}
+    assert with_json == answers.ANSWERS.keys()
+    tried = {kind for kind, _ in CASES}
+    assert {kind for kinds in answers.ANSWERS.values() for kind in kinds} == tried
+
+
+def test_the_page_is_written_from_the_types() -> None:
+    path = ROOT / "scripts" / "json_docs.py"
+    spec = importlib.util.spec_from_file_location("json_docs", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert Path(module.PAGE).read_text() == module.page(), "run scripts/json_docs.py"
