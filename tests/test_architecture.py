@@ -45,7 +45,7 @@ MAY_IMPORT: dict[str, str] = {
     "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",
     "board": "errors hardware formula model forward motors motion board/ports board/firmware board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion reach view board board/ports board/firmware",
+    " motion path_file reach view board board/ports board/firmware",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

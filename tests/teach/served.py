@@ -86,8 +86,8 @@ class Page:
         self._events = self._connection.getresponse()
         assert self._events.status == 200
 
-    def act(self, name: str, **fields: Any) -> tuple[int, Any]:
-        return act(self.server, name, fields, self.id)
+    def act(self, action: str, /, **fields: Any) -> tuple[int, Any]:
+        return act(self.server, action, fields, self.id)
 
     def hear(self, topic: str, until: Callable[[Any], bool] = lambda data: True) -> Any:
         """The next news of a topic that is as it shall be."""

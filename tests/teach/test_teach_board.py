@@ -159,6 +159,22 @@ def test_the_gripper(sim: Page) -> None:
     sim.idle()
 
 
+def test_a_program_is_carried_out_with_the_gripper_in_between(sim: Page) -> None:
+    sim.act("program", do="record", kind="joint", q=POSE)
+    sim.act("program", do="record", kind="grip", value="closed")
+    sim.act("program", do="record", kind="joint", q=[10, 80, -80])
+    assert sim.act("run", speed=100) == (200, {})
+    state = sim.idle()
+    assert state["error"] == ""
+    assert state["joints"] == pytest.approx([10, 80, -80], abs=0.02)
+    assert state["done_s"] == pytest.approx(state["total_s"], abs=0.2)
+    sim.act("program", do="record", kind="joint", q=[10, 130, -80])
+    sim.act("run", speed=100)
+    after = sim.idle()
+    assert "outside" in after["error"]
+    assert after["pulses"] == state["pulses"]  # nothing of it was begun
+
+
 def test_nothing_follows_unless_it_is_told_to(sim: Page) -> None:
     sim.act("look", q=[20, 80, -80])
     time.sleep(0.4)

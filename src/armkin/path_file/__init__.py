@@ -42,7 +42,7 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     except strict_yaml.StrictYamlError as error:
         raise _invalid(name, [(error.line, error.problem)]) from None
     try:
-        return PathFile.model_validate(document.data)
+        return PathFile.model_validate(_lists(document.data))
     except ValidationError as error:
         from armkin.path_file import words
 
@@ -64,6 +64,13 @@ def json_schema() -> dict[str, Any]:
     from armkin.robot_file.schema import made_from
 
     return made_from(PathFile, "armkin path file")
+
+
+def _lists(data: Any) -> Any:
+    """The loader's tuples as lists, which the model's strict types want."""
+    if isinstance(data, dict):
+        return {key: _lists(value) for key, value in data.items()}
+    return [_lists(value) for value in data] if isinstance(data, tuple) else data
 
 
 def _is_yaml(data: bytes) -> bool:

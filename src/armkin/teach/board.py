@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from armkin.board.firmware import gripping, homing, jogging
-from armkin.board.firmware.cutting import plan
+from armkin.board.firmware.cutting import cut, plan
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits
+from armkin.motion.trajectory import Trajectory
 from armkin.teach import guard
 
 if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine
     from armkin.formula.arrays import Array
-    from armkin.teach.desk import Action, Fields
+    from armkin.motion.path_plan import PathPlan
     from armkin.teach.pilot import Pilot
-    from armkin.teach.tabs import Tab
+    from armkin.teach.tabs import Action, Fields, Tab
 
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
 FOLLOW_SPEED = 0.15  # of every joint's max_speed
@@ -31,8 +33,9 @@ _LONGEST_JOG = 60.0  # [s]
 class Board:
     """The page's actions on a board."""
 
-    def __init__(self, pilot: Pilot) -> None:
-        self.pilot, self.arm = pilot, pilot.arm
+    def __init__(self, pilot: Pilot, program: Callable[[Array, float], PathPlan]) -> None:
+        """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
+        self.pilot, self.arm, self.program = pilot, pilot.arm, program
         self.follows = False
         self._alive = 0.0  # until when a jog goes on
         self._jogging: tuple[int, float] | None = None
@@ -44,6 +47,7 @@ class Board:
         return {
             "connect": self.connect,
             "send": self.send,
+            "run": self.run_program,
             "assume_home": self.assume_home,
             "home": self.home,
             "jog": self.jog,
@@ -75,6 +79,13 @@ class Board:
         check_limits(arm, q[None])
         self.check_file()
         self.pilot.submit("send", lambda machine: self._move(machine, q, speed))
+        return {}
+
+    def run_program(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Carry out the page's program from where the arm stands."""
+        speed = guard.number(fields, "speed", 1, 100) / 100
+        self.check_file()
+        self.pilot.submit("run", lambda machine: self._run_program(machine, speed))
         return {}
 
     def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -119,30 +130,12 @@ class Board:
 
     def grip(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Open or close the gripper, or take a value; `assume`: it stands open now, if nothing is known of it."""
-        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
         value = fields.get("value")
-        named = {"open": gripper.open, "closed": gripper.closed}
-        if isinstance(value, str):
-            if value not in named:
-                raise UsageError("value: expected open, closed or a number")
-            target = named[value]
-        else:
-            low, high = sorted((gripper.value(gripper.open), gripper.value(gripper.closed)))
-            target = gripper.count(guard.number(fields, "value", low, high))
-        start = gripper.open if guard.flag(fields, "assume") else None
-
-        def job(machine: Machine) -> None:
-            known = gripping.known(machine, gripper)
-            if not known and start is None and not machine.session.port.simulated:
-                raise LinkError(
-                    "the gripper's position is lost: say first that it stands open\n"
-                    "a servo jumps there at once, at its full speed: keep your fingers out"
-                )
-            gripping.prepare(machine, gripper, None if known else start)
-            gripping.grip(machine, gripper, target)
-
+        wanted = value if isinstance(value, str) else guard.number(fields, "value", -1e6, 1e6)
+        self._grip_count(wanted)
+        assume = guard.flag(fields, "assume")
         self.check_file()
-        self.pilot.submit("grip", job)
+        self.pilot.submit("grip", lambda machine: self._grip(machine, wanted, assume))
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -183,6 +176,53 @@ class Board:
                 "the arm's position is lost: home it, or put it in its home pose and say so; it was not moved"
             )
         machine.prepare()
+
+    def _run_program(self, machine: Machine, speed: float) -> None:
+        """Every part is planned and cut before the first one moves: the gripper's moves stand between them."""
+        self.prepare(machine)
+        plan = self.program(machine.joints(), speed)
+        assert plan.trajectory is not None
+        clock, least = machine.info.clock, machine.info.min_interval
+        at, joints, first = np.array(machine.counts()), plan.trajectory.start, 0
+        parts = []
+        for marker in [*plan.markers, None]:
+            last = len(plan.trajectory.stretches) if marker is None else marker.before
+            part = Trajectory(self.arm, joints, plan.trajectory.stretches[first:last])
+            cuts = cut(part, at, clock=clock, min_interval=least)
+            parts.append((cuts, None if marker is None else marker.value))
+            at, joints, first = cuts.end, part.end, last
+            if marker is not None:
+                self._grip_count(marker.value)
+        before = 0.0
+        for cuts, value in parts:
+            if cuts.duration:
+                began = before
+                machine.run([cuts], lambda done, _, began=began: self._progress(began + done, plan.duration))  # type: ignore[misc]
+                before += cuts.duration
+            if value is not None:
+                self._grip(machine, value, assume=False)
+
+    def _grip_count(self, value: str | float) -> int:
+        """Counts of a gripper's value; UsageError if the arm has no gripper, or it does not go there."""
+        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
+        named = {"open": gripper.open, "closed": gripper.closed}
+        if isinstance(value, str):
+            if value not in named:
+                raise UsageError("value: expected open, closed or a number")
+            return named[value]
+        low, high = sorted((gripper.value(gripper.open), gripper.value(gripper.closed)))
+        return gripper.count(guard.number({"value": value}, "value", low, high))
+
+    def _grip(self, machine: Machine, value: str | float, assume: bool) -> None:
+        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
+        known = gripping.known(machine, gripper)
+        if not known and not assume and not machine.session.port.simulated:
+            raise LinkError(
+                "the gripper's position is lost: say first that it stands open\n"
+                "a servo jumps there at once, at its full speed: keep your fingers out"
+            )
+        gripping.prepare(machine, gripper, gripper.open if assume and not known else None)
+        gripping.grip(machine, gripper, self._grip_count(value))
 
     def _move(self, machine: Machine, q: Array, speed: float) -> None:
         self.run(machine, q[None], speed)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
@@ -11,15 +10,13 @@ from armkin.model import units
 from armkin.teach import guard
 from armkin.teach.guard import RefusedError
 from armkin.teach.look import Question, look
+from armkin.teach.rehearsal import Rehearsal
 from armkin.teach.scene import scene
-from armkin.teach.tabs import Tab, Tabs
+from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.teach.board import Board
-
-Fields = Mapping[str, Any]
-Action = Callable[[Tab, Fields], dict[str, Any]]
 
 
 class Desk:
@@ -33,13 +30,15 @@ class Desk:
         self._solving = threading.Lock()  # one question at a time: two cores are not many
         self._shown: dict[str, Any] = {}
         # Name -> what it does, for the page in control; and what every page may do.
-        self.actions: dict[str, Action] = {"look": self._look}
+        self.rehearsal = Rehearsal(arm, self.stands, lambda state: self.tabs.tell("program", state))
+        self.actions: dict[str, Action] = {"look": self._look, **self.rehearsal.actions()}
         self.free: dict[str, Action] = {"take": self._take, "stop": self._stop}
         if port is not None:
             from armkin.teach.board import Board
             from armkin.teach.pilot import Pilot
 
-            self.board = Board(Pilot(arm, port, baud, lambda state: self.tabs.tell("board", state)))
+            pilot = Pilot(arm, port, baud, lambda state: self.tabs.tell("board", state))
+            self.board = Board(pilot, self.rehearsal.program.plan)
             self.actions |= self.board.actions()
 
     def close(self) -> None:
@@ -68,7 +67,13 @@ class Desk:
             held = (drawn["lock"],) if drawn["lock"] else ()
             self._shown = look(self.arm, Question(self.arm.home, held=held))
         board = None if self.board is None else self.board.pilot.state()
-        return {"tab": tab.id, "scene": scene(self.arm), "look": self._shown, "board": board}
+        return {
+            "tab": tab.id,
+            "scene": scene(self.arm),
+            "look": self._shown,
+            "program": self.rehearsal.program.state(),
+            "board": board,
+        }
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a pose or a target is, with all branches; the other pages see it, too."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from armkin.teach.guard import RefusedError
@@ -37,6 +37,10 @@ class Tab:
                 self._ready.wait(timeout)
             news, self._news = self._news, {}
             return news
+
+
+Fields = Mapping[str, Any]  # of an action's body
+Action = Callable[[Tab, Fields], dict[str, Any]]  # what a page asks for -> what it is told
 
 
 class Tabs:

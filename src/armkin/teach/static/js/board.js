@@ -13,7 +13,7 @@ const WORDS = /** @type {Object<string, string>} */ ({
 export class Board {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {{pose: () => number[], show: (q: number[]) => void, moved: (state: import("./types.js").BoardState) => void,
+   * @param {{pose: () => Promise<number[]>, show: (q: number[]) => void, moved: (state: import("./types.js").BoardState) => void,
    *   trouble: (text: string) => void}} page
    */
   constructor(arm, page) {
@@ -36,7 +36,8 @@ export class Board {
     const number = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (get(id)).valueAsNumber;
     const checked = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (get(id)).checked;
     const click = (/** @type {string} */ id, /** @type {() => void} */ action) => get(id).addEventListener("click", action);
-    click("send", () => this.ask("send", { q: this.page.pose(), speed: number("speed") }));
+    click("send", async () => this.ask("send", { q: await this.page.pose(), speed: number("speed") }));
+    click("run", () => this.ask("run", { speed: number("speed") }));
     click("home", () => this.ask("home"));
     click("connect", () => this.ask("connect"));
     click("here", () => this.state?.joints && this.page.show([...this.state.joints]));
@@ -151,6 +152,7 @@ export class Board {
       /** @type {HTMLButtonElement} */ (get(id)).disabled = when;
     };
     off("send", busy);
+    off("run", busy);
     off("home", busy);
     off("grip", busy);
     off("here", !state.joints);

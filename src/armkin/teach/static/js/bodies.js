@@ -74,7 +74,7 @@ export class Shapes {
     if (!this.arm.gripper) return [];
     const n = this.arm.joints.length;
     const r = this.radius(n);
-    const tool = new Matrix4().set(.../** @type {any} */ (this.arm.links[n].flat()));
+    const tool = new Matrix4().fromArray(this.arm.links[n].flat()).transpose();
     const way = new Vector3(...this.arm.gripper.along);
     return [-1, 1].map((side) => {
       const finger = new BoxGeometry(0.5 * r, 3.2 * r, 0.9 * r);
@@ -132,7 +132,7 @@ export class Figure {
     this.at = after;
     this.tool = tool;
     const put = (/** @type {Group} */ group, /** @type {number[]} */ T) => {
-      group.matrix.set(.../** @type {any} */ (T));
+      group.matrix.fromArray(T).transpose();
       group.matrixWorldNeedsUpdate = true;
     };
     after.forEach((T, i) => {

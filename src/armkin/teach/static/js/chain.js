@@ -22,7 +22,9 @@ export function times(a, b) {
  */
 export function frames(arm, q) {
   let T = arm.links[0].flat();
+  /** @type {Matrix[]} */
   const before = [];
+  /** @type {Matrix[]} */
   const after = [];
   arm.joints.forEach((joint, i) => {
     before.push(T);

@@ -5,6 +5,7 @@ import { get } from "./dom.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
 import { Motors } from "./motors.js";
+import { Program } from "./program.js";
 import { act, enter, Latest } from "./server.js";
 import { Tip } from "./tip.js";
 
@@ -25,8 +26,16 @@ class Page {
     /** @type {import("./view.js").View | null} */
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
+    const pose = async () => {
+      await this.asking.idle();
+      return this.q;
+    };
     this.board = new Board(arm, {
-      pose: () => this.q, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble,
+      pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble,
+    });
+    this.program = new Program(arm, {
+      pose, settled: () => this.ask({}), played: (q) => this.played(q),
+      trail: (tips) => this.view?.trail(tips), trouble,
     });
     this.asking = new Latest((fields) => this.answer(fields));
     get("robot").textContent = arm.robot;
@@ -62,11 +71,20 @@ class Page {
     try {
       const look = /** @type {Look} */ (await act("look", { q: this.q, ...fields }));
       const turned = !fields.target && this.asking.next !== null;
-      if (!turned) this.show(look, fields.target !== undefined);
+      if (!turned) this.show(look, fields.target !== undefined, this.asking.next !== null);
       trouble("");
     } catch (error) {
       trouble(/** @type {Error} */ (error).message);
     }
+  }
+
+  /** The program is played: the arm alone, without asking for every pose. @param {number[]} q */
+  played(q) {
+    if (this.moving) return;
+    this.q = q;
+    this.joints.show(q);
+    this.view?.pose(q);
+    this.view?.haunt([]);
   }
 
   /** The board says where the arm stands. @param {import("./types.js").BoardState} state */
@@ -92,14 +110,18 @@ class Page {
     this.view?.haunt(ghosts);
   }
 
-  /** @param {Look} look @param {boolean} [aimed] whether the pose follows a target */
-  show(look, aimed = false) {
+  /**
+   * @param {Look} look
+   * @param {boolean} [aimed] whether the pose follows a target
+   * @param {boolean} [stale] whether something newer was asked for meanwhile
+   */
+  show(look, aimed = false, stale = false) {
     this.look = look;
     this.q = look.q;
     if (!aimed || look.chosen !== null) this.branch = look.branches[look.chosen ?? -1]?.name ?? this.branch;
     this.joints.show(look.q);
     this.joints.say(look.outside);
-    this.tip.show(look);
+    this.tip.show(look, stale);
     this.motors.show(look);
     if (!this.view || this.moving) return;
     this.view.pose(look.q);
@@ -170,8 +192,8 @@ function theme(/** @type {string} */ name, /** @type {Page} */ page) {
 }
 
 async function start() {
-  /** @type {Page | undefined} */
-  let page;
+  /** @type {{page: Page | null}} of the news that may come before there is a page */
+  const here = { page: null };
   /** @param {{holder: string, pages: number}} news */
   const control = ({ holder, pages }) => {
     const mine = holder === "yours";
@@ -182,11 +204,16 @@ async function start() {
     get("canvas").inert = !mine;
   };
   const opened = await enter(
-    { control, look: (look) => page?.show(look), board: (state) => page?.board.show(state) },
+    {
+      control,
+      look: (look) => here.page?.show(look),
+      program: (state) => here.page?.program.show(state),
+      board: (state) => here.page?.board.show(state),
+    },
     (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : ""),
   );
-  page = new Page(opened.scene, opened.look);
-  const one = page;
+  const one = new Page(opened.scene, opened.look);
+  here.page = one;
   theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light", one);
   get("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark", one));
   get("take").addEventListener("click", () => act("take").catch((error) => trouble(error.message)));
@@ -196,10 +223,15 @@ async function start() {
   };
   get("stop").addEventListener("click", stop);
   /** @type {Object<string, () => void>} */
-  const actions = { g: () => one.board.grip(one.board.open ? "closed" : "open") };
+  const actions = {
+    r: () => one.program.record(),
+    p: () => one.program.player.toggle(),
+    g: () => one.board.grip(one.board.open ? "closed" : "open"),
+  };
   for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);
   keys(actions, (way) => one.nudge(way), stop);
   one.show(opened.look);
+  one.program.show(opened.program);
   if (opened.board) one.board.show(opened.board);
   await one.draw();
   document.documentElement.dataset.ready = "yes";

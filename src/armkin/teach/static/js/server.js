@@ -65,12 +65,19 @@ export class Latest {
     this.busy = false;
     /** @type {any} */
     this.next = null;
+    /** @type {Promise<void>} */
+    this.done = Promise.resolve();
   }
 
   /** @param {any} fields */
   push(fields) {
     this.next = fields;
-    if (!this.busy) this.run();
+    if (!this.busy) this.done = this.run();
+  }
+
+  /** Until nothing is asked any more. */
+  async idle() {
+    while (this.busy) await this.done;
   }
 
   async run() {

@@ -30,8 +30,8 @@ export class Tip {
     get("nearest").addEventListener("click", () => went(this.nearest));
   }
 
-  /** @param {import("./types.js").Look} look */
-  show(look) {
+  /** @param {import("./types.js").Look} look @param {boolean} stale whether the target has changed since */
+  show(look, stale) {
     get("target").hidden = look.task === null;
     if (look.task === null) {
       get("answer").textContent = look.why ?? "";
@@ -41,8 +41,10 @@ export class Tip {
     }
     const { labels = [], units = [], target = [], names = [], chosen = null } = look;
     if (labels.join() !== this.labels) this.build(labels, units);
-    this.target = target;
-    target.forEach((value, i) => show(this.boxes[i], value));
+    if (!stale) {
+      this.target = target;
+      target.forEach((value, i) => show(this.boxes[i], value));
+    }
     this.rows = look.branches.map((branch, k) => ({
       branch, colour: colour(names.indexOf(branch.name)), chosen: k === chosen,
     }));

@@ -18,5 +18,10 @@
  *   chosen?: number|null, closest?: {joints: number[], distance_mm: number, angle_deg: number}|null}} Look
  * @typedef {{port: string, board: string, simulated: boolean, connected: boolean, doing: string, done_s: number,
  *   total_s: number, position: string, pulses: number[]|null, joints: number[]|null, error: string}} BoardState
+ * @typedef {{kind: string, name: string, said: string, blend: number|null}} ProgramMove
+ * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,
+ *   undo: number, redo: number}} ProgramState
+ * @typedef {{duration_s: number, length_mm: number, time: number[], joints: number[][], tips: number[][],
+ *   shares: number[][], stops: number[], end_joints: number[]}} Played
  */
 export {};

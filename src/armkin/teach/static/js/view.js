@@ -1,8 +1,9 @@
 // @ts-check
 /** The 3-D view: drawn when something has changed, never in a loop. */
 import {
-  AmbientLight, AxesHelper, Box3, DirectionalLight, DoubleSide, GridHelper, HemisphereLight, Matrix4, Mesh,
-  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, ShadowMaterial, Vector3, WebGLRenderer,
+  AmbientLight, AxesHelper, Box3, BufferGeometry, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper,
+  HemisphereLight, Line, LineBasicMaterial, Mesh, MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry,
+  Scene, ShadowMaterial, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
@@ -26,6 +27,8 @@ export class View {
     this.camera = new PerspectiveCamera(36, 1, arm.reach / 100, arm.reach * 30);
     this.camera.up.set(0, 0, 1);
     this.waiting = false;
+    /** @type {Line | null} */
+    this.way = null;
     this.shapes = new Shapes(arm);
     this.tube = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.05 });
     this.drum = new MeshStandardMaterial({ roughness: 0.5, metalness: 0.1 });
@@ -39,7 +42,7 @@ export class View {
     const length = 0.14 * arm.reach;
     this.base = new AxesHelper(length);
     this.base.matrixAutoUpdate = false;
-    this.base.matrix.set(.../** @type {any} */ (arm.base.flat()));
+    this.base.matrix.fromArray(arm.base.flat()).transpose();
     this.tool = new AxesHelper(length);
     this.tool.matrixAutoUpdate = false;
     for (const axes of [this.base, this.tool]) axes.setColors(0xd62728, 0x2ca02c, 0x1f4fd6);
@@ -109,7 +112,7 @@ export class View {
   /** @param {number[]} q */
   pose(q) {
     this.solid.pose(q);
-    if (this.solid.tool) this.tool.matrix.set(.../** @type {any} */ (this.solid.tool));
+    if (this.solid.tool) this.tool.matrix.fromArray(this.solid.tool).transpose();
     this.tool.matrixWorldNeedsUpdate = true;
     this.draw();
   }
@@ -150,9 +153,18 @@ export class View {
     return ghost.group.visible;
   }
 
-  /** Where the tip is. @returns {Matrix4} */
-  tip() {
-    return this.tool.matrix;
+  /** Draw the tip's way through a program. @param {number[][]} tips */
+  trail(tips) {
+    if (this.way) {
+      this.scene.remove(this.way);
+      this.way.geometry.dispose();
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new Float32BufferAttribute(tips.flat(), 3));
+    this.way = new Line(geometry, new LineBasicMaterial({ color: 0xd55e00 }));
+    this.way.frustumCulled = false;
+    this.scene.add(this.way);
+    this.draw();
   }
 
   size() {

@@ -1,0 +1,23 @@
+import js from "@eslint/js";
+
+const browser = [
+  "Blob", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver", "URL",
+  "clearInterval", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
+  "requestAnimationFrame", "setInterval", "setTimeout", "window",
+];
+
+export default [
+  js.configs.recommended,
+  {
+    files: ["src/armkin/teach/static/js/*.js"],
+    languageOptions: { globals: Object.fromEntries(browser.map((name) => [name, "readonly"])) },
+    rules: {
+      eqeqeq: "error",
+      "no-implicit-globals": "error",
+      "no-var": "error",
+      "prefer-const": "error",
+      "max-lines": ["error", 300],
+      "no-restricted-properties": ["error", { property: "innerHTML", message: "text is text: use textContent" }],
+    },
+  },
+];

@@ -1,0 +1,270 @@
+"""A program: moves recorded one after another, in the words of a path file, with undo."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin import path_file
+from armkin.errors import UsageError
+from armkin.forward import fk
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.model import units
+from armkin.motion.path import path
+from armkin.path_file.model import KINDS
+from armkin.teach import guard
+from armkin.teach.look import target_out
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+
+MOST = 2000  # moves
+SAMPLES = 1500  # of a plan that the page plays
+_UNDO = 100
+_DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
+_SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
+_NAMED = re.compile(r"^\s*- .*?#\s*(?P<name>.+?)\s*$")
+
+
+class Program:
+    """Moves of one arm. Every edit can be taken back."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm = arm
+        self.head: dict[str, Any] = {}  # start, task, blend, speed, tool_speed, tolerance: as in a path file
+        self.moves: list[dict[str, Any]] = []  # each as in a path file
+        self.names: list[str] = []  # of the moves, "" if none was given
+        self.via: list[float] | None = None  # the point on the way of the arc that is being recorded
+        self._before: list[tuple[Any, ...]] = []
+        self._after: list[tuple[Any, ...]] = []
+
+    def state(self) -> dict[str, Any]:
+        """JSON: what the pages show."""
+        return {
+            "moves": [
+                {"kind": _kind(move), "name": name, "said": _said(move), "blend": move.get("blend")}
+                for move, name in zip(self.moves, self.names, strict=True)
+            ],
+            "blend": self.head.get("blend", 0),
+            "speed": self.head.get("speed", 100),
+            "tool_speed": self.head.get("tool_speed"),
+            "via": self.via is not None,
+            "undo": len(self._before),
+            "redo": len(self._after),
+        }
+
+    def edit(self, fields: Mapping[str, Any]) -> None:
+        """Carry out one edit: `do` names it. Raises UsageError and changes nothing if it makes no sense."""
+        what = guard.text(fields, "do", 20)
+        if what in ("undo", "redo"):
+            back, forth = (self._before, self._after) if what == "undo" else (self._after, self._before)
+            if back:
+                forth.append(self._copy())
+                self._restore(back.pop())
+            return
+        edits = {
+            "record": self._record,
+            "via": self._set_via,
+            "rename": self._rename,
+            "reorder": self._reorder,
+            "delete": self._delete,
+            "clear": self._clear,
+            "blend": self._blend,
+            "settings": self._settings,
+        }
+        if what not in edits:
+            raise UsageError(f"do: '{what}' is none of {', '.join((*edits, 'undo', 'redo'))}")
+        before = self._copy()
+        try:
+            edits[what](fields)
+            if self.moves:
+                path_file.validated(self.document())
+        except Exception:
+            self._restore(before)
+            raise
+        self._before = [*self._before[-_UNDO + 1 :], before]
+        self._after = []
+
+    def document(self) -> dict[str, Any]:
+        """The program as a path file has it."""
+        return {"robot": self.arm.name, **self.head, "moves": self.moves}
+
+    def text(self) -> str:
+        """The program as the text of a path file; names are comments."""
+        lines = [f"robot: {self.arm.name}"]
+        keys = [key for key in path_file.PathFile.model_fields if key in self.head]
+        lines += [f"{key}: {_flow(self.head[key])}" for key in keys]
+        lines.append("moves:")
+        for move, name in zip(self.moves, self.names, strict=True):
+            entries = [f"{key}: {_flow(value)}" for key, value in move.items()]
+            shown = entries[0] if len(entries) == 1 else "{" + ", ".join(entries) + "}"
+            lines.append(f"  - {shown}" + (f"  # {name}" if name else ""))
+        return "\n".join(lines) + "\n"
+
+    def load(self, text: str, name: str) -> None:
+        """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
+        file = path_file.parse(text, name)
+        if file.robot is not None and file.robot != self.arm.name and file.robot != self.arm.path:
+            raise UsageError(f"{name} is a path of {file.robot}, this is {self.arm.name}")
+        data = file.model_dump(exclude_unset=True, exclude_none=True)
+        data.pop("robot", None)
+        moves = data.pop("moves")
+        if len(moves) > MOST:
+            raise UsageError(f"{name} has {len(moves)} moves; the page takes {MOST}")
+        self._before = [*self._before[-_UNDO + 1 :], self._copy()]
+        self._after = []
+        self.head, self.moves, self.via = data, moves, None
+        items = [line for line in text.splitlines() if line.lstrip().startswith("- ")]
+        found = [_NAMED.match(line) for line in items]
+        named = [match["name"][:60] if match else "" for match in found]
+        self.names = named if len(named) == len(moves) else [""] * len(moves)
+
+    def plan(self, start: Array | None, speed: float = 1.0) -> PathPlan:
+        """The motion; start: (n,) [rad | mm] where the arm stands, None: in its home pose; speed: a fraction."""
+        if not self.moves:
+            raise UsageError("the program has no moves: record one")
+        return path(self.arm, path_file.validated(self.document()), start=start, speed=speed)
+
+    # Edits
+
+    def _record(self, fields: Mapping[str, Any]) -> None:
+        """Append a move to the pose q, or put it behind `index`."""
+        if len(self.moves) >= MOST:
+            raise UsageError(f"a program has at most {MOST} moves")
+        kind = guard.text(fields, "kind", 20)
+        at = len(self.moves) if fields.get("index") is None else guard.whole(fields, "index", len(self.moves)) + 1
+        self.moves.insert(at, self._move(kind, fields))
+        self.names.insert(at, "")
+
+    def _move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+        if kind == "wait":
+            return {"wait": guard.number(fields, "seconds", 0, 3600)}
+        if kind == "grip":
+            value = guard.text(fields, "value", 10)
+            if value not in ("open", "closed"):
+                raise UsageError("value: expected open or closed")
+            return {"grip": value}
+        values = guard.numbers(fields, "q", self.arm.n)
+        if kind == "joint":
+            return {"joint": _rounded(values)}
+        target = self._target(values)
+        if kind == "line":
+            return {"line": target}
+        if kind == "arc":
+            if self.via is None:
+                raise UsageError("an arc needs a point on its way: set it first")
+            via, self.via = self.via, None
+            return {"arc": {"via": via, "to": target}}
+        raise UsageError(f"kind: '{kind}' is none of joint, line, arc, wait, grip")
+
+    def _target(self, values: Sequence[float]) -> list[float]:
+        q = units.joints_in(self.arm, values)
+        task = task_for(self.arm, self.head.get("task"))
+        return _rounded(target_out(task, targets_of(task, fk(self.arm, q)[None], q[None])[0]))
+
+    def _set_via(self, fields: Mapping[str, Any]) -> None:
+        q = units.joints_in(self.arm, guard.numbers(fields, "q", self.arm.n))
+        self.via = _rounded(fk(self.arm, q)[:3, 3].tolist())
+
+    def _rename(self, fields: Mapping[str, Any]) -> None:
+        self.names[self._index(fields)] = " ".join(guard.text(fields, "name", 60).replace("#", "").split())
+
+    def _reorder(self, fields: Mapping[str, Any]) -> None:
+        at, to = self._index(fields), guard.whole(fields, "to", len(self.moves))
+        self.moves.insert(to, self.moves.pop(at))
+        self.names.insert(to, self.names.pop(at))
+
+    def _delete(self, fields: Mapping[str, Any]) -> None:
+        at = self._index(fields)
+        del self.moves[at], self.names[at]
+
+    def _clear(self, fields: Mapping[str, Any]) -> None:
+        self.moves, self.names, self.head, self.via = [], [], {}, None
+
+    def _blend(self, fields: Mapping[str, Any]) -> None:
+        """A move's own blend radius; null: the program's."""
+        move = self.moves[self._index(fields)]
+        if fields.get("blend") is None:
+            move.pop("blend", None)
+        else:
+            move["blend"] = guard.number(fields, "blend", 0, 1e6)
+
+    def _settings(self, fields: Mapping[str, Any]) -> None:
+        for key in _SETTINGS:
+            if key in fields:
+                if fields[key] is None:
+                    self.head.pop(key, None)
+                else:
+                    self.head[key] = guard.number(fields, key, 0, 1e6)
+
+    def _index(self, fields: Mapping[str, Any]) -> int:
+        if not self.moves:
+            raise UsageError("the program has no moves")
+        return guard.whole(fields, "index", len(self.moves))
+
+    def _copy(self) -> tuple[Any, ...]:
+        return copy.deepcopy((self.head, self.moves, self.names, self.via))
+
+    def _restore(self, before: tuple[Any, ...]) -> None:
+        self.head, self.moves, self.names, self.via = before
+
+
+def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
+    """A plan as the page plays it: joint values over time, the tip's way, speeds as shares of the limits."""
+    count = int(min(SAMPLES, max(2, math.ceil(plan.duration / 0.02) + 1)))
+    begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
+    t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
+    q = plan.q(t)
+    with np.errstate(invalid="ignore"):
+        shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)
+    return {
+        "duration_s": plan.duration,
+        "length_mm": plan.length,
+        "time": t.round(4).tolist(),
+        "joints": units.joints_out(arm, q).round(5).tolist(),
+        "tips": fk(arm, q)[:, :3, 3].round(3).tolist(),
+        "shares": shares.round(4).T.tolist(),
+        "stops": [round(begin, 4) for begin in begins],
+        "end_joints": units.joints_out(arm, plan.q(plan.duration)).tolist(),
+    }
+
+
+def _kind(move: Mapping[str, Any]) -> str:
+    return next(kind for kind in KINDS if kind in move)
+
+
+def _said(move: Mapping[str, Any]) -> str:
+    """A move's figures for people."""
+    value = move[_kind(move)]
+    if isinstance(value, dict) and "to" in value:
+        return ", ".join(f"{x:.1f}" for x in value["to"])
+    if isinstance(value, list) and value and isinstance(value[0], int | float):
+        return ", ".join(f"{x:.1f}" for x in value)
+    return str(value)
+
+
+def _rounded(values: Sequence[float]) -> list[float]:
+    return [round(float(value), _DIGITS) + 0.0 for value in values]
+
+
+def _flow(value: Any) -> str:
+    """A value in YAML's flow style."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, float):
+        text = repr(value)
+        return text if "e" not in text else f"{value:.12f}".rstrip("0")
+    if isinstance(value, str) and re.fullmatch(r"[A-Za-z][\w ]*", value) and value not in ("yes", "no", "on", "off"):
+        return value
+    return json.dumps(value)

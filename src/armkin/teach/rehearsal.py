@@ -1,0 +1,63 @@
+"""The page's actions on its program: edits, plans to be played, the path file's text."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from armkin.motors import joints as joints_of
+from armkin.teach import guard
+from armkin.teach.program import Program, played
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.teach.tabs import Action, Fields, Tab
+
+
+class Rehearsal:
+    """One program that all pages show; `tell` hears it whenever it changes."""
+
+    def __init__(
+        self, arm: Arm, stands: Callable[[], tuple[int, ...] | None], tell: Callable[[dict[str, Any]], None]
+    ) -> None:
+        self.arm, self.program = arm, Program(arm)
+        self._stands, self._tell = stands, tell
+        self._lock = threading.Lock()
+
+    def actions(self) -> dict[str, Action]:
+        """Name -> action, for the page in control."""
+        return {"program": self.edit, "plan": self.plan, "save": self.save, "load": self.load}
+
+    def start(self) -> Array | None:
+        """Joint values where the arm stands; None if that is not known."""
+        counts = self._stands()
+        return None if counts is None else joints_of(self.arm, counts)
+
+    def edit(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """One edit of the program."""
+        with self._lock:
+            self.program.edit(fields)
+            return self._told()
+
+    def load(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Take a path file's text as the program."""
+        with self._lock:
+            self.program.load(guard.text(fields, "text", guard.LARGEST), guard.text(fields, "name"))
+            return self._told()
+
+    def save(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """The text of a path file, for `armkin path` and `armkin send --path`."""
+        with self._lock:
+            return {"text": self.program.text(), "name": f"{self.arm.name}_path.yaml"}
+
+    def plan(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """The program's motion from where the arm stands, else from home: to be played."""
+        with self._lock:
+            return played(self.arm, self.program.plan(self.start()))
+
+    def _told(self) -> dict[str, Any]:
+        state = self.program.state()
+        self._tell(state)
+        return state

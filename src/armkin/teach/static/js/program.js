@@ -1,0 +1,146 @@
+// @ts-check
+/** The program: record, name, reorder, delete, undo; save and load the path file. */
+import { fixed, get, make } from "./dom.js";
+import { Player } from "./player.js";
+import { act, Latest } from "./server.js";
+
+export class Program {
+  /**
+   * @param {import("./types.js").Arm} arm
+   * @param {{pose: () => Promise<number[]>, settled: () => void, played: (q: number[]) => void,
+   *   trail: (tips: number[][]) => void, trouble: (text: string) => void}} page
+   */
+  constructor(arm, page) {
+    this.page = page;
+    this.player = new Player(arm, page.played, page.settled);
+    this.chosen = -1;
+    this.count = 0;
+    this.planning = new Latest(() => this.plan());
+    const click = (/** @type {string} */ id, /** @type {() => void} */ action) => get(id).addEventListener("click", action);
+    click("record", () => this.record());
+    click("via", async () => this.edit({ do: "via", q: await page.pose() }));
+    click("undo", () => this.edit({ do: "undo" }));
+    click("redo", () => this.edit({ do: "redo" }));
+    click("clear", () => this.edit({ do: "clear" }));
+    click("save", () => this.save());
+    click("add-wait", () => this.edit({ do: "record", kind: "wait", seconds: 1 }));
+    click("add-open", () => this.edit({ do: "record", kind: "grip", value: "open" }));
+    click("add-close", () => this.edit({ do: "record", kind: "grip", value: "closed" }));
+    get("add-open").hidden = get("add-close").hidden = arm.gripper === null;
+    const file = /** @type {HTMLInputElement} */ (get("load"));
+    file.addEventListener("change", async () => {
+      const [chosen] = file.files ?? [];
+      if (chosen) await this.change("load", { text: await chosen.text(), name: chosen.name });
+      file.value = "";
+    });
+    for (const key of ["blend", "speed", "tool_speed"]) {
+      const box = /** @type {HTMLInputElement} */ (get(`program-${key}`));
+      box.addEventListener("change", () => this.edit({ do: "settings", [key]: box.value === "" ? null : box.valueAsNumber }));
+    }
+  }
+
+  async record() {
+    const kind = /** @type {HTMLSelectElement} */ (get("kind")).value;
+    const index = this.chosen >= 0 && this.chosen < this.count - 1 ? { index: this.chosen } : {};
+    this.chosen = index.index === undefined ? -1 : this.chosen + 1;
+    await this.edit({ do: "record", kind, q: await this.page.pose(), ...index });
+  }
+
+  /** @param {object} fields */
+  edit(fields) {
+    return this.change("program", fields);
+  }
+
+  /** @param {string} action @param {object} fields */
+  async change(action, fields) {
+    try {
+      this.show(await act(action, fields));
+      this.page.trouble("");
+    } catch (error) {
+      this.page.trouble(/** @type {Error} */ (error).message);
+    }
+  }
+
+  async plan() {
+    if (!this.count) {
+      this.player.load(null);
+      this.page.trail([]);
+      get("planned").textContent = "";
+      return;
+    }
+    try {
+      const plan = /** @type {import("./types.js").Played} */ (await act("plan"));
+      this.player.load(plan);
+      this.page.trail(plan.tips);
+      get("planned").textContent = `${fixed(plan.duration_s, 3)} s, ${fixed(plan.length_mm, 1)} mm on the tool's way`;
+      get("planned").className = "";
+    } catch (error) {
+      this.player.load(null);
+      this.page.trail([]);
+      get("planned").textContent = /** @type {Error} */ (error).message;
+      get("planned").className = "bad";
+    }
+  }
+
+  async save() {
+    try {
+      const { text, name } = await act("save");
+      const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/yaml" })), download: name });
+      link.click();
+      URL.revokeObjectURL(link.href);
+    } catch (error) {
+      this.page.trouble(/** @type {Error} */ (error).message);
+    }
+  }
+
+  /** @param {import("./types.js").ProgramState} state */
+  show(state) {
+    this.count = state.moves.length;
+    this.chosen = Math.min(this.chosen, this.count - 1);
+    const focused = document.activeElement?.closest("#moves") ? document.activeElement.id : "";
+    get("moves").replaceChildren(...state.moves.map((move, k) => this.row(move, k)));
+    if (focused) document.getElementById(focused)?.focus();
+    const off = (/** @type {string} */ id, /** @type {boolean} */ when) => {
+      /** @type {HTMLButtonElement} */ (get(id)).disabled = when;
+    };
+    off("undo", !state.undo);
+    off("redo", !state.redo);
+    off("clear", !this.count);
+    off("save", !this.count);
+    get("via").setAttribute("aria-pressed", String(state.via));
+    for (const key of /** @type {("blend"|"speed"|"tool_speed")[]} */ (["blend", "speed", "tool_speed"])) {
+      const box = /** @type {HTMLInputElement} */ (get(`program-${key}`));
+      if (document.activeElement !== box) box.value = state[key] === null ? "" : String(state[key]);
+    }
+    this.planning.push({});
+  }
+
+  /** @param {import("./types.js").ProgramMove} move @param {number} k */
+  row(move, k) {
+    const said = `move ${k + 1}`;
+    const name = make("input", { type: "text", maxlength: "60", placeholder: move.said, "aria-label": `name of ${said}`, id: `name-${k}` });
+    name.value = move.name;
+    name.addEventListener("change", () => this.edit({ do: "rename", index: k, name: name.value }));
+    name.addEventListener("focus", () => (this.chosen = k));
+    const button = (/** @type {string} */ sign, /** @type {string} */ text, /** @type {object} */ fields, /** @type {boolean} */ off) => {
+      const one = make("button", { type: "button", "aria-label": `${text} ${said}`, id: `${text.replace(/ /g, "-")}-${k}` }, sign);
+      one.disabled = off;
+      one.addEventListener("click", () => this.edit({ ...fields, index: k }));
+      return one;
+    };
+    const moves = ["joint", "line", "arc", "point", "spline", "polyline", "circle", "offset"].includes(move.kind);
+    const blend = make("input", {
+      type: "number", min: "0", step: "1", placeholder: "blend", "aria-label": `blend radius of ${said} in mm`, id: `blend-${k}`,
+    });
+    blend.value = move.blend === null ? "" : String(move.blend);
+    blend.disabled = !moves;
+    blend.addEventListener("change", () => this.edit({ do: "blend", index: k, blend: blend.value === "" ? null : blend.valueAsNumber }));
+    return make(
+      "li", { title: `${move.kind}: ${move.said}` },
+      make("span", { class: "kind" }, `${k + 1} ${move.kind}`), name, blend,
+      button("↑", "move up", { do: "reorder", to: k - 1 }, k === 0),
+      button("↓", "move down", { do: "reorder", to: k + 1 }, k === this.count - 1),
+      button("✕", "delete", { do: "delete" }, false),
+    );
+  }
+}
