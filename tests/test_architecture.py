@@ -38,14 +38,15 @@ MAY_IMPORT: dict[str, str] = {
     "view": "errors formula model forward",
     "plot": "errors files formula model forward view reach",
     "board/ports": "errors",
-    "board/firmware": "errors hardware formula model motors motion board/ports robot_file",
+    "board/firmware": "board/backend errors hardware formula model motors motion board/ports robot_file",
     "board/backend": "formula model motion board/ports",
     "board/grbl": "errors formula model motors motion board/ports board/backend",
-    "board/feetech": "errors formula model motors motion board/ports board/backend",
+    "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",
-    "board": "errors hardware formula model forward motors motion board/ports board/firmware board/sim",
+    "board": "errors hardware formula model forward motors motion board/ports board/backend board/firmware"
+    " board/grbl board/feetech board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion path_file reach view board board/ports board/firmware",
+    " motion path_file reach view board board/ports board/backend board/firmware",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

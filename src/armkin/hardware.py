@@ -58,6 +58,25 @@ BOARDS = {
 
 
 @dataclass(frozen=True)
+class ForeignBoard:
+    """A board with somebody else's firmware, or a bus of servos."""
+
+    kind: str
+    motors: str  # the kind of drive that it takes: stepper or bus
+    axes: tuple[str, ...]  # names of its axes; a bus goes by ids
+    baud: int
+
+
+FOREIGN = {
+    board.kind: board
+    for board in (
+        ForeignBoard("grbl", "stepper", ("X", "Y", "Z", "A", "B", "C"), 115_200),
+        ForeignBoard("feetech", "bus", (), 1_000_000),
+    )
+}
+
+
+@dataclass(frozen=True)
 class Driver:
     """What a stepper driver's data sheet asks for; times in 0.1 us, `wake` in ms."""
 

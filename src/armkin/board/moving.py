@@ -5,12 +5,13 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.cutting import Cut, plan
+from armkin.board.firmware.cutting import plan
+from armkin.board.foreign import Foreign
 from armkin.board.told import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
@@ -18,8 +19,8 @@ from armkin.model import units
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:
+    from armkin.board.backend import Backend, Planned
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.machine import Machine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -29,31 +30,39 @@ _AHEAD = 1000  # rows that are read before they are planned
 class Planner:
     """Plans for one arm at one speed, and what they come to."""
 
-    def __init__(self, arm: Arm, configuration: Configuration, speed: float) -> None:
+    def __init__(self, arm: Arm, board: Configuration | Foreign, speed: float) -> None:
         self.arm, self.speed = arm, speed
-        self.done: list[Cut] = []
-        self.use(configuration.board.clock, configuration.board.min_interval)
+        self.done: list[Planned] = []
+        self._plan: Callable[[Sequence[int], Array, float], Planned]
+        if isinstance(board, Foreign):
+            self._plan = board.plan
+        else:
+            self.use(board.board.clock, board.board.min_interval)
 
     def use(self, clock: int, min_interval: int) -> None:
         """Take the figures of the board that is there."""
-        self.clock, self.min_interval = clock, min_interval
+
+        def cut(start: Sequence[int], q: Array, speed: float) -> Planned:
+            return plan(self.arm, start, q, speed=speed, clock=clock, min_interval=min_interval)
+
+        self._plan = cut
 
     def counts(self, q: Array) -> list[int]:
         """Counts at joint values."""
         return list(pulses(self.arm, q).tolist())
 
-    def plan(self, start: Sequence[int], q: Array) -> Cut:
+    def plan(self, start: Sequence[int], q: Array) -> Planned:
         """A plan through joint values (w, n) [rad | mm]."""
-        return plan(self.arm, start, q, speed=self.speed, clock=self.clock, min_interval=self.min_interval)
+        return self._plan(start, q, self.speed)
 
-    def noted(self, plans: Iterable[Cut | None]) -> Iterator[Cut | None]:
+    def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
         """The same plans, remembered for the summary."""
         for made in plans:
             if made is not None:
                 self.done.append(made)
             yield made
 
-    def summary(self, plans: Sequence[Cut], start: Sequence[int] | None = None) -> Summary:
+    def summary(self, plans: Sequence[Planned], start: Sequence[int] | None = None) -> Summary:
         """JSON: what the plans come to."""
         arm = self.arm
         first = list(start) if start is not None else plans[0].start.tolist()
@@ -62,7 +71,7 @@ class Planner:
         rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
         end = joints(arm, last)
         return {
-            "waypoints": sum(len(plan.ends) for plan in plans),
+            "waypoints": sum(len(plan.trajectory.stretches) for plan in plans),
             "start_joints": units.joints_out(arm, joints(arm, first)).tolist(),
             "joints": units.joints_out(arm, end).tolist(),
             "joint_units": units.names(arm),
@@ -100,7 +109,7 @@ class Stream:
             self._rows.put(error)
         self._rows.put(None)
 
-    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Cut | None]:
+    def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Planned | None]:
         """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
         at, empty = list(start), True
         while True:
@@ -126,7 +135,7 @@ class Stream:
         if empty:
             self.problem = UsageError("there are no rows: nothing was moved")
 
-    def whole(self, planner: Planner, start: Sequence[int]) -> list[Cut]:
+    def whole(self, planner: Planner, start: Sequence[int]) -> list[Planned]:
         """All plans, once the last row has come. Raises what is wrong with one."""
         plans = []
         for made in self.plans(planner, start):
@@ -139,7 +148,7 @@ class Stream:
         return plans
 
 
-def where(machine: Machine) -> Where:
+def where(machine: Backend) -> Where:
     """Where the arm stands, as JSON [deg | mm]."""
     arm = machine.arm
     known = machine.position() != "lost"

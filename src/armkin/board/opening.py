@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from armkin.board.backend import Backend, StoppedError
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.session import StoppedError
+from armkin.board.foreign import Foreign
 from armkin.board.ports import BAUD, SIM, Port, SerialPort
 
 if TYPE_CHECKING:
@@ -28,6 +29,27 @@ def open_port(name: str, *, board: Board, baud: int = BAUD, paced: bool = False)
 
         return (PacedSimPort if paced else SimPort)(SimBoard(board))
     return SerialPort(name, baud)
+
+
+@contextmanager
+def open_backend(
+    arm: Arm,
+    board: Configuration | Foreign,
+    port: str,
+    *,
+    baud: int | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[Backend]:
+    """The arm on a board of any kind behind a port, given back at the end; baud: by default the kind's own."""
+    if not isinstance(board, Foreign):
+        with open_machine(arm, board, port, baud=baud or BAUD, stop=stop) as machine:
+            yield machine
+        return
+    link = board.simulated() if port == SIM else SerialPort(port, baud or board.board.baud)
+    try:
+        yield board.machine(link, stop)
+    finally:
+        link.close()
 
 
 @contextmanager

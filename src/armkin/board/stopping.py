@@ -6,7 +6,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from armkin.board.firmware.session import StoppedError
+from armkin.board.backend import StoppedError
 
 
 class Stop:

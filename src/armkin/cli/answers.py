@@ -285,6 +285,71 @@ class StatusOfBoard(Stands):
     reset_cause: int
 
 
+class StatusOfGrbl(Stands):
+    """`status` of a board of kind grbl."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    state: Annotated[str, "as GRBL says it: idle, run, hold, alarm, ..."]
+    inputs: Annotated[str, "letters of the active ones: limits X Y Z A B C, probe P, door D"]
+    settings: Annotated[list[str], "those that differ from the robot file, in words"]
+
+
+class Servo(TypedDict):
+    """What a bus servo says of itself."""
+
+    name: Annotated[str, "of the motor"]
+    id: int
+    torque: Annotated[bool, "whether its motor is on"]
+    load_percent: Annotated[float, "of its greatest torque"]
+    voltage: float
+    temperature: Annotated[int, "[deg C]"]
+    errors: Annotated[list[str], "voltage, angle sensor, overheating, overcurrent, overload"]
+
+
+class StatusOfServos(Stands):
+    """`status` of a board of kind feetech."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    servos: list[Servo]
+
+
+class Difference(TypedDict):
+    """A setting of a board that is not as the robot file wants it."""
+
+    setting: Annotated[int, "its number, as in $100"]
+    what: str
+    found: Annotated[float | None, "null: the board has no such setting"]
+    wanted: float
+    serious: Annotated[bool, "motion would be wrong or too fast; otherwise only slower"]
+
+
+class Setup(Head):
+    """`setup`: a board's settings against the robot file."""
+
+    port: str
+    firmware: str
+    differences: Annotated[list[Difference], "as found, before anything was written"]
+    written: bool
+
+
+class Zero(Head):
+    """`zero`: where the zero of bus servos is."""
+
+    port: str
+    counts: Annotated[list[int], "of every servo, in the pose given"]
+    zero: Annotated[list[int], "of every drive"]
+
+
+class GripOfServo(Head):
+    """`grip` on a servo bus."""
+
+    port: str
+    gripper: Annotated[float, "where it came to rest, in its drive's degrees"]
+    target: float
+
+
 class Grip(Head):
     """Where the gripper stands."""
 
@@ -314,9 +379,11 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "robots": (Robots,),
     "export": (Export,),
     "send": (DryRun, Send),
-    "status": (StatusOfBoard,),
+    "status": (StatusOfBoard, StatusOfGrbl, StatusOfServos),
     "home": (Stands,),
     "jog": (Stands,),
-    "grip": (Grip,),
+    "grip": (Grip, GripOfServo),
+    "setup": (Setup,),
+    "zero": (Zero,),
     "ports": (Ports,),
 }

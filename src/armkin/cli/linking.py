@@ -12,8 +12,10 @@ from armkin.cli import completion, output, render
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
+    from armkin.board.backend import Backend
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
+    from armkin.board.foreign import Foreign
     from armkin.model.arm import Arm
 
 PortName = Annotated[
@@ -29,7 +31,9 @@ PortName = Annotated[
         "[default: ARMKIN_PORT, else the only board that answers]",
     ),
 ]
-Baud = Annotated[int, typer.Option("--baud", metavar="N", help="The firmware's rate.")]
+Baud = Annotated[
+    int | None, typer.Option("--baud", metavar="N", help="The port's rate. [default: what the kind of board uses]")
+]
 AssumeHome = Annotated[
     bool,
     typer.Option(
@@ -62,17 +66,63 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
 
 
 @contextmanager
+def backend(
+    arm: Arm, board: Configuration | Foreign, port: str | None, baud: int | None, *, simulated: str = _AT_HOME
+) -> Iterator[Backend]:
+    """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first."""
+    from armkin.board.backend import StoppedError
+    from armkin.board.foreign import Foreign
+    from armkin.board.opening import open_backend
+    from armkin.board.stopping import stoppable
+
+    port = foreign_port(port, board) if isinstance(board, Foreign) else port_name(port, board, baud or BAUD)
+    if port == SIM:
+        output.note(simulated)
+    with stoppable() as stop, open_backend(arm, board, port, baud=baud, stop=stop) as one:
+        for difference in one.differences if port != SIM else ():
+            output.note(difference)
+        try:
+            yield one
+        except StoppedError:
+            output.warn(f"stopped: {one.standing()}")
+            raise
+
+
+def foreign_port(given: str | None, board: Foreign) -> str:
+    """The port given; who listens at the others is not tried, because other machines speak these languages, too."""
+    if given is None:
+        raise UsageError(
+            f"--port is missing: boards of kind {board.board.kind} are not looked for\n"
+            "armkin ports lists them, ARMKIN_PORT names one for every command; sim is a board in this process"
+        )
+    return given
+
+
+def foreign(arm: Arm) -> Foreign | None:
+    """The arm's board if it does not run armkin's firmware."""
+    from armkin.board.foreign import foreign
+
+    return foreign(arm)
+
+
+def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
+    """The arm's board: one with our firmware, or a foreign one."""
+    return foreign(arm) or configured(arm, rehearsal=rehearsal)
+
+
+@contextmanager
 def machine(
-    arm: Arm, configuration: Configuration, port: str | None, baud: int, *, simulated: str = _AT_HOME
+    arm: Arm, configuration: Configuration, port: str | None, baud: int | None, *, simulated: str = _AT_HOME
 ) -> Iterator[Machine]:
     """The arm on the board behind a port, given back at the end; a signal stops the arm first.
 
     simulated: what to say of a board in this process.
     """
-    from armkin.board.firmware.session import StoppedError
+    from armkin.board.backend import StoppedError
     from armkin.board.opening import open_machine
     from armkin.board.stopping import stoppable
 
+    baud = baud or BAUD
     port = port_name(port, configuration, baud)
     if port == SIM:
         output.note(simulated)

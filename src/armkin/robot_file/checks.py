@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin.hardware import BOARDS
+from armkin.hardware import BOARDS, FOREIGN
 from armkin.robot_file.model import Triple, dot
 
 if TYPE_CHECKING:
@@ -306,8 +306,13 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
     used: set[str] = set()
     numbers: set[int] = set()
     for path, drive in drives:
+        foreign = None if robot.board is None else FOREIGN.get(robot.board.kind)
         if drive.kind == "bus" and robot.board is not None and robot.board.kind in BOARDS:
             yield (*path, "kind"), f"{robot.board.kind} has no bus; leave board out, or name one that has"
+        if foreign is not None and path[0] == "gripper" and drive.kind != foreign.motors:
+            continue  # a gripper of another kind is not this board's: `armkin grip` refuses
+        if foreign is not None and drive.kind != foreign.motors:
+            yield (*path, "kind"), f"{foreign.kind} takes drives of kind {foreign.motors} alone, not {drive.kind}"
         if drive.id is not None:
             if drive.id in numbers:
                 yield (*path, "id"), f"{drive.id} is used already; each servo has its own number on the bus"
@@ -319,8 +324,11 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
         used.add(drive.axis)
         if robot.board is None:
             continue
-        board = BOARDS[robot.board.kind]
-        allowed = board.steppers if drive.kind == "stepper" else board.servos
+        if foreign is not None:
+            allowed = foreign.axes
+        else:
+            board = BOARDS[robot.board.kind]
+            allowed = board.steppers if drive.kind == "stepper" else board.servos
         if drive.axis not in allowed:
             what = f"{robot.board.kind} has no {drive.kind} axis {drive.axis}"
             yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
@@ -329,6 +337,11 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
 
 
 def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
+    if settings.kind in FOREIGN:
+        for key in ("driver", "enable", "abort"):
+            if getattr(settings, key) is not None:
+                yield ("board", key), f"{settings.kind} has settings of its own for this; remove it"
+        return
     board = BOARDS[settings.kind]
     if not board.steppers:
         for key in ("driver", "enable"):

@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from armkin.board.backend import StoppedError
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.session import StoppedError
 from armkin.board.opening import open_port
 from armkin.board.ports import SIM
 from armkin.errors import ArmkinError, LinkError

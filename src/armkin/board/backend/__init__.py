@@ -23,7 +23,11 @@ Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
 
 class StoppedError(Exception):
-    """The operator asked to stop, and the arm stands."""
+    """The operator asked to stop: the arm stands, `status` says where (None: it was not asked yet)."""
+
+    def __init__(self, status: Any = None) -> None:
+        super().__init__("stopped")
+        self.status = status
 
 
 class Planned(Protocol):
@@ -59,7 +63,10 @@ class Backend(Protocol):
 
     arm: Arm
     port: Port
-    differences: tuple[str, ...]  # what this kind of board cannot promise, for people
+
+    @property
+    def differences(self) -> tuple[str, ...]:
+        """What this kind of board cannot promise, for people."""
 
     def position(self) -> Position:
         """Whether the board knows where the arm stands."""
@@ -76,7 +83,7 @@ class Backend(Protocol):
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
 
-    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
+    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> object:
         """Carry out plans, one after another; None in between: nothing to do yet."""
 
     def standing(self) -> str:

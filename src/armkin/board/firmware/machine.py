@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from armkin.board.firmware import protocol
+from armkin.board.firmware import cutting, protocol
 from armkin.board.firmware.protocol import Error, Flag, Segment, State, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
@@ -22,7 +22,6 @@ from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.cutting import Cut
     from armkin.board.firmware.segments import Counts, Move
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
@@ -58,7 +57,7 @@ class Machine:
     def __init__(
         self, port: Port, arm: Arm, configuration: Configuration, stop: Callable[[], bool] = lambda: False
     ) -> None:
-        self.arm, self.configuration = arm, configuration
+        self.arm, self.port, self.configuration = arm, port, configuration
         self.session = Session(port, stop)
         self.info = self.session.open()
         expected, board = configuration.board.number, self.info.board
@@ -94,6 +93,28 @@ class Machine:
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
         return joints_of(self.arm, self.counts())
+
+    @property
+    def differences(self) -> tuple[str, ...]:
+        """Nothing: what armkin promises of a board is what this firmware does."""
+        return ()
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""
+        info, status, board = self.info, self.status, self.configuration.board
+        flags = Flag(status.flags)
+        return {
+            "firmware": ".".join(map(str, info.firmware)),
+            "configured": self.configured,
+            "state": State(status.state).name.lower(),
+            "error": Error(status.error).name.lower() if status.error else None,
+            "drivers_on": Flag.DRIVERS in flags,
+            "servo_pulses_on": Flag.SERVOS in flags,
+            "abort_input": Flag.ABORT in flags,
+            "switches": {name: bool(status.switches >> i & 1) for i, name in enumerate(board.switches)},
+            "boots": info.boots,
+            "reset_cause": info.cause,
+        }
 
     # Getting ready
 
@@ -181,7 +202,12 @@ class Machine:
 
     # Moving
 
-    def run(self, plans: Iterable[Cut | None], progress: Progress = lambda done, total: None) -> Status:
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> cutting.Cut:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each, for the board that is there."""
+        info = self.info
+        return cutting.plan(self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval)
+
+    def run(self, plans: Iterable[cutting.Cut | None], progress: Progress = lambda done, total: None) -> Status:
         """Carry out plans, one after another; None in between: nothing to do yet.
 
         Returns the status at the end, where the last plan ends, or raises LinkError.

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from armkin.board.backend import StoppedError
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import Ack, Credit, Error, Info, State, Status
 from armkin.board.ports import Port
@@ -38,14 +39,6 @@ class DeviceError(LinkError):
         self.error = Error(error) if error in Error._value2member_map_ else Error.OK
         self.detail, self.state = detail, state
         super().__init__(f"the board refused: {self.error.name} ({error}), detail {detail}")
-
-
-class StoppedError(Exception):
-    """The operator asked to stop: the arm stands, `status` says where (None: it was not asked yet)."""
-
-    def __init__(self, status: Status | None = None) -> None:
-        super().__init__("stopped")
-        self.status = status
 
 
 @dataclass

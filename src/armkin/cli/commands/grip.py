@@ -15,6 +15,7 @@ from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Grip
+    from armkin.board.foreign import Foreign
     from armkin.cli.answers import Grip as Answer
     from armkin.model.arm import Arm
 
@@ -34,13 +35,16 @@ def grip(
             help="Where a gripper whose position is lost stands: a servo jumps there first.",
         ),
     ] = None,
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
     from armkin.board.firmware import gripping
 
     arm = inputs.load(robot)
+    if (other := linking.foreign(arm)) is not None:
+        _grip_servo(arm, other, value, port, baud, json)
+        return
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     gripper = gripping.gripper_of(arm.name, configuration)
     target = _count(gripper, value, "VALUE")
@@ -59,6 +63,27 @@ def grip(
     }
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
+
+
+def _grip_servo(arm: Arm, other: Foreign, value: str, port: str | None, baud: int | None, json: bool) -> None:
+    """A gripper on a bus of servos, which may close on something before it is where it was sent."""
+    gripper = arm.gripper
+    if other.board.kind != "feetech" or gripper is None or gripper.kind != "bus":
+        raise UsageError(f"{arm.name} has no gripper that a board of kind {other.board.kind} moves")
+    named = {"open": gripper.open, "closed": gripper.closed}
+    target = named[_WORD[value]] if value in _WORD else number(value, "VALUE")
+    low, high = sorted(named.values())
+    if not low <= target <= high:
+        raise UsageError(f"VALUE: {value} is outside of the gripper's {low:g} to {high:g}")
+    from armkin.board.feetech.machine import ServoMachine
+
+    with linking.backend(arm, other, port, baud) as machine:
+        assert isinstance(machine, ServoMachine)
+        at = machine.grip(gripper, target)
+    found = {**render.head(arm), "port": machine.port.name, "gripper": at, "target": target}
+    with output.destination(None) as write:
+        held = "" if abs(at - target) < 1 else f" of {render.short(target)}: it holds something, or is blocked"
+        write(render.to_json(found) + "\n" if json else f"gripper: {render.short(at)} deg{held}\n")
 
 
 def _said(arm: Arm, gripper: Grip, count: int) -> str:

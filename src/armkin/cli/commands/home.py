@@ -9,6 +9,7 @@ import typer
 from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
 from armkin.cli.options import Json, Robot
+from armkin.errors import UsageError
 
 
 def home(
@@ -20,7 +21,7 @@ def home(
             metavar="[JOINT...]", help="These joints only. [default: all]", autocompletion=completion.joints
         ),
     ] = None,
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Find the limit switches, and with them the position.
@@ -32,6 +33,16 @@ def home(
     from armkin.board.moving import where
 
     arm = inputs.load(robot)
+    other = linking.foreign(arm)
+    if other is not None:
+        if joints:
+            raise UsageError(f"boards of kind {other.board.kind} home all joints at once: leave {' '.join(joints)} out")
+        with linking.backend(arm, other, port, baud) as backend:
+            other.home(backend)
+            told = {**render.head(arm), "port": backend.port.name, **where(backend)}
+        with output.destination(None) as write:
+            write(render.to_json(told) + "\n" if json else linking.where_text(arm, told))
+        return
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     homing.searches(arm, configuration, joints or ())  # refuses before a port is opened
     with linking.machine(arm, configuration, port, baud) as machine:

@@ -22,7 +22,7 @@ def jog(
     speed: Annotated[str, typer.Argument(metavar="SPEED", help="In deg/s (prismatic joints: mm/s), signed.")],
     port: PortName = None,
     seconds: Annotated[str, typer.Option("--seconds", metavar="S", help="How long; Ctrl-C ends it earlier.")] = "0.5",
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Move one joint at a constant speed, for a short time.
@@ -35,7 +35,7 @@ def jog(
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)
-    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
+    other = linking.foreign(arm)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")
@@ -44,6 +44,14 @@ def jog(
     top = float(units.joints_out(arm, arm.max_speed)[j])
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
+    if other is not None:
+        with linking.backend(arm, other, port, baud) as backend:
+            other.jog(backend, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
+            told = {**render.head(arm), "port": backend.port.name, **where(backend)}
+        with output.destination(None) as write:
+            write(render.to_json(told) + "\n" if json else linking.where_text(arm, told))
+        return
+    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     with linking.machine(arm, configuration, port, baud) as machine:
         jogging.prepare(machine)
         slow = top / jogging.SLOW

@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.cutting import Cut
+    from armkin.board.backend import Planned
     from armkin.board.moving import Planner, Stream
     from armkin.cli.goals import Goals
     from armkin.model.arm import Arm
@@ -59,7 +59,7 @@ def send(
         str | None,
         typer.Option("--trace", metavar="FILE", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Move the arm.
@@ -67,6 +67,7 @@ def send(
     All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
     its path; its position stays known.
     """
+    from armkin.board.firmware.machine import Machine
     from armkin.board.moving import Planner, Stream, where
 
     fraction = number(speed, "--speed") / 100
@@ -77,8 +78,8 @@ def send(
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     arm, goals = read_goals(robot, q, target, branch, task, batch)
-    configuration = linking.configured(arm, rehearsal=dry_run or port == SIM)
-    planner = Planner(arm, configuration, fraction)
+    board = linking.board_of(arm, rehearsal=dry_run or port == SIM)
+    planner = Planner(arm, board, fraction)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
@@ -89,13 +90,14 @@ def send(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
             )
         return
-    with linking.machine(arm, configuration, port, baud) as machine:
+    with linking.backend(arm, board, port, baud) as machine:
         if machine.prepare(assume_home=assume_home) and assume_home:
             output.note("the board takes the arm to stand in its home pose")
         began = machine.counts()
-        planner.use(machine.info.clock, machine.info.min_interval)
+        if isinstance(machine, Machine):
+            planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
-            source: Iterable[Cut | None] = goals.plans(planner, began)
+            source: Iterable[Planned | None] = goals.plans(planner, began)
             whole = None  # how many rows will come is not known
         else:
             source = plans = _all(planner, goals, began)  # every refusal before anything moves
@@ -104,14 +106,14 @@ def send(
         with output.progress("ms of motion", whole) as tick:
             machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
         planned = planner.summary(planner.done, began)
-        found: dict[str, Any] = {**planned, "port": machine.session.port.name, **where(machine)}
+        found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     with output.destination(None) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
 
 
-def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Cut]:
+def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
     """All plans at once, from counts; a stream is read to its end."""
     import armkin
     from armkin.board.moving import Stream
@@ -122,7 +124,7 @@ def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[
     return [planner.plan(start, goals.resolve(planner.arm, near))]
 
 
-def _write_trace(arm: Arm, plans: Sequence[Cut], path: str | None) -> None:
+def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
     if path is None:
         return
     names = [*arm.joint_names, "tool"]

@@ -9,7 +9,7 @@ from armkin.errors import LinkError, UsageError
 _PATIENCE = 15.0  # [s] for an arm to come to rest
 
 
-def stop(port: PortName = None, baud: Baud = linking.BAUD) -> None:
+def stop(port: PortName = None, baud: Baud = None) -> None:
     """Stop the arm along its path.
 
     Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
@@ -17,6 +17,7 @@ def stop(port: PortName = None, baud: Baud = linking.BAUD) -> None:
     """
     from armkin.board.ports import SIM, SerialPort, holder
 
+    baud = baud or linking.BAUD
     port = _port(port, baud)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")

@@ -17,7 +17,7 @@ def teach(
         str | None,
         typer.Option("--port", "-p", metavar="PORT", help="A board: device, COM port, pyserial URL, or sim."),
     ] = None,
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     open: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
     """A page in the browser: see the arm, choose a branch, send it.
@@ -28,7 +28,7 @@ def teach(
     from armkin.teach.desk import Desk
     from armkin.teach.server import Server
 
-    desk = Desk(inputs.load(robot), port, baud)
+    desk = Desk(inputs.load(robot), port, baud or linking.BAUD)
     try:
         with Server(desk) as server:
             with output.destination(None) as write:

@@ -1,0 +1,130 @@
+"""Boards with somebody else's firmware: what stands where our own has a configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.hardware import FOREIGN, ForeignBoard
+from armkin.model import units
+from armkin.motion.plan import plan as plan_joints
+from armkin.motion.plan import rate_lines
+from armkin.motors import joints, pulses
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Backend, Planned
+    from armkin.board.feetech.machine import ServoMachine
+    from armkin.board.grbl.machine import GrblMachine
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """An arm's board, of a kind that does not run armkin's firmware."""
+
+    arm: Arm
+    board: ForeignBoard
+
+    def plan(self, start: Sequence[int], targets: Array, speed: float) -> Planned:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        counts = np.asarray(start, dtype=np.int64)
+        trajectory = plan_joints(self.arm, joints(self.arm, counts), targets, speed=speed)
+        if self.board.kind == "grbl":
+            from armkin.board.grbl.gcode import Job
+
+            return Job(trajectory, counts)
+        from armkin.board.feetech.machine import Job as Positions
+
+        return Positions(trajectory, counts)
+
+    def simulated(self) -> Port:
+        """A board of this kind in this process, set up for the arm, which stands at home."""
+        home = pulses(self.arm, self.arm.home).tolist()
+        if self.board.kind == "grbl":
+            from armkin.board.grbl.axes import axes_of
+            from armkin.board.grbl.settings import wanted
+            from armkin.board.sim.grbl import Grbl
+
+            axes = axes_of(self.arm)
+            settings = {number: value for number, (_, value) in wanted(axes).items()}
+            return Grbl(axes=max(axis.index for axis in axes) + 1, settings=settings)
+        from armkin.board.feetech.machine import servo_ids
+        from armkin.board.sim.servo_bus import Servo, ServoBus
+
+        servos = [Servo(number, at) for number, at in zip(servo_ids(self.arm), home, strict=True)]
+        gripper = self.arm.gripper
+        if gripper is not None and gripper.id is not None:
+            servos.append(Servo(gripper.id))
+        return ServoBus(servos)
+
+    def home(self, machine: Backend) -> None:
+        """Find the limit switches by the board's own cycle.
+
+        Raises UsageError, before anything moves, for a bus, which needs none, and for joints without `homing` or
+        whose switch is that of no single motor.
+        """
+        from armkin.board.grbl.machine import GrblMachine
+
+        arm = self.arm
+        if not isinstance(machine, GrblMachine):
+            raise UsageError("bus servos know their position: there is nothing to home")
+        lacks = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
+        if lacks:
+            raise UsageError(f"joints without homing: {', '.join(lacks)}; GRBL homes all axes or none")
+        if np.count_nonzero(arm.motor_gain) != arm.n:
+            raise UsageError("GRBL homes motors, not joints: this arm's motors turn several joints at once")
+        at = units.joints_in(arm, [homing.at for homing in arm.homing if homing is not None])
+        upward = [homing.direction > 0 for homing in arm.homing if homing is not None]
+        order = np.abs(arm.motor_gain).argmax(axis=1)  # motor -> its joint
+        machine.home(pulses(arm, at).tolist(), [upward[j] for j in order])
+
+    def jog(self, machine: Backend, joint: int, rate: float, seconds: float) -> None:
+        """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most."""
+        machine.prepare()
+        arm, q = self.arm, machine.joints()
+        goal = q.copy()
+        low, high = min(arm.lower[joint], q[joint]), max(arm.upper[joint], q[joint])
+        goal[joint] = np.clip(q[joint] + rate * seconds, low, high)
+        share = float(abs(rate) / arm.max_speed[joint])
+        machine.run([self.plan(machine.counts(), goal[None], min(share, 1.0))])
+
+    def machine(self, port: Port, stop: Callable[[], bool]) -> GrblMachine | ServoMachine:
+        """The arm on the board behind an open port."""
+        if self.board.kind == "grbl":
+            from armkin.board.grbl.machine import GrblMachine
+
+            return GrblMachine(port, self.arm, stop)
+        from armkin.board.feetech.machine import ServoMachine
+
+        return ServoMachine(port, self.arm, stop)
+
+
+def foreign(arm: Arm) -> Foreign | None:
+    """The arm's board if it is a foreign one.
+
+    Raises UsageError, naming what is missing, if such an arm cannot be planned or driven.
+    """
+    settings = arm.board
+    board = None if settings is None else FOREIGN.get(settings.kind)
+    if board is None:
+        return None
+    lines = rate_lines(arm)
+    if lines:
+        raise UsageError(
+            "".join([f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)])
+        )
+    if board.kind == "grbl":
+        from armkin.board.grbl.axes import axes_of
+
+        axes_of(arm)
+    else:
+        from armkin.board.feetech.machine import servo_ids
+
+        servo_ids(arm)
+    return Foreign(arm, board)

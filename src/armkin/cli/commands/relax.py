@@ -1,0 +1,54 @@
+"""`armkin relax`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from armkin.cli import inputs, linking, output
+from armkin.cli.batch import csv_line
+from armkin.cli.linking import Baud, PortName
+from armkin.cli.numbers import number
+from armkin.cli.options import Out, Robot
+from armkin.errors import UsageError
+from armkin.model import units
+
+_LONGEST = 3600.0  # [s]
+_RATE = 10  # [rows/s]
+
+
+def relax(
+    robot: Robot,
+    port: PortName = None,
+    seconds: Annotated[
+        str, typer.Option("--seconds", metavar="S", help="How long the joints are read; Ctrl-C ends it earlier.")
+    ] = "0",
+    out: Out = None,
+    baud: Baud = None,
+) -> None:
+    """Switch bus servos off, to move the arm by hand and read it.
+
+    Hold the arm: without its motors it falls. Prints joint values as CSV with a header, one row, or ten a second
+    for --seconds; `armkin send ROBOT --batch FILE` plays them back.
+    """
+    from armkin.board.feetech.machine import ServoMachine
+
+    arm = inputs.load(robot)
+    other = linking.foreign(arm)
+    if other is None or other.board.kind != "feetech":
+        raise UsageError(f"{arm.name} has no bus servos: other motors cannot be moved by hand and read")
+    time = number(seconds, "--seconds")
+    if not 0 <= time <= _LONGEST:
+        raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
+    with linking.backend(arm, other, port, baud) as machine, output.destination(out) as write:
+        assert isinstance(machine, ServoMachine)
+        machine.relax()
+        output.note("the motors are off; armkin send switches them on again, where the arm then stands")
+        write(csv_line(arm.joint_names) + "\n")
+        begin, rows = machine.port.now(), 0
+        while rows <= _RATE * time and machine.wait(begin + rows / _RATE):
+            write(csv_line(units.joints_out(arm, machine.read()).tolist()) + "\n")
+            rows += 1
+    if out not in (None, "-"):
+        output.note(f"{rows} row{'s' * (rows != 1)} in {out}")

@@ -1,0 +1,65 @@
+"""`armkin zero`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, linking, output, render
+from armkin.cli.linking import Baud, PortName
+from armkin.cli.options import Json, Out, Robot
+from armkin.errors import UsageError
+
+
+def zero(
+    robot: Robot,
+    port: PortName = None,
+    pose: Annotated[
+        str, typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in.")
+    ] = "home",
+    out: Out = None,
+    baud: Baud = None,
+    json: Json = False,
+) -> None:
+    """Record where the zero of bus servos is.
+
+    Put the arm into a pose by hand (armkin relax switches its motors off) and run this: the servos' counts give
+    every drive's `zero`. Prints them; --out writes the robot file with them, all else as it stands. The servos'
+    own memory is not touched.
+    """
+    import numpy as np
+
+    from armkin.board.feetech.machine import ServoMachine
+    from armkin.model import units
+    from armkin.motors import motor_names
+    from armkin.robot_file import parse
+    from armkin.robot_file.catalogue import locate
+    from armkin.robot_file.edit import replaced
+
+    arm = inputs.load(robot)
+    other = linking.foreign(arm)
+    if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
+        raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
+    q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
+    with linking.backend(arm, other, port, baud) as machine:
+        assert isinstance(machine, ServoMachine)
+        counts, name = list(machine.counts()), machine.port.name
+    found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
+    names = motor_names(arm)
+    if out is not None:
+        where: dict[tuple[str | int, ...], int] = {
+            ("joints", arm.joint_names.index(n), "drive", "zero"): z for n, z in zip(names, found, strict=True)
+        }
+        text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), where)
+        parse(text, out)  # nothing is written that no command would take
+        with output.destination(out) as write:
+            write(text)
+    if out != "-":
+        answer: dict[str, Any] = {**render.head(arm), "port": name, "counts": counts, "zero": found}
+        rows = [["joint", "count", "zero", "was"]]
+        for joint, count, new, motor in zip(names, counts, found, arm.motors, strict=True):
+            rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
+        with output.destination(None) as write:
+            write(render.to_json(answer) + "\n" if json else render.table(rows) + "\n")

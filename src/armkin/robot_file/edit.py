@@ -1,0 +1,49 @@
+"""A robot file's text with other values: comments, order and spelling of all else stay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+Path = tuple[str | int, ...]
+
+
+def replaced(text: str, values: Mapping[Path, float | int | str]) -> str:
+    """A robot file's text with values replaced, or added at the end of the mapping where the key is missing.
+
+    values: where -> what, as ``("joints", 0, "drive", "zero"): 2048``. Raises KeyError for a path whose mapping is
+    not there.
+
+    >>> replaced("a: {b: 1}  # one", {("a", "b"): 2, ("a", "c"): 3})
+    'a: {b: 2, c: 3}  # one'
+    """
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    edits: list[tuple[int, int, str]] = []
+    for path, value in values.items():
+        mapping = _at(root, path[:-1])
+        found = next((node for key, node in mapping.value if key.value == path[-1]), None)
+        last = mapping.value[-1][1].end_mark.index
+        if found is not None:
+            edits.append((found.start_mark.index, found.end_mark.index, str(value)))
+        elif mapping.flow_style:
+            edits.append((last, last, f", {path[-1]}: {value}"))
+        else:
+            column = mapping.value[0][0].start_mark.column
+            end = last if text[:last].endswith("\n") else text.find("\n", last) + 1 or len(text)
+            edits.append((end, end, f"{' ' * column}{path[-1]}: {value}\n"))
+    for begin, end, new in sorted(edits, reverse=True):
+        text = text[:begin] + new + text[end:]
+    return text
+
+
+def _at(node: Any, path: Path) -> Any:
+    for step in path:
+        if isinstance(step, int):
+            node = node.value[step]
+        else:
+            node = next((value for key, value in node.value if key.value == step), None)
+            if node is None:
+                raise KeyError(step)
+    return node

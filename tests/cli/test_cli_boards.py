@@ -1,0 +1,159 @@
+"""Commands on boards of others: GRBL and a bus of servos, simulated in the process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import armkin
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.settings import wanted
+from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.robot_file.edit import replaced
+from command_line import ROOT, THREE_DOF, run
+from pty_port import PtyPort
+
+BUS = """name: bus_arm   # an arm of bus servos
+convention: standard
+joints:
+  - name: j1
+    dh: {alpha: 90, a: 0, d: 60}
+    limits: [-150, 150]
+    max_speed: 90
+    max_accel: 300
+    drive: {kind: bus, id: 1, counts: 4096, zero: 2058}   # its own
+  - name: j2
+    dh: {alpha: 0, a: 110, d: 0}
+    limits: [-150, 150]
+    max_speed: 90
+    max_accel: 300
+    drive:
+      kind: bus
+      id: 2
+      counts: 4096
+      invert: true
+      zero: 2068   # turned the other way
+board: {kind: feetech}
+gripper: {kind: bus, id: 6, counts: 4096, zero: 2048, open: 60, closed: 0}
+"""
+
+
+@pytest.fixture
+def grbl(tmp_path: Path) -> str:
+    text = (ROOT / THREE_DOF).read_text().replace("{kind: uno_cnc_shield, driver: A4988}", "{kind: grbl}")
+    path = tmp_path / "grbl.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.fixture
+def bus(tmp_path: Path) -> str:
+    path = tmp_path / "bus.yaml"
+    path.write_text(BUS)
+    return str(path)
+
+
+def test_grbl_takes_the_published_pose_to_the_published_steps(grbl: str) -> None:
+    done = run("send", grbl, -30, 5, -5, "--port", "sim", "--json")
+    assert done.code == 0
+    assert done.json["pulses"] == [-1067, -10144, 5667]
+    assert done.json["position"] == "known"
+
+
+def test_a_dry_run_of_grbl_plans_what_ours_plans(grbl: str) -> None:
+    ours, theirs = (run("send", robot, -30, 5, -5, "--dry-run", "--json").json for robot in (THREE_DOF, grbl))
+    for key in ("pulses", "moves", "duration_s", "top_speed", "position_mm"):
+        assert theirs[key] == pytest.approx(ours[key], rel=1e-3)
+
+
+def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
+    board = Grbl(axes=4)
+    with PtyPort(board) as pty:
+        refused = run("send", grbl, -30, 5, -5, "--port", pty.name, "--assume-home")
+        assert (refused.code, refused.out) == (5, "")
+        assert "settings do not fit three_dof: $100" in refused.err
+        told = run("setup", grbl, "--port", pty.name, "--json")
+        assert {100, 101, 102} <= {row["setting"] for row in told.json["differences"] if row["serious"]}
+        assert board.settings[100] == 250
+        assert run("setup", grbl, "--port", pty.name, "--write").code == 0
+        written = {number: value for number, (_, value) in _wanted(grbl).items() if number != 10}
+        assert {number: board.settings[number] for number in written} == pytest.approx(written)
+        lost = run("send", grbl, -3, 85, -85, "--port", pty.name)
+        assert (lost.code, "position is lost" in lost.err) == (5, True)
+        moved = run("send", grbl, -3, 85, -85, "--port", pty.name, "--assume-home", "--json")
+        assert moved.json["pulses"] == board.steps[:3] == armkin.pulses(armkin.load(grbl), _rad(-3, 85, -85)).tolist()
+        assert "GRBL has no checksum" in moved.err
+        again = run("status", grbl, "--port", pty.name, "--json").json
+        assert (again["position"], again["pulses"]) == ("known", moved.json["pulses"])
+        board.boot()
+        assert run("status", grbl, "--port", pty.name, "--json").json["position"] == "lost"
+
+
+def _wanted(robot: str) -> dict[int, tuple[str, float]]:
+    return wanted(axes_of(armkin.load(robot)))
+
+
+def _rad(*degrees: float) -> list[float]:
+    return [value * 3.141592653589793 / 180 for value in degrees]
+
+
+def test_bus_servos_move_jog_grip_and_tell(bus: str) -> None:
+    moved = run("send", bus, 10, -20, "--port", "sim", "--json")
+    assert moved.json["pulses"] == pytest.approx([2058 + 10 * 4096 / 360, 2068 + 20 * 4096 / 360], abs=14)
+    assert run("jog", bus, "j1", 20, "--port", "sim", "--json").json["joints"] == pytest.approx([10, 0], abs=1.2)
+    assert run("grip", bus, "open", "--port", "sim", "--json").json["gripper"] == pytest.approx(60, abs=1.2)
+    servos = run("status", bus, "--port", "sim", "--json").json["servos"]
+    assert [servo["name"] for servo in servos] == ["j1", "j2"]
+    assert all(not servo["errors"] for servo in servos)
+
+
+def test_relaxed_rows_are_played_back(bus: str, tmp_path: Path) -> None:
+    rows = tmp_path / "rows.csv"
+    port = ServoBus([Servo(1, 2158), Servo(2, 2168), Servo(6)])
+    with PtyPort(port) as pty:
+        assert run("relax", bus, "--port", pty.name, "--seconds", "0.3", "--out", rows).code == 0
+    lines = rows.read_text().splitlines()
+    assert lines[0] == "j1,j2"
+    assert len(lines) == 5
+    assert [float(value) for value in lines[1].split(",")] == pytest.approx([100 * 360 / 4096, -100 * 360 / 4096])
+    assert run("send", bus, "--batch", rows, "--dry-run").code == 0
+
+
+def test_zero_writes_counts_and_leaves_the_rest_of_the_file(bus: str, tmp_path: Path) -> None:
+    new = tmp_path / "new.yaml"
+    with PtyPort(ServoBus([Servo(1, 2100), Servo(2, 1600)])) as pty:
+        assert run("zero", bus, "--port", pty.name, "--pose", "0,45", "--out", new).code == 0
+    text = BUS.replace("zero: 2058", "zero: 2100").replace("zero: 2068", "zero: 2112")
+    assert new.read_text() == text
+    assert Path(bus).read_text() == BUS
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("home", "{bus}", "--port", "sim"), 2, "bus servos know their position"),
+        (("home", "{grbl}", "--port", "sim"), 2, "joints without homing: q1, q2, q3"),
+        (("setup", "{bus}", "--port", "sim"), 2, "setup is for board: {kind: grbl}"),
+        (("relax", "{grbl}", "--port", "sim"), 2, "no bus servos"),
+        (("zero", "{grbl}", "--port", "sim"), 2, "zero is for arms whose joints have a bus servo"),
+        (("grip", "{grbl}", "open", "--port", "sim"), 2, "no gripper that a board of kind grbl moves"),
+        (("send", "{bus}", 0, 0, "--port", "sim", "--assume-home"), 5, "know their position"),
+        (("send", "{bus}", 0, 0), 2, "boards of kind feetech are not looked for"),
+        (("send", "{grbl}", 0, 200, 0, "--port", "sim"), 3, "nothing was moved"),
+        (("relax", "{bus}", "--port", "sim", "--seconds", "-1"), 2, "must be from 0 to 3600"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(
+    words: tuple[object, ...], code: int, message: str, grbl: str, bus: str
+) -> None:
+    done = run(*(str(word).replace("{bus}", bus).replace("{grbl}", grbl) for word in words))
+    assert (done.code, done.out) == (code, "")
+    assert message in done.err
+
+
+def test_values_are_replaced_where_they_stand() -> None:
+    text = "a:\n  - {b: 1, c: [2, 3]}  # one\n  - b: 4\n    d: x\ne: 5\n"
+    found = replaced(text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14})
+    assert found == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
