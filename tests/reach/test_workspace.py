@@ -359,3 +359,13 @@ def test_progress_counts_to_the_end() -> None:
     seen: list[int] = []
     workspace(THREE_DOF, CHUNK + 5, progress=seen.append, volume=False)
     assert seen == [CHUNK, CHUNK + 5]
+
+
+def test_few_samples_do_not_wait_for_the_volume() -> None:
+    """The whole effort for the volume took half a second, whatever was asked for."""
+    few, many = armkin.workspace(THREE_DOF, 1), armkin.workspace(THREE_DOF, 100_000)
+    assert few.extent is not None
+    assert many.extent is not None
+    assert few.seconds < 0.5 * many.seconds
+    assert abs(few.extent.value - many.extent.value) < few.extent.error + many.extent.error
+    assert many.extent.error < few.extent.error < 0.1 * few.extent.value

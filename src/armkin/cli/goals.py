@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armkin.cli import inputs, piped
-from armkin.cli.batch import streamed_rows
+from armkin.cli.csv_rows import streamed_rows
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 
@@ -53,9 +53,9 @@ def goals(
     if batch == "-":
         from armkin.board.moving import Stream
 
-        return arm, Stream(arm, streamed_rows(batch, arm.joint_names, arm.name))
+        return arm, Stream(arm, streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm)))
     if batch is not None:
-        rows = list(streamed_rows(batch, arm.joint_names, arm.name))
+        rows = list(streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm)))
         if not rows:
             raise UsageError(f"{batch} has no rows: it needs one of {','.join(arm.joint_names)} per waypoint")
         return arm, _checked(arm, [number for number, _ in rows], [values for _, values in rows])

@@ -31,6 +31,13 @@ def load(robot: str) -> Arm:
     return arm
 
 
+def named(robot: str | None) -> str:
+    """The robot's name, which must be given."""
+    if robot is None:
+        raise UsageError("missing argument 'ROBOT': a robot file or the name of a shipped robot (armkin robots)")
+    return robot
+
+
 def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     """One value for each joint [deg | mm], or the name of a pose."""
     if words is not None and len(words) == 1 and (named := _pose(arm, words[0], "")) is not None:
@@ -38,6 +45,17 @@ def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     values = numbers(words or (), arm.joint_names, arm.name)
     unit_notes.joint_values(arm, values)
     return values
+
+
+def poses(robot: str | None, words: Sequence[str] | None) -> tuple[Arm, list[list[float]]]:
+    """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
+    from armkin.cli import piped
+
+    if not words and (found := piped.joint_values(robot)) is not None:
+        return found
+    assert robot is not None  # else `piped` has said that it is missing
+    arm = load(robot)
+    return arm, [joints(arm, words)]
 
 
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:

@@ -14,6 +14,14 @@ Robot = Annotated[
         autocompletion=completion.robots,
     ),
 ]
+RobotOrPipe = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[ROBOT]",
+        help="Robot file or name; an answer on standard input names its own.",
+        autocompletion=completion.robots,
+    ),
+]
 Joints = Annotated[
     list[str] | None,
     typer.Argument(

@@ -30,9 +30,19 @@ def destination(path: str | None) -> Iterator[Write]:
         yield sys.stdout.write
 
 
-def spare(robot: str, out: str | None) -> None:
+@contextmanager
+def beside(path: str | None) -> Iterator[Write]:
+    """Where a command's answer goes while other data goes to `path`: stderr if that is stdout ("-")."""
+    if path == "-" and sys.stderr is not None:
+        yield sys.stderr.write
+        return
+    with destination(None) as write:
+        yield write
+
+
+def spare(robot: str | None, out: str | None) -> None:
     """Refuse to write over the robot file."""
-    if out and os.path.isfile(out) and os.path.isfile(robot) and os.path.samefile(out, robot):
+    if out and robot and os.path.isfile(out) and os.path.isfile(robot) and os.path.samefile(out, robot):
         raise UsageError(f"--out {out} is the robot file; give another name")
 
 

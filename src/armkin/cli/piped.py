@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from armkin.errors import NoSolutionError, UsageError
+from armkin.cli import output
+from armkin.errors import FileError, NoSolutionError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
 
 _LARGEST = 100_000_000  # bytes
 _NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
@@ -55,6 +59,68 @@ def read(robot: str | None) -> Piped:
     if robot is not None and robot != first["robot_file"]:
         raise UsageError(f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input")
     return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
+
+
+def joint_values(robot: str | None) -> tuple[Arm, list[list[float]]] | None:
+    """The arm and joint values [deg | mm] of what `fk`, `ik` or `pulses` with --json has printed.
+
+    robot: a robot given as well, which must be the same. None if there is a robot and nothing on standard
+    input. Answers of ik without a branch within limits are skipped, with a warning.
+    """
+    found = answers(robot)
+    if found is None:
+        return None
+    arm, parsed = found
+    values = [_joints(answer, arm) for answer in parsed if not _is_unsolved(answer)]
+    if len(values) < len(parsed):
+        skipped = f"{len(parsed) - len(values)} of {len(parsed)} answers have no branch within limits"
+        if not values:
+            raise NoSolutionError(f"{skipped}: there are no joint values on standard input")
+        output.warn(f"{skipped}: skipped")
+    return arm, values
+
+
+def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:
+    """The same as the arm and the answers themselves."""
+    from armkin.cli import inputs
+
+    text = _text()
+    if not text.strip():
+        inputs.named(robot)
+        return None
+    try:
+        parsed = [_parsed(part) for part in _parts(text)]
+    except UsageError:
+        if robot is None or text.lstrip()[:1] == "{":
+            raise
+        raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
+    arm = inputs.load(robot or parsed[0]["robot_file"])
+    for answer in parsed:
+        if answer["robot_sha256"] != arm.sha256:
+            name = answer["robot_file"]
+            raise FileError(f"the answer on standard input was computed with another {name}, or it has changed since")
+    return arm, parsed
+
+
+def _text() -> str:
+    """Standard input; nothing if that is a terminal."""
+    if sys.stdin is None or sys.stdin.isatty():
+        return ""
+    try:
+        return sys.stdin.buffer.read(_LARGEST).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise UsageError(_NO_JSON) from None
+
+
+def _is_unsolved(answer: dict[str, Any]) -> bool:
+    return "branches" in answer and answer.get("best") is None
+
+
+def _joints(answer: dict[str, Any], arm: Arm) -> list[float]:
+    values = _pose(answer).joints
+    if len(values) != arm.n:
+        raise UsageError(f"the answer has {len(values)} joint values, {arm.name} has {arm.n} joints")
+    return values
 
 
 def _parts(text: str) -> list[str]:

@@ -59,7 +59,8 @@ def workspace(
     out: a .csv, .npz or .ply file for all samples. keep: how many samples the result holds.
     progress: called with the number of samples done.
 
-    Memory does not grow with the number of samples. The volume does not depend on it: see `extent`.
+    Memory does not grow with the number of samples. The volume does not depend on it from 100,000 on; below,
+    its error grows: see `extent`.
     """
     started = time.perf_counter()
     sampling = _sampling(arm, samples, grid_points, seed)
@@ -79,7 +80,7 @@ def workspace(
             if progress is not None:
                 progress(tally.done)
         # Within the block: without its volume there is no result, and then no file either.
-        size = extent(arm, seed) if volume else None
+        size = extent(arm, seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
 
 

@@ -43,6 +43,8 @@ _LINE = 1 << 14  # cells of a planar arm's section, which is a line
 _STRETCHES = 64  # at most, along the sweep
 _UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples grown from them
 _CHUNK = 1 << 16
+_LEAST_CHUNK = 1 << 11
+_ALL = 100_000  # samples of a survey from which its volume is worth the whole effort
 _POOL = 1 << 14  # poses to grow from
 _OVERSHOOT = 0.04  # of the range: samples beyond a limit are set on it
 _MARGIN = 0.02  # of the section's size, around what a first look finds
@@ -58,11 +60,12 @@ class Extent:
     method: str
 
 
-def extent(arm: Arm, seed: int = 0) -> Extent:
+def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     """Volume [mm3] of an arm's reach, or area [mm2] if it moves in a plane.
 
     An arm whose tip has fewer freedoms than the space it moves in (two joints in space sweep a
-    surface) has the volume 0.
+    surface) has the volume 0. samples: of the survey that asks; for fewer than 100,000 the volume, too, is
+    found from proportionally fewer poses, and its error says so.
     """
     normal, freedoms = motion(arm)
     dimensions = 3 if normal is None else 2
@@ -72,13 +75,14 @@ def extent(arm: Arm, seed: int = 0) -> Extent:
     section = _Section(arm, normal)
     rng = np.random.default_rng(seed)
     look = _Cells(section, *section.widest(), 64)
-    _fill(look, rng, 2, 2)
+    chunk = max(_LEAST_CHUNK, min(_CHUNK, _CHUNK * samples // _ALL))
+    _fill(look, rng, 2, 2, chunk)
     margin = _MARGIN * (look.most - look.least)
     low, high = look.least - margin, look.most + margin
     if section.revolute:
         low[0] = max(low[0], 0.0)
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else _SIDE)
-    _fill(cells, rng, _UNIFORM, _GROWN)
+    _fill(cells, rng, _UNIFORM, _GROWN, chunk)
     levels = [cells]
     while (coarse := levels[-1].merged()) is not None:
         levels.append(coarse)
@@ -240,7 +244,7 @@ class _Cells:
         return float(least.sum()) * cell, float(most.sum()) * cell
 
 
-def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int) -> None:
+def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int, size: int) -> None:
     """Sample the other joints: at random first, then around the poses that last found something new."""
     arm, low, high = cells.section.arm, cells.section.low, cells.section.high
     limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
@@ -248,11 +252,11 @@ def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int) -> 
     pool = np.empty((0, arm.n))
     for chunk in range(uniform + grown):
         if chunk < uniform:
-            q = low - _OVERSHOOT * width + (1 + 2 * _OVERSHOOT) * width * rng.random((_CHUNK, arm.n))
+            q = low - _OVERSHOOT * width + (1 + 2 * _OVERSHOOT) * width * rng.random((size, arm.n))
         else:
-            seeds = pool[rng.integers(len(pool), size=_CHUNK)]
-            step = 10.0 ** rng.uniform(-4.0, -0.5, (_CHUNK, 1))
-            q = seeds + step * width * rng.standard_normal((_CHUNK, arm.n))
+            seeds = pool[rng.integers(len(pool), size=size)]
+            step = 10.0 ** rng.uniform(-4.0, -0.5, (size, 1))
+            q = seeds + step * width * rng.standard_normal((size, arm.n))
         q = np.where(limited, np.clip(q, low, high), q)
         q[:, 0] = 0.0
         new = cells.add(q)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
-from armkin.cli.options import Batch, Joints, JsonLines, Out, Robot
+from armkin.cli.batch import run_batch
+from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
+from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
 from armkin.cli.render import fixed
 from armkin.model import units
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def fk(
-    robot: Robot,
+    robot: RobotOrPipe = None,
     q: Joints = None,
     frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
     json: JsonLines = False,
@@ -28,23 +29,28 @@ def fk(
 ) -> None:
     """Where the tool is for given joint values."""
     output.spare(robot, out)
-    arm = inputs.load(robot)
     if batch is not None:
         inputs.no_numbers(q)
-        tally = run_batch(
-            batch_rows(batch, arm.joint_names, arm.name),
-            out,
-            json,
-            lambda chunk: _answers(arm, chunk, frames),
-            [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
-            lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
-        )
-        tally.warn_of_limits()
-        return
-    [answer] = _answers(arm, one_row(inputs.joints(arm, q)), frames)
-    with output.destination(out) as write:
-        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-    render.warn_of_limits(arm, answer["violations"])
+        arm = inputs.load(inputs.named(robot))
+        chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
+    else:
+        arm, values = inputs.poses(robot, q)
+        if len(values) == 1:
+            [answer] = _answers(arm, one_row(values[0]), frames)
+            with output.destination(out) as write:
+                write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+            render.warn_of_limits(arm, answer["violations"])
+            return
+        chunks = all_rows(values)
+    tally = run_batch(
+        chunks,
+        out,
+        json,
+        lambda chunk: _answers(arm, chunk, frames),
+        [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
+        lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
+    )
+    tally.warn_of_limits()
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[Fk]:

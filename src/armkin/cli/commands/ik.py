@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import holding, inputs, output, render
-from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
+from armkin.cli.batch import run_batch
+from armkin.cli.csv_rows import Chunk, batch_rows, one_row
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -193,10 +194,10 @@ def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Bran
 
 
 def _records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:
-    """CSV: one line a branch, or one line without joints."""
+    """CSV: one line a branch, or one line without joints. A name has no comma here: `cut` sees one column."""
     for branch in answer["branches"]:
         rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
-        yield [row, answer["status"], branch["name"], *branch["joints"], *rest]
+        yield [row, answer["status"], branch["name"].replace(",", ""), *branch["joints"], *rest]
     if not answer["branches"]:
         yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import holding, inputs, render
-from armkin.cli.batch import batch_rows
+from armkin.cli.csv_rows import batch_rows
 from armkin.cli.numbers import listed
 from armkin.cli.options import Joints, Lock, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.batch import Chunk, batch_rows, one_row, run_batch
-from armkin.cli.options import Batch, Joints, JsonLines, Out, Robot
+from armkin.cli.batch import run_batch
+from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
+from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
 from armkin.cli.render import fixed
 from armkin.model import units
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def pulses(
-    robot: Robot,
+    robot: RobotOrPipe = None,
     q: Joints = None,
     start: Annotated[
         str | None,
@@ -41,28 +42,33 @@ def pulses(
     from armkin.motors import motor_names
 
     output.spare(robot, out)
-    arm = inputs.load(robot)
-    origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
     if batch is not None:
         inputs.no_numbers(q)
-        motors = [f"pulses_{name}" for name in motor_names(arm)]
-        actual = [f"actual_{name}" for name in arm.joint_names]
-        tally = run_batch(
-            batch_rows(batch, arm.joint_names, arm.name),
-            out,
-            json,
-            lambda chunk: _answers(arm, chunk, origin, best),
-            [*arm.joint_names, *motors, *actual, "x", "y", "z", "error_mm", "within_limits"],
-            lambda _, a: [_record(a)],
-        )
-        tally.warn_of_limits()
+        arm = inputs.load(inputs.named(robot))
+        chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
+    else:
+        arm, values = inputs.poses(robot, q)
+        chunks = all_rows(values)
+    origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
+    if batch is None and len(values) == 1:
+        [answer] = _answers(arm, one_row(values[0]), origin, best)
+        with output.destination(out) as write:
+            write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+        render.warn_of_limits(arm, answer["violations"])
+        for name in answer["outside_travel"]:
+            output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
-    [answer] = _answers(arm, one_row(inputs.joints(arm, q)), origin, best)
-    with output.destination(out) as write:
-        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-    render.warn_of_limits(arm, answer["violations"])
-    for name in answer["outside_travel"]:
-        output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
+    motors = [f"pulses_{name}" for name in motor_names(arm)]
+    actual = [f"actual_{name}" for name in arm.joint_names]
+    tally = run_batch(
+        chunks,
+        out,
+        json,
+        lambda chunk: _answers(arm, chunk, origin, best),
+        [*arm.joint_names, *motors, *actual, "x", "y", "z", "error_mm", "within_limits"],
+        lambda _, a: [_record(a)],
+    )
+    tally.warn_of_limits()
 
 
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
@@ -80,7 +86,23 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     names = motor_names(arm)
     head, kinds, joint_units = render.head(arm), pulse_units(arm), units.names(arm)
     steps = units.joints_out(arm, resolution(arm)).tolist()
-    for i, joints in enumerate(chunk.values.tolist()):
+    # Columns of the whole chunk, then plain Python: numpy is slow at single numbers.
+    columns = zip(
+        chunk.values.tolist(),
+        r.pulses.tolist(),
+        moves,
+        actual,
+        (r.theoretical + 0.0).tolist(),
+        (r.actual + 0.0).tolist(),
+        r.difference.tolist(),
+        r.error.tolist(),
+        violations,
+        too_far.tolist(),
+        strict=True,
+    )
+    plain = None if found is None else list(zip(rounded.pulses.tolist(), rounded.error.tolist(), strict=True))
+    gains = [] if found is None else found.gain.tolist()
+    for i, (joints, counts, move, there, exact, at, off, error, outside, far) in enumerate(columns):
         answer: Pulses = {
             "robot": head["robot"],
             "robot_file": head["robot_file"],
@@ -91,22 +113,18 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
             "resolution": steps,
             "from": origin,
             "joints": joints,
-            "pulses": r.pulses[i].tolist(),
-            "moves": moves[i],
-            "actual_joints": actual[i],
-            "position_mm": {
-                "theoretical": (r.theoretical[i] + 0.0).tolist(),
-                "actual": (r.actual[i] + 0.0).tolist(),
-                "difference": r.difference[i].tolist(),
-            },
-            "error_mm": float(r.error[i]),
-            "within_limits": not violations[i],
-            "violations": violations[i],
-            "outside_travel": [name for name, far in zip(names, too_far[i], strict=True) if far],
+            "pulses": counts,
+            "moves": move,
+            "actual_joints": there,
+            "position_mm": {"theoretical": exact, "actual": at, "difference": off},
+            "error_mm": error,
+            "within_limits": not outside,
+            "violations": outside,
+            "outside_travel": [name for name, beyond in zip(names, far, strict=True) if beyond] if any(far) else [],
         }
-        if found is not None:
-            answer["rounded"] = {"pulses": rounded.pulses[i].tolist(), "error_mm": float(rounded.error[i])}
-            answer["gain_mm"] = float(found.gain[i])
+        if found is not None and plain is not None:
+            answer["rounded"] = {"pulses": plain[i][0], "error_mm": plain[i][1]}
+            answer["gain_mm"] = gains[i]
             answer["tried"] = found.tried
         yield answer
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import completion, inputs, linking, output, render
+from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import goals as read_goals
 from armkin.cli.linking import SIM, AssumeHome, Baud, PortName
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, TaskName
+from armkin.cli.options import BranchName, Joints, Json, RobotOrPipe, TaskName
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -24,14 +24,7 @@ if TYPE_CHECKING:
 
 
 def send(
-    robot: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[ROBOT]",
-            help="Robot file or name; a piped answer names its own.",
-            autocompletion=completion.robots,
-        ),
-    ] = None,
+    robot: RobotOrPipe = None,
     q: Joints = None,
     port: PortName = None,
     target: Annotated[
@@ -57,7 +50,7 @@ def send(
     ] = None,
     trace: Annotated[
         str | None,
-        typer.Option("--trace", metavar="FILE", help="CSV of the plan: time, joints, every joint's position."),
+        typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
     baud: Baud = None,
     json: Json = False,
@@ -84,7 +77,7 @@ def send(
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
         _write_trace(arm, plans, trace)
-        with output.destination(None) as write:
+        with output.beside(trace) as write:
             summed = planner.summary(plans)
             write(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
@@ -107,7 +100,7 @@ def send(
             machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
         planned = planner.summary(planner.done, began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
-    with output.destination(None) as write:
+    with output.beside(trace) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
