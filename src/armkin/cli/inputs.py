@@ -47,17 +47,6 @@ def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     return values
 
 
-def poses(robot: str | None, words: Sequence[str] | None) -> tuple[Arm, list[list[float]]]:
-    """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
-    from armkin.cli import piped
-
-    if not words and (found := piped.joint_values(robot)) is not None:
-        return found
-    assert robot is not None  # else `piped` has said that it is missing
-    arm = load(robot)
-    return arm, [joints(arm, words)]
-
-
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     """One value for each joint [deg | mm], comma-separated, or the name of a pose."""
     named = _pose(arm, text, f"{option}: ")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import output
+from armkin.cli import inputs, output
 from armkin.errors import FileError, NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -61,6 +62,14 @@ def read(robot: str | None) -> Piped:
     return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
 
 
+def poses(robot: str | None, words: Sequence[str] | None) -> tuple[Arm, list[list[float]]]:
+    """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
+    if not words and (found := joint_values(robot)) is not None:
+        return found
+    arm = inputs.load(inputs.named(robot))
+    return arm, [inputs.joints(arm, words)]
+
+
 def joint_values(robot: str | None) -> tuple[Arm, list[list[float]]] | None:
     """The arm and joint values [deg | mm] of what `fk`, `ik` or `pulses` with --json has printed.
 
@@ -82,8 +91,6 @@ def joint_values(robot: str | None) -> tuple[Arm, list[list[float]]] | None:
 
 def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:
     """The same as the arm and the answers themselves."""
-    from armkin.cli import inputs
-
     text = _text()
     if not text.strip():
         inputs.named(robot)
