@@ -31,6 +31,7 @@ _PYTHON = {
     "less": "{} < {}",
     "less_equal": "{} <= {}",
     "greater": "{} > {}",
+    "greater_equal": "{} >= {}",
     "equal": "{} == {}",
     "bitwise_or": "{} or {}",
     "bitwise_and": "{} and {}",

@@ -52,6 +52,10 @@ class Trace:
         if op == "negative":
             x = inputs[0]
             return x.args[0] if x.op == "negative" else self.record(op, inputs)
+        if op in ("bitwise_and", "bitwise_or"):
+            for x, y in (inputs, inputs[::-1]):
+                if isinstance(x, bool | np.bool_):  # of two constants
+                    return y if bool(x) == (op == "bitwise_and") else bool(x)
         if op in ("multiply", "add", "subtract"):
             a, b = inputs
             minus_a, minus_b = _is_negative(a), _is_negative(b)
