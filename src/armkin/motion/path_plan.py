@@ -94,44 +94,52 @@ class PathPlan:
         return self
 
     @property
-    def _motion(self) -> Trajectory:
+    def motion(self) -> Trajectory:
+        """The joints over time, stretch by stretch."""
         assert self.trajectory is not None, "the path was not planned to its end"
         return self.trajectory
 
     @property
     def duration(self) -> float:
         """Seconds."""
-        return self._motion.duration
+        return self.motion.duration
 
     def q(self, t: ArrayLike) -> Array:
         """Joint values at times t [s]: (...,) -> (..., n) [rad | mm]."""
-        return self._motion.q(t)
+        return self.motion.q(t)
 
     def qd(self, t: ArrayLike) -> Array:
         """Joint speeds: (...,) -> (..., n) [rad/s | mm/s]."""
-        return self._motion.qd(t)
+        return self.motion.qd(t)
 
     def qdd(self, t: ArrayLike) -> Array:
         """Joint accelerations: (...,) -> (..., n) [rad/s2 | mm/s2]."""
-        return self._motion.qdd(t)
+        return self.motion.qdd(t)
 
     def s(self, t: ArrayLike) -> Array:
         """Way of the tool along its path at times t: (...,) [mm]; before, between and behind it stays."""
         when = np.atleast_1d(np.asarray(t, dtype=float))
         out = np.zeros(len(when))
-        begins = self._motion.begins
+        begins = self.motion.begins
         for k, (stretch, base) in sorted(self.on_path.items()):
             if isinstance(stretch, Curve | Smoothed):
                 late = when >= begins[k]
                 out[late] = base + stretch.way(when[late] - begins[k])
         return out.reshape(np.shape(t))
 
+    def s_range(self, number: int) -> tuple[float, float]:
+        """Where a stretch on the tool's way begins and ends [mm]."""
+        stretch, base = self.on_path[number]
+        assert isinstance(stretch, Curve | Smoothed)
+        s = (stretch if isinstance(stretch, Curve) else stretch.curve).path.s
+        return base + float(s[0]), base + float(s[-1])
+
     @cached_property
     def limits(self) -> dict[str, Array]:
         """Greatest shares of the joints' limits that the motion takes: speed, accel (and jerk): (n,) each."""
         speed, accel = np.zeros(self.arm.n), np.zeros(self.arm.n)
         jerk = np.zeros(self.arm.n)
-        for stretch in self._motion.stretches:
+        for stretch in self.motion.stretches:
             if isinstance(stretch, Smoothed):
                 t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / 0.001), 2))
             elif isinstance(stretch, Curve):

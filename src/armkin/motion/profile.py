@@ -31,6 +31,11 @@ class Profile:
         return float(self.times[-1])
 
     @property
+    def is_trapezoid(self) -> bool:
+        """Whether speed rises and falls at the one acceleration, and nothing else happens."""
+        return len(self.jerk) == 3 and not self.jerk.any()
+
+    @property
     def peak(self) -> float:
         """Greatest speed that is reached."""
         return float(self.states[:, 1].max(initial=0.0))

@@ -49,8 +49,8 @@ def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
 
 
 def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
-    """The branches at the start, the one that carries farthest first."""
-    c, found = carried.columns, []
+    """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
+    c, found, chosen = carried.columns, [], None
     for chain in carried.all:
         if chain.first == 0:
             e = chain.carries(0)
@@ -58,7 +58,9 @@ def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
             far = float(c.s[e]) if e >= 0 else 0.0
             why = words(arm, _break(arm, c, chain, 0, 0.0))
             found.append((e, Branch(_name(c, int(chain.labels[0])), q, far, why)))
-    return [branch for _, branch in sorted(found, key=lambda one: -round(one[1].carries, 2))]
+            if carried.runs and chain is carried.runs[0].chain:
+                chosen = found[-1][1]
+    return [branch for _, branch in sorted(found, key=lambda one: (-round(one[1].carries, 2), one[1] is not chosen))]
 
 
 def _name(c: Columns, label: int) -> str:
@@ -80,6 +82,65 @@ def words(arm: Arm, where: Reconfiguration) -> str:
         return _WHY[where.why]
     size, unit = (1.0, "mm") if arm.prismatic[where.index] else (units.DEGREE, "deg")
     return f"{where.joint} meets its limit {where.value / size:.6g} {unit}"
+
+
+def answer(plan: PathPlan) -> dict[str, Any]:
+    """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
+    arm = plan.arm
+    out = units.joints_out
+    planned = plan.trajectory is not None
+    worst = plan.nearest_singularity
+    return {
+        "task": plan.task.name,
+        "length_mm": plan.length,
+        "duration_s": plan.duration if planned else None,
+        "samples": plan.samples,
+        "complete": plan.complete,
+        "tolerance_mm": plan.tolerance,
+        "deviation_mm": plan.deviation if planned else None,
+        "joint_units": units.names(arm),
+        "start_joints": out(arm, plan.motion.start).tolist() if planned else None,
+        "joints": out(arm, plan.motion.end).tolist() if planned else None,
+        "runs": [
+            {
+                "s_mm": [run.begin, run.end],
+                "branches": [{"s_mm": s, "name": name} for s, name in run.names],
+                "start_joints": out(arm, run.start_joints).tolist(),
+                "end_joints": out(arm, run.end_joints).tolist(),
+            }
+            for run in plan.runs
+        ],
+        "reconfigurations": [
+            {
+                "s_mm": one.s,
+                "why": one.why,
+                "joint": one.joint,
+                "value": None if one.value is None or one.index is None else _shown(arm, one.index, one.value),
+                "status_beyond": one.beyond,
+            }
+            for one in plan.reconfigurations
+        ],
+        "branches": [
+            {
+                "name": branch.name,
+                "start_joints": out(arm, branch.start_joints).tolist(),
+                "carries_mm": branch.carries,
+                "ends_because": branch.ends_because,
+            }
+            for branch in plan.branches
+        ],
+        "limits": {key: dict(zip(arm.joint_names, shares.tolist(), strict=True)) for key, shares in plan.limits.items()}
+        if planned
+        else None,
+        "nearest_singularity": None
+        if worst is None
+        else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
+    }
+
+
+def _shown(arm: Arm, joint: int, value: float) -> float:
+    """One joint's value in degrees, or mm."""
+    return value if arm.prismatic[joint] else value / units.DEGREE
 
 
 def refused(plan: PathPlan, carried: Carried) -> NoSolutionError:

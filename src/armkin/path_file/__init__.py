@@ -8,6 +8,7 @@ This package imports pydantic and yaml, and is itself imported only when a path 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
@@ -52,7 +53,7 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
 def validated(data: dict[str, Any], name: str = "path") -> PathFile:
     """Validate a path that is data already, as the page or a program has it."""
     try:
-        return PathFile.model_validate(data)
+        return PathFile.model_validate(_lists(data))
     except ValidationError as error:
         from armkin.path_file import words
 
@@ -66,11 +67,11 @@ def json_schema() -> dict[str, Any]:
     return made_from(PathFile, "armkin path file")
 
 
-def _lists(data: Any) -> Any:
-    """The loader's tuples as lists, which the model's strict types want."""
-    if isinstance(data, dict):
-        return {key: _lists(value) for key, value in data.items()}
-    return [_lists(value) for value in data] if isinstance(data, tuple) else data
+def _lists(value: Any) -> Any:
+    """The same data with lists where the reader (or a program) has tuples."""
+    if isinstance(value, Mapping):
+        return {key: _lists(part) for key, part in value.items()}
+    return [_lists(part) for part in value] if isinstance(value, list | tuple) else value
 
 
 def _is_yaml(data: bytes) -> bool:

@@ -83,6 +83,9 @@ class Backend(Protocol):
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
 
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+        """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
+
     def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> object:
         """Carry out plans, one after another; None in between: nothing to do yet."""
 

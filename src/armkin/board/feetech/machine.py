@@ -183,6 +183,10 @@ class ServoMachine:
         counts = np.asarray(start, dtype=np.int64)
         return Job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+        """A trajectory that starts at counts (motors,)."""
+        return Job(trajectory, start)
+
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = done = 0.0

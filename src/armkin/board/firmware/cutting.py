@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.board.firmware.curves import CurveSegments, rates
 from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, line
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -26,6 +27,9 @@ from armkin.motors import motor_accel, motor_names, pulses
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Stretch, Trajectory
+
+
+TOLERANCE = 0.05  # [mm] between the chord of a segment and its curve
 
 
 class RateError(UsageError):
@@ -56,7 +60,7 @@ class Cut:
     @cached_property
     def segments(self) -> int:
         """Number of device segments."""
-        return sum(sum(1 for _ in move.segments) for move in self.moves())
+        return sum(len(move.segments) for move in self.moves())
 
     def moves(self) -> Iterator[Move]:
         """The moves, one a stretch, made as they are asked for."""
@@ -66,8 +70,11 @@ class Cut:
             at = end
 
     def _move(self, stretch: Stretch, start: Counts, end: Counts) -> Move:
-        assert isinstance(stretch, Straight)
-        brakes = motor_accel(self.trajectory.arm)
+        arm = self.trajectory.arm
+        if not (isinstance(stretch, Straight) and (stretch.law.is_trapezoid or stretch.duration == 0)):
+            parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
+            return Move(start, end, parts, round(stretch.duration * self.clock), 0.0)
+        brakes = motor_accel(arm)
         return line(
             start.tolist(),
             end.tolist(),
@@ -89,10 +96,10 @@ def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_int
     top = np.zeros(len(first))
     at, allowed = first, clock / min_interval
     for stretch, end in zip(trajectory.stretches, ends, strict=True):
-        rates = _rates(stretch, at, end)
-        if rates.max(initial=0.0) > allowed:
-            raise _too_fast(arm, stretch, rates, allowed)
-        top, at = np.maximum(top, rates), end
+        needed = _rates(arm, stretch, at, end)
+        if needed.max(initial=0.0) > allowed:
+            raise _too_fast(arm, stretch, needed, allowed)
+        top, at = np.maximum(top, needed), end
     return Cut(trajectory, first, np.array(ends, dtype=np.int64).reshape(-1, len(first)), top, clock, min_interval)
 
 
@@ -129,9 +136,10 @@ def plan(
         raise RateError(f"{error}\nlower its max_speed, or the speed to {percent} percent", **error.fields) from None
 
 
-def _rates(stretch: Stretch, start: Counts, end: Counts) -> Array:
+def _rates(arm: Arm, stretch: Stretch, start: Counts, end: Counts) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s]."""
-    assert isinstance(stretch, Straight)
+    if not isinstance(stretch, Straight):
+        return rates(arm, stretch)
     return np.asarray(np.abs(end - start) * stretch.law.peak)
 
 

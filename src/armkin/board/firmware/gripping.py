@@ -23,6 +23,19 @@ def gripper_of(name: str, configuration: Configuration) -> Grip:
     return gripper
 
 
+def count_of(gripper: Grip, value: str | float) -> int:
+    """Counts of open, closed, or a value of the drive; UsageError if that is beyond the two."""
+    named = {"open": gripper.open, "closed": gripper.closed}
+    if isinstance(value, str):
+        return named[value]
+    count = gripper.count(value)
+    low, high = sorted(named.values())
+    if not low <= count <= high:
+        ends = sorted((gripper.value(low), gripper.value(high)))
+        raise UsageError(f"grip: {value:g} is outside of the gripper's {ends[0]:g} to {ends[1]:g}")
+    return count
+
+
 def known(machine: Machine, gripper: Grip) -> bool:
     """Whether the board knows where the gripper stands."""
     return machine.configured and bool(machine.status.known >> gripper.axis & 1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
 
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
@@ -207,6 +209,10 @@ class Machine:
         info = self.info
         return cutting.plan(self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval)
 
+    def lay(self, trajectory: Trajectory, start: Counts) -> cutting.Cut:
+        """A trajectory that starts at counts (motors,), for the board that is there."""
+        return cutting.cut(trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval)
+
     def run(self, plans: Iterable[cutting.Cut | None], progress: Progress = lambda done, total: None) -> Status:
         """Carry out plans, one after another; None in between: nothing to do yet.
 
@@ -271,11 +277,12 @@ class Machine:
         moving = sorted(move.moving, key=lambda k: axes[k])
         at = [int(move.start[k]) for k in moving]
         room = self.info.frame - 4
-        todo = [Segment(s.ticks, s.interval, s.add, tuple(s.steps[k] for k in moving)) for s in move.segments]
-        if todo and self.session.state == State.IDLE and not self.session.under_way:
+        source = (Segment(s.ticks, s.interval, s.add, tuple(s.steps[k] for k in moving)) for s in move.segments)
+        todo: list[Segment] = []
+        if move.segments and self.session.state == State.IDLE and not self.session.under_way:
             lead = _LEAD[self.session.damaged]
-            todo.insert(0, Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
-        while todo:
+            todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
+        while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
             most = _BATCH[0] if self.session.noisy else _BATCH[1]
             n = 1
             while (
@@ -285,6 +292,8 @@ class Machine:
             ):
                 n += 1
             part, todo = todo[:n], todo[n:]
+            if not todo:
+                todo = list(islice(source, 1))
             end = [a + sum(s.steps[i] for s in part) for i, a in enumerate(at)]
             yield _Batch([axes[k] for k in moving], at, end, part, not todo, clock)
             at = end

@@ -18,6 +18,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +32,21 @@ Counts = NDArray[np.int64]
 CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 400  # [cycles] between ticks
 
-_GROWTH = 1.12  # time at a ramp segment's end over time at its start, seen from standstill
+_GROWTH = 1.12  # the least: time at a ramp segment's end over time at its start, seen from standstill
 _SHORTEST = (0.002, 0.02)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
+_RAMP = 24  # segments that a ramp has, about, at most
 _AHEAD = 26  # segments that the board's queue surely holds (32, but for those under way)
 _CRUISE = 0.05  # [s] a cruise segment's time at least
 _TICK = 1300  # [cycles] slower segments are oversampled down to about this
 _LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
+
+
+class Segments(Protocol):
+    """Segments in order, as often as they are asked for."""
+
+    def __iter__(self) -> Iterator[Segment]: ...
+
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -45,14 +55,14 @@ class Move:
 
     start: Counts  # (motors,)
     end: Counts  # (motors,)
-    segments: Sequence[Segment]
+    segments: Segments
     cycles: int  # of the clock, all segments together
-    peak: float  # [1/s] greatest speed, in lines per second
+    peak: float  # [1/s] greatest speed, in lines per second; 0: not a line
 
     @property
     def moving(self) -> list[int]:
-        """Motors that have a step on the way, whether or not they end where they start."""
-        return np.flatnonzero(np.any([s.steps for s in self.segments], axis=0)).tolist() if self.segments else []
+        """Motors that take part: on a line those that end elsewhere, on a curve all."""
+        return [k for k in range(len(self.start)) if self.peak == 0 or self.start[k] != self.end[k]]
 
     @property
     def leader(self) -> int:
@@ -194,13 +204,23 @@ class _Trapezoid:
         """Whether a segment has no part of a ramp."""
         return a >= self.way and b <= self.n - self.way
 
+    @property
+    def growth(self) -> float:
+        """Time at a ramp segment's end over time at its start: the whole ramp is in the queue before it begins."""
+        ramp = self.peak / self.accel
+        for growth in (_GROWTH, 1.14, 1.17, 1.2, 1.25, 1.3, 1.4):
+            geometric = max(ramp * (growth - 1) / self.shortest, 1.0)
+            if 1 / (growth - 1) + math.log(geometric) / math.log(growth) <= _RAMP:
+                return growth
+        return 1.5
+
     def bounds(self) -> Iterator[int]:
         """Leader steps where segments end: geometric in the ramps, even between them."""
-        rise = [0]
+        rise, growth = [0], self.growth
         whole = min(int(self.way), self.n // 2)
         while rise[-1] < whole:
             t = self.time(rise[-1])
-            t = max(t * _GROWTH, t + self.shortest)
+            t = max(t * growth, t + self.shortest)
             at = max(int(self.accel * t * t / 2), rise[-1] + 1)
             rise.append(whole if at + (at - rise[-1]) // 2 > whole else at)
         middle = self.n - 2 * whole
@@ -210,7 +230,7 @@ class _Trapezoid:
             rise.pop()
         else:
             yield from rise
-            longest = max(_CRUISE, (_GROWTH - 1) * self.peak / self.accel)
+            longest = max(_CRUISE, (growth - 1) * self.peak / self.accel)
             parts = min(max(1, math.ceil(middle / (self.peak * longest))), middle)
             parts = max(parts, math.ceil(middle / 30_000))
             yield from (whole + middle * i // parts for i in range(1, parts))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.grbl import lines, settings
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
 
 MARK = 1000.0  # [units] added to G92: an offset of 0 means that nobody has said where the arm stands
 _REST = 30.0  # [s] that a hold may take
@@ -134,6 +136,10 @@ class GrblMachine:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
         made = joints_of(self.arm, np.asarray(start, dtype=np.int64))
         return Job(plan_joints(self.arm, made, targets, speed=speed), np.asarray(start, dtype=np.int64))
+
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+        """A trajectory that starts at counts (motors,)."""
+        return Job(trajectory, start)
 
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""

@@ -6,6 +6,7 @@ COMMANDS = {
     "ik": "All joint values that reach a target.",
     "pulses": "Motor pulses from home to a pose.",
     "send": "Move the arm.",
+    "path": "Plan a path through space, and move along it.",
     "status": "Where the board says that the arm stands.",
     "home": "Find the limit switches, and with them the position.",
     "stop": "Stop the arm along its path.",

@@ -1,0 +1,138 @@
+"""Any stretch of a trajectory as device segments: straight lines in counts with a ramp of speed, made as asked for.
+
+A segment spans so little time that its chord leaves the curve by at most the tolerance, and that its speed changes
+by about an eighth near a rest; at least 10 ms, and so much that the board's queue always reaches to a stop. Its steps
+are differences of rounded counts: their sums are exact. Its ramp follows the speed along the way, and no motor is
+faster in its fastest tick than its greatest rate: the board checks that of every segment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.firmware.protocol import Segment
+from armkin.board.firmware.segments import Counts, cycles_of
+from armkin.formula.arrays import Array
+from armkin.forward import jacobian
+from armkin.motors import motor_accel, pulses
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Stretch
+
+_LEAST, _MOST = 0.010, 0.050  # [s] a segment
+_GROWTH = 0.12  # of the time since the start, or to the end
+_FINE = 0.005  # [s] between the samples from which the spans are chosen
+_TICK = 1300  # [cycles] slower segments are oversampled down to about this
+_LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
+_QUEUED = 25  # segments that are surely in the board's queue
+_BLOCK = 512  # segments that are made at once
+
+
+@dataclass(frozen=True)
+class CurveSegments:
+    """The segments of one stretch; iterating makes them anew, in bounded memory."""
+
+    arm: Arm
+    stretch: Stretch
+    start: Counts  # (motors,)
+    end: Counts
+    clock: int
+    min_interval: int
+    tolerance: float  # [mm]
+
+    def __iter__(self) -> Iterator[Segment]:
+        """The segments in order."""
+        bounds = self.bounds()
+        fastest = np.abs(self.arm.motor_gain) @ self.arm.max_speed
+        per_step = [self.clock // (4 * max(1, math.ceil(rate - 1e-9))) for rate in fastest.tolist()]
+        carry, at = 0.0, self.start
+        for first in range(0, len(bounds) - 1, _BLOCK):
+            t = bounds[first : first + _BLOCK + 1]
+            counts = pulses(self.arm, self.stretch.at(t))
+            if first + _BLOCK >= len(bounds) - 1:
+                counts[-1] = self.end
+            speed = np.linalg.norm(self.stretch.at(t, 1) @ self.arm.motor_gain.T, axis=1)
+            for k in range(len(t) - 1):
+                steps = [int(b - a) for a, b in zip(at, counts[k + 1], strict=True)]
+                exact = float(t[k + 1] - t[k]) * self.clock + carry
+                one = self._segment(steps, exact, float(speed[k]), float(speed[k + 1]), per_step)
+                carry = exact - cycles_of(one)
+                at = counts[k + 1]
+                yield one
+
+    def __len__(self) -> int:
+        return len(self.bounds()) - 1
+
+    def bounds(self) -> Array:
+        """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
+        whole = self.stretch.duration
+        t = np.linspace(0.0, whole, max(int(whole / _FINE), 16))
+        parts = [self._spans(part) for part in np.array_split(t, max(len(t) // 20_000, 1))]
+        span, stop = (np.concatenate(x) for x in zip(*parts, strict=True))
+        span = np.minimum(span, _GROWTH * np.minimum(t, whole - t))
+        span = np.maximum(np.clip(span, _LEAST, _MOST), _reaching(stop, float(t[1])))
+        density = 1.0 / span
+        level = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(t))])
+        number = max(int(level[-1]), 1)
+        out = np.interp(np.linspace(0.0, level[-1], number + 1), level, t)
+        out[-1] = whole
+        return np.asarray(out)
+
+    def _spans(self, t: Array) -> tuple[Array, Array]:
+        """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest."""
+        q, qd = self.stretch.at(t), self.stretch.at(t, 1)
+        J = jacobian(self.arm, q)[:, :3]
+        v, bend = ((J @ x[:, :, None])[..., 0] for x in (qd, self.stretch.at(t, 2)))
+        along = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
+        across = np.linalg.norm(bend - along * (along * bend).sum(axis=1, keepdims=True), axis=1)
+        stop = (np.abs(qd @ self.arm.motor_gain.T) / motor_accel(self.arm)).max(axis=1)
+        return np.sqrt(8 * self.tolerance / np.maximum(across, 1e-9)), stop
+
+    def _segment(self, steps: list[int], exact: float, v0: float, v1: float, per_step: list[int]) -> Segment:
+        """One segment of about `exact` cycles, its speed going from v0 to v1 (only their ratio counts)."""
+        n = max(map(abs, steps))
+        cycles = max(exact, float(self.min_interval))
+        over = max(1, int(cycles / (_TICK * max(n, 1))))
+        if n and n <= 127:
+            over = min(over, max(255 // n, 1))
+        over = max(over, math.ceil(1.6 * cycles / (_LONGEST * max(n, 1))))
+        ticks = over * max(n, 1)
+        mean = cycles / ticks
+        # The fastest tick: right for the speed there, and slow enough for every motor.
+        share = (v0 + v1) / 2 / max(v0, v1, 1e-12)
+        needed = max(
+            (math.ceil((4 * (abs(s) - 1) * per + 4) / ticks) for s, per in zip(steps, per_step, strict=True) if s),
+            default=0,
+        )
+        fast = max(mean * share, float(min(needed, mean)), float(self.min_interval))
+        fast = min(fast, mean)
+        change = 2 * (mean - fast)
+        add = round(256 * (change if v0 > v1 else -change) / ticks)
+        interval = round(mean - add * (ticks - 1) / 512 + (0.5 if add else 0.0))
+        last = (256 * interval + (ticks - 1) * add) >> 8
+        interval += max(0, max(self.min_interval, needed) - min(interval, last))
+        return Segment(ticks, interval, add, tuple(steps))
+
+
+def _reaching(stop: Array, step: float) -> Array:
+    """Least span of segments so that `_QUEUED` of them always reach to a stop; samples `step` [s] apart.
+
+    What moves now and needs u to a stop asks that of all segments within the next u.
+    """
+    need = stop / _QUEUED
+    out = need.copy()
+    for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
+        out[d:] = np.maximum(out[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
+    return out
+
+
+def rates(arm: Arm, stretch: Stretch) -> Array:
+    """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
+    t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _FINE), 16))
+    return np.asarray(np.abs(stretch.at(t, 1) @ arm.motor_gain.T).max(axis=0))

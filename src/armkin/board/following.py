@@ -1,0 +1,62 @@
+"""A planned path on a board: laid out before anything moves, carried out part by part, the gripper between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.firmware import gripping
+from armkin.board.firmware.machine import Machine
+from armkin.errors import UsageError
+from armkin.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armkin.board.backend import Backend, Planned, Progress
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.foreign import Foreign
+    from armkin.motion.path_plan import PathPlan
+
+Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
+
+
+def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
+    """A plan's motion between the gripper's, from counts. Raises UsageError if the board is too slow for it."""
+    whole = plan.motion
+    edges = [0, *(marker.before for marker in plan.markers), len(whole.stretches)]
+    found, at, q = [], np.asarray(start, dtype=np.int64), whole.start
+    for a, b in pairwise(edges):
+        trajectory = Trajectory(plan.arm, q, whole.stretches[a:b])
+        one = lay(trajectory, at)
+        found.append(one)
+        at, q = one.end, trajectory.end
+    return found
+
+
+def check_gripper(plan: PathPlan, board: Configuration | Foreign) -> None:
+    """Raise UsageError if the plan needs a gripper that the board does not move, or a value it cannot reach."""
+    from armkin.board.foreign import Foreign
+
+    for marker in plan.markers:
+        if isinstance(board, Foreign):
+            raise UsageError(f"a path with grip: needs a board with armkin's firmware, not {board.board.kind}")
+        gripping.count_of(gripping.gripper_of(plan.arm.name, board), marker.value)
+
+
+def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: Progress) -> None:
+    """Carry out a plan's parts, and what the gripper does between them."""
+    done, total = 0.0, sum(one.duration for one in laid)
+    for k, one in enumerate(laid):
+        if one.trajectory.stretches:
+            begun = done
+            machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
+            done += one.duration
+        if k < len(plan.markers):
+            assert isinstance(machine, Machine)
+            gripper = gripping.gripper_of(plan.arm.name, machine.configuration)
+            gripping.prepare(machine, gripper, None)
+            gripping.grip(machine, gripper, gripping.count_of(gripper, plan.markers[k].value))

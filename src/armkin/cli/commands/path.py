@@ -1,0 +1,295 @@
+"""`armkin path`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import holding, inputs, linking, output, render
+from armkin.cli.batch import csv_line
+from armkin.cli.linking import SIM, AssumeHome, Baud
+from armkin.cli.numbers import listed, number, whole
+from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Planned
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+
+_STEP = 0.01  # [s] between the rows of --out
+
+
+def path(
+    robot: Robot,
+    file: Annotated[
+        str | None, typer.Argument(metavar="[FILE|-]", help="Moves: a path file (YAML), or corners as CSV rows.")
+    ] = None,
+    via: Annotated[
+        list[str] | None,
+        typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a corner of straight lines. Repeatable."),
+    ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option("--port", "-p", metavar="PORT", help="Move: to the start by a joint move, then along the path."),
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan and tell, whatever --port says.")] = False,
+    tolerance: Annotated[
+        str | None, typer.Option("--tolerance", metavar="MM", help="Between plan and path. [default: 0.05]")
+    ] = None,
+    blend: Annotated[
+        str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
+    ] = None,
+    speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
+    accel: Annotated[str, typer.Option("--accel", metavar="PERCENT", help="Of every joint's max_accel.")] = "100",
+    tool_speed: Annotated[
+        str | None, typer.Option("--tool-speed", metavar="MM/S", help="Greatest speed of the tool.")
+    ] = None,
+    jerk: Annotated[
+        str | None,
+        typer.Option("--jerk", metavar="DEG/S3", help="Greatest jerk of every joint. [default: its max_jerk]"),
+    ] = None,
+    near: Near = None,
+    start: Annotated[
+        str | None,
+        typer.Option("--start", metavar="Q,...", help="Where the arm stands, for a plan. [default: the home pose]"),
+    ] = None,
+    branch: BranchName = None,
+    task: TaskName = None,
+    lock: Lock = None,
+    split: Annotated[
+        bool, typer.Option("--split", help="Where no branch carries on, change it there by a joint move.")
+    ] = False,
+    samples: Annotated[
+        str | None, typer.Option("--samples", metavar="N", help="Targets solved at first. [default: one a mm]")
+    ] = None,
+    out: Out = None,
+    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
+    assume_home: AssumeHome = False,
+    baud: Baud = linking.BAUD,
+    json: Json = False,
+) -> None:
+    """Plan a path through space, and move along it.
+
+    The branch that carries the whole way, within all limits, as fast as the joints allow; where none does: how
+    far each one goes, and why no farther. Nothing moves unless the whole path is planned.
+    """
+    if start is not None and port is not None and not dry_run:
+        raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
+    if port is not None and lock:
+        raise UsageError("--lock plans only: leave --port out")
+    if out:
+        output.spare(robot, out)
+    if plot is not None:
+        from armkin.plot import canvas
+
+        canvas.check(plot)
+        canvas.require()
+    import numpy as np
+
+    arm = inputs.load(robot)
+    held = holding.locks(arm, lock)
+    if held:
+        import armkin
+
+        arm = armkin.lock(arm, {n: v if arm.prismatic[arm.joint_names.index(n)] else v * units.DEGREE
+                                for n, v in held.items()})  # fmt: skip
+    moves = _moves(arm, file, via, task)
+    options: dict[str, Any] = {
+        "branch": branch,
+        "task": task,
+        "tolerance": _positive(tolerance, "--tolerance"),
+        "blend": None if blend is None else _positive(blend, "--blend", zero=True),
+        "speed": (_positive(speed, "--speed") or 100.0) / 100,
+        "accel": (_positive(accel, "--accel") or 100.0) / 100,
+        "tool_speed": _positive(tool_speed, "--tool-speed"),
+        "jerk": None if jerk is None else units.joints_in(arm, np.full(arm.n, _positive(jerk, "--jerk"))),
+        "near": None if near is None else units.joints_in(arm, inputs.joint_list(arm, near, "--near")),
+        "split": split,
+        "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
+    }
+    if port is None or dry_run:
+        if start is not None:
+            options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--start"))
+        plan = _planned(arm, moves, options, json=json)
+        _files(plan, out, plot)
+        found = _found(plan, _rehearsed(plan) if not held else None)
+        _print(plan, found, json=json)
+        return
+    _carried_out(arm, moves, options, port, baud, out, plot, assume_home=assume_home, json=json)
+
+
+def _carried_out(
+    arm: Arm,
+    moves: Any,
+    options: dict[str, Any],
+    port: str,
+    baud: int | None,
+    out: str | None,
+    plot: str | None,
+    *,
+    assume_home: bool,
+    json: bool,
+) -> None:
+    """Plan from where the arm stands, then move it."""
+    from armkin.board import following
+    from armkin.board.moving import where
+
+    board = linking.board_of(arm, rehearsal=port == SIM)
+    with linking.backend(arm, board, port, baud) as machine:
+        if machine.prepare(assume_home=assume_home) and assume_home:
+            output.note("the board takes the arm to stand in its home pose")
+        plan = _planned(arm, moves, {**options, "start": machine.joints()}, json=json)
+        following.check_gripper(plan, board)
+        laid = following.parts(plan, machine.counts(), machine.lay)
+        _files(plan, out, plot)
+        with output.progress("ms of motion", round(1000 * plan.duration)) as tick:
+            following.follow(machine, plan, laid, lambda done, _: tick(round(1000 * done)))
+        found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
+    _print(plan, found, json=json)
+    if not json:
+        with output.destination(None) as write:
+            write(linking.where_text(arm, found))
+
+
+def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
+    """The moves as `armkin.path` takes them."""
+    from armkin import path_file
+
+    if (file is None) == (not via):
+        raise UsageError("give a path file, or corners with --via X,Y,Z --via X,Y,Z: one of the two")
+    if via:
+        from armkin.inverse.tasks.fitting import task_for
+
+        labels = task_for(arm, task).labels
+        first, *rest = [_corner(text, labels) for text in via]
+        return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in rest)]})
+    assert file is not None
+    if file == "-":
+        import sys
+
+        return path_file.parse(sys.stdin.buffer.read(), "standard input")
+    return path_file.read(file)
+
+
+def _corner(text: str, labels: tuple[str, ...]) -> list[float]:
+    """`--via X,Y,Z`, or with the rest of the target."""
+    short = labels[: 2 if labels[2:3] != ("z",) else 3]
+    return listed(text, short if text.count(",") + 1 == len(short) else labels, "--via")
+
+
+def _positive(text: str | None, option: str, *, zero: bool = False) -> float | None:
+    if text is None:
+        return None
+    value = number(text, option)
+    if value < 0 or (value == 0 and not zero):
+        raise UsageError(f"{option}: '{text}' must be {'at least' if zero else 'above'} 0")
+    return value
+
+
+def _planned(arm: Arm, moves: Any, options: dict[str, Any], *, json: bool) -> PathPlan:
+    """The plan; of a path that is not carried, what is known of it is printed first."""
+    import armkin
+
+    try:
+        return armkin.path(arm, moves, **options)
+    except NoSolutionError as error:
+        plan: PathPlan | None = getattr(error, "plan", None)
+        if plan is not None:
+            _print(plan, _found(plan, None), json=json)
+        raise
+
+
+def _rehearsed(plan: PathPlan) -> list[Planned] | None:
+    """The plan on the robot file's board, or on one that is made up; None without drives."""
+    from functools import partial
+
+    from armkin.board import following
+    from armkin.board.firmware.cutting import cut
+    from armkin.motors import pulses
+
+    try:
+        board = linking.configured(plan.arm, rehearsal=True).board
+    except UsageError:
+        return None
+    start = pulses(plan.arm, plan.motion.start).tolist()
+    return following.parts(plan, start, partial(cut, clock=board.clock, min_interval=board.min_interval))
+
+
+def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
+    """The answer as data."""
+    from armkin.motion.report import answer
+
+    segments = None if laid is None else sum(one.segments for one in laid)
+    return {**render.head(plan.arm), **answer(plan), "segments": segments}
+
+
+def _files(plan: PathPlan, out: str | None, plot: str | None) -> None:
+    """`--out` and `--plot`."""
+    if out is not None:
+        _write(plan, out)
+    if plot is not None:
+        from armkin.plot.path import plot_path
+
+        plot_path(plan, plot)
+
+
+def _write(plan: PathPlan, name: str) -> None:
+    """CSV: time, joints, their speeds, the tool, the way."""
+    import numpy as np
+
+    import armkin
+
+    arm = plan.arm
+    heading = ["time_s", *arm.joint_names, *(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]
+    t = np.append(np.arange(0.0, plan.duration, _STEP), plan.duration)
+    with output.destination(name) as write:
+        write(csv_line(heading) + "\n")
+        for part in np.array_split(t, max(len(t) // 10_000, 1)):
+            q = plan.q(part)
+            rows = np.column_stack([
+                part, units.joints_out(arm, q), units.joints_out(arm, plan.qd(part)), armkin.fk(arm, q)[:, :3, 3],
+                plan.s(part),
+            ])  # fmt: skip
+            write("".join(csv_line(row) + "\n" for row in (rows + 0.0).tolist()))
+
+
+def _print(plan: PathPlan, found: dict[str, Any], *, json: bool) -> None:
+    with output.destination(None) as write:
+        write(render.to_json(found) + "\n" if json else _text(plan, found))
+
+
+def _text(plan: PathPlan, found: dict[str, Any]) -> str:
+    """The plan for people."""
+    arm = plan.arm
+    lines = [f"{arm.name}: {found['length_mm']:.3f} mm of path"]
+    if found["duration_s"] is not None:
+        lines[0] += f", {found['duration_s']:.3f} s"
+        if found["segments"] is not None:
+            lines[0] += f", {found['segments']} segments"
+    for run in found["runs"]:
+        names = ", then ".join(
+            f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
+            for k, one in enumerate(run["branches"])
+        )
+        lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
+    for one in plan.reconfigurations:
+        from armkin.motion.report import words
+
+        lines.append(f"  at {one.s:.3f} mm: {words(arm, one)}")
+    if found["branches"]:
+        rows = [["branch at the start", "carries/mm", ""]]
+        rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]
+        lines += ["", render.table(rows, left=(0, 2))]
+    if found["limits"] is not None:
+        rows = [["share of", *arm.joint_names]]
+        rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in found["limits"].items()]
+        lines += ["", render.table(rows), ""]
+        worst = found["nearest_singularity"]
+        if worst is not None:
+            size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
+            lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
+        lines.append(f"at most {found['deviation_mm']:.4f} mm from the path; {found['tolerance_mm']:g} allowed")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,127 @@
+"""`armkin path`: plans, tells, draws, moves on the simulated board; refuses in words with the right exit code."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from command_line import ROOT, THREE_DOF, run
+
+PICK = """
+robot: three_dof
+blend: 5
+start: home
+moves:
+  - point: [390, 80, 300]
+  - line: [390, 140, 300]
+  - arc: {via: [380, 160, 300], to: [360, 160, 300]}
+  - grip: closed
+  - offset: {xyz: [0, 0, -30]}
+  - wait: 0.2
+  - joint: home
+"""
+
+
+@pytest.fixture
+def pick(tmp_path: Path) -> Path:
+    path = tmp_path / "pick.yaml"
+    path.write_text(PICK)
+    return path
+
+
+def test_a_plan_is_told_drawn_and_written(pick: Path, tmp_path: Path) -> None:
+    done = run("path", THREE_DOF, pick, "--json", "--out", tmp_path / "o.csv", "--plot", tmp_path / "o.png")
+    assert done.code == 0, done.err
+    found = done.json
+    assert found["robot"] == "three_dof"
+    assert len(found["robot_sha256"]) == 64
+    assert found["length_mm"] == pytest.approx(134.628, abs=0.001)
+    assert [run["s_mm"] for run in found["runs"]] == [[0.0, found["length_mm"]]]
+    assert found["runs"][0]["branches"] == [{"s_mm": 0.0, "name": "left, elbow up"}]
+    assert found["reconfigurations"] == []
+    assert found["branches"][0]["carries_mm"] == found["length_mm"]
+    assert max(found["limits"]["speed"].values()) <= 1.002
+    assert max(found["limits"]["accel"].values()) <= 1.002
+    assert found["deviation_mm"] <= found["tolerance_mm"] == 0.05
+    assert found["segments"] < 100 * found["duration_s"]
+    rows = list(csv.DictReader((tmp_path / "o.csv").read_text().splitlines()))
+    assert float(rows[-1]["time_s"]) == found["duration_s"]
+    assert float(rows[-1]["s_mm"]) == pytest.approx(found["length_mm"])
+    q = np.deg2rad([float(rows[300][name]) for name in ("q1", "q2", "q3")])
+    tip = armkin.fk(armkin.load(THREE_DOF), q)[:3, 3]
+    assert tip == pytest.approx([float(rows[300][f"{axis}_mm"]) for axis in "xyz"])
+    assert (tmp_path / "o.png").stat().st_size > 20_000
+
+
+def test_the_arm_goes_along_a_path_and_ends_at_exact_counts(pick: Path) -> None:
+    done = run("path", THREE_DOF, pick, "--port", "sim", "--json")
+    assert done.code == 0, done.err
+    assert done.json["pulses"] == [0, 0, 0]
+    assert done.json["position"] == "known"
+
+
+def test_a_closed_path_moves_although_it_ends_where_it_starts(tmp_path: Path) -> None:
+    circle = tmp_path / "circle.yaml"
+    circle.write_text("moves:\n  - circle: {centre: [228, 10, 367], normal: [0, 0, 1]}\n")
+    done = run("path", THREE_DOF, circle, "--port", "sim", "--json")
+    assert done.code == 0, done.err
+    assert done.json["pulses"] == [0, 0, 0]
+    assert done.json["length_mm"] == pytest.approx(60 * np.pi)
+    assert done.json["segments"] > 30
+
+
+def test_corners_from_options_and_from_csv(tmp_path: Path) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text("z,x,y,blend\n300,390,80,0\n300,390,140,10\n300,330,140,0\n")
+    one = run("path", THREE_DOF, rows, "--json").json
+    two = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,140,300", "--via", "330,140,300",
+              "--blend", 10, "--json").json  # fmt: skip
+    assert one["length_mm"] == pytest.approx(two["length_mm"])
+    assert one["length_mm"] < 120
+    assert run("path", THREE_DOF, "-", "--json", stdin=rows.read_bytes()).json["length_mm"] == one["length_mm"]
+
+
+def test_what_is_not_carried_is_exit_3_with_the_verdict() -> None:
+    done = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,-400,300", "--json", "--port", "sim")
+    assert done.code == 3
+    found = done.json
+    assert found["duration_s"] is None
+    assert found["reconfigurations"][0]["why"] == "reach"
+    assert found["reconfigurations"][0]["status_beyond"] == "unreachable"
+    assert [branch["ends_because"] for branch in found["branches"]][-1] == "q1 meets its limit -120 deg"
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        ("moves: []", 2, "has 0 items"),
+        ("moves:\n  - lin: [1, 2, 3]", 2, ":2: move 1: lin: unknown key; did you mean line?"),
+        ("moves:\n  - line: [1, 2, x]", 2, "move 1: line"),
+        ("moves:\n  - line: [300, 0, 300]\n    joint: home", 2, "has joint and line: one of them"),
+        ("speed: 200\nmoves:\n  - joint: home", 2, "speed: must be at most 100"),
+        ("moves:\n  - line: [258, 10, 367]", 2, "no length"),
+        ("moves:\n  - joint: [0, 130, 0]", 3, "q2 = 130 deg is outside"),
+        ("moves:\n  - point: [3000, 0, 0]", 3, "no solution within the limits"),
+        ("moves:\n  - point: [3000, 0, 0]\n  - line: [2000, 0, 0]", 3, "first point is out of reach"),
+        ("x,y,z\n1,2\n", 2, ":2: 2 cells, 3 columns"),
+        ("x,y,z\n1,2,nan\n", 2, ":2: 'nan' is no number"),
+        ("x,x,z\n1,2,3\n", 2, "column x stands twice"),
+    ],
+)
+def test_bad_paths_are_refused_in_words(tmp_path: Path, text: str, code: int, words: str) -> None:
+    bad = tmp_path / ("bad.csv" if text.startswith("x") else "bad.yaml")
+    bad.write_text(text)
+    done = run("path", THREE_DOF, bad, "--port", "sim")
+    assert done.code == code, done.err
+    assert words in done.err
+    assert "read back" not in done.out
+
+
+def test_the_robot_file_is_not_written_over(tmp_path: Path, pick: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text((ROOT / THREE_DOF).read_text())
+    assert run("path", mine, pick, "--out", mine).code == 2
