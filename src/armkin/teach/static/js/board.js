@@ -87,9 +87,10 @@ export class Board {
 
   /** @param {string} name @param {object} [fields] */
   async ask(name, fields = {}) {
+    // Before it is asked for: what the board says of it may come sooner than the answer.
+    if (name !== "jog" || !this.beating) this.page.trouble("");
     try {
       await act(name, fields);
-      this.page.trouble("");
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
       if (name === "jog") clearInterval(this.beating);

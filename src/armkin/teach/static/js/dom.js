@@ -60,6 +60,10 @@ export function typed(box, hear) {
     box.dataset.typing = "yes";
     if (box.value !== "" && Number.isFinite(box.valueAsNumber)) hear(box.valueAsNumber);
   });
-  box.addEventListener("change", () => delete box.dataset.typing);
-  box.addEventListener("blur", () => delete box.dataset.typing);
+  const done = () => {
+    delete box.dataset.typing;
+    if (box.value !== "") box.value = fixed(box.valueAsNumber);
+  };
+  box.addEventListener("change", done);
+  box.addEventListener("blur", done);
 }

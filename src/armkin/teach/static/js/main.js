@@ -31,11 +31,12 @@ class Page {
       return this.q;
     };
     this.board = new Board(arm, {
-      pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble,
+      pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text) => trouble(text, "board"),
     });
     this.program = new Program(arm, {
       pose, settled: () => this.ask({}), played: (q) => this.played(q),
-      trail: (tips) => this.view?.trail(tips), trouble,
+      trail: (tips) => this.view?.trail(tips),
+      trouble: (text) => trouble(text, "program"),
     });
     this.asking = new Latest((fields) => this.answer(fields));
     get("robot").textContent = arm.robot;
@@ -63,6 +64,7 @@ class Page {
 
   /** @param {object} fields */
   ask(fields) {
+    document.documentElement.dataset.asking = "yes";
     this.asking.push({ ...fields, held: [...this.joints.held], best: this.motors.best.checked });
   }
 
@@ -76,6 +78,7 @@ class Page {
     } catch (error) {
       trouble(/** @type {Error} */ (error).message);
     }
+    if (this.asking.next === null) document.documentElement.dataset.asking = "no";
   }
 
   /** The program is played: the arm alone, without asking for every pose. @param {number[]} q */
@@ -180,9 +183,17 @@ class Page {
   }
 }
 
-/** @param {string} text what went wrong, or nothing */
-export function trouble(text) {
-  get("trouble").textContent = text;
+/** @type {Map<string, string>} */
+const troubles = new Map();
+
+/**
+ * Say what went wrong.
+ * @param {string} text or nothing
+ * @param {string} [source] whose trouble it is: what one part has mended says nothing of another's
+ */
+export function trouble(text, source = "page") {
+  troubles.set(source, text);
+  get("trouble").textContent = [...troubles.values()].filter(Boolean).join("\n");
 }
 
 function theme(/** @type {string} */ name, /** @type {Page} */ page) {
@@ -210,7 +221,7 @@ async function start() {
       program: (state) => here.page?.program.show(state),
       board: (state) => here.page?.board.show(state),
     },
-    (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : ""),
+    (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : "", "line"),
   );
   const one = new Page(opened.scene, opened.look);
   here.page = one;
@@ -219,7 +230,7 @@ async function start() {
   get("take").addEventListener("click", () => act("take").catch((error) => trouble(error.message)));
   const stop = () => {
     one.board.stopped();
-    act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`));
+    act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`, "stop"));
   };
   get("stop").addEventListener("click", stop);
   /** @type {Object<string, () => void>} */

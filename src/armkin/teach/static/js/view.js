@@ -101,7 +101,7 @@ export class View {
     this.scene.updateMatrixWorld();
     const box = new Box3().setFromObject(this.solid.group);
     for (const ghost of this.shown) box.expandByObject(ghost.group);
-    const size = Math.max(1.05 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
+    const size = Math.max(0.9 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
     this.camera.position.set(x, y, z).multiplyScalar(size).add(this.middle);
@@ -188,6 +188,9 @@ export class View {
   now() {
     this.waiting = false;
     this.renderer.render(this.scene, this.camera);
-    document.documentElement.dataset.drawn = String(Number(document.documentElement.dataset.drawn ?? 0) + 1);
+    const at = this.gizmo.handle.getWorldPosition(new Vector3()).project(this.camera);
+    const { width, height } = this.canvas.getBoundingClientRect();
+    // For tests and other programs that drag the handle: where it is in the picture [px].
+    this.canvas.dataset.handle = `${((at.x + 1) / 2) * width} ${((1 - at.y) / 2) * height}`;
   }
 }

@@ -1,0 +1,99 @@
+"""A real browser without a window: Debian's Chromium, driven by Playwright, drawing in software."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from armkin.teach.server import Server
+
+_OPTIONS = (
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """The browser; every start has a profile of its own."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    assert path, "the page's tests need chromium: README's line of system packages has it"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, headless=True, args=list(_OPTIONS))
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser: Browser, server: Server, **settings: object) -> Iterator[Page]:
+    """A page, open and drawn; script: runs before the page's own; quiet: it complains of nothing. It must
+    not ask another machine for anything."""
+    viewport = settings.pop("viewport", {"width": 1000, "height": 760})
+    script, quiet = settings.pop("script", ""), settings.pop("quiet", True)
+    context = browser.new_context(viewport=viewport, **settings)  # type: ignore[arg-type]
+    page = context.new_page()
+    page.add_init_script(str(script))
+    page.set_default_timeout(15_000)
+    said: list[str] = []
+    asked: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    base = server.address.split("#")[0]
+    page.goto(server.address)
+    page.wait_for_selector("html[data-ready]")
+    yield page
+    context.close()
+    # An action that is refused is told to the person, and by Chromium to its console, too.
+    assert not quiet or [text for text in said if "Failed to load resource" not in text] == []
+    assert [url for url in asked if not url.startswith((base, "data:", "blob:"))] == []
+
+
+def value(page: Page, selector: str) -> float:
+    """Number in a box."""
+    return float(page.input_value(selector))
+
+
+def values(page: Page, selector: str) -> list[float]:
+    """Numbers in boxes."""
+    return [float(box.input_value()) for box in page.locator(selector).all()]
+
+
+def aim(page: Page, *target: float) -> None:
+    """Type the tip's target."""
+    for box, number in zip(page.locator("#target input").all(), target, strict=True):
+        box.fill(str(number))
+    page.keyboard.press("Tab")
+    settled(page)
+
+
+def until(page: Page, condition: str, argument: object = None, seconds: float = 15.0) -> None:
+    """Until an expression holds. (Playwright's own waiting evaluates text in the page, which its policy forbids.)"""
+    end = time.monotonic() + seconds
+    while not page.evaluate(f"argument => {condition}", argument):
+        if time.monotonic() > end:
+            seen = page.evaluate(
+                "['standing', 'arrived', 'trouble'].map(id => document.getElementById(id).textContent)"
+            )
+            raise AssertionError(f"not within {seconds:g} s: {condition} ({argument}); the page says {seen}")
+        page.wait_for_timeout(20)
+
+
+def settled(page: Page) -> None:
+    """Until the page's answers have come: nothing is asked any more."""
+    until(page, "document.documentElement.dataset.asking === 'no'")
+
+
+def idle(page: Page, after: str) -> None:
+    """Until the board has ended what it was told."""
+    until(page, "document.querySelector('#arrived').textContent.includes(argument)", after, 20)

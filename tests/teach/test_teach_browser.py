@@ -1,0 +1,363 @@
+"""The page in a real browser: everything by mouse, everything by keyboard, for eyes and for screen readers."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from browsing import aim, chromium, idle, opened, settled, until, value, values
+from emulator import EmulatedBoard
+from matplotlib import image
+from playwright.sync_api import Browser, Page
+from served import served
+
+import armkin
+from armkin.teach.server import Server
+from command_line import ROOT, run
+
+COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with served() as one:
+        yield one
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    with opened(browser, server) as one:
+        yield one
+
+
+def net(board: EmulatedBoard) -> list[int]:
+    return [board.net()[axis] for axis in "XYZ"]
+
+
+def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
+    with EmulatedBoard() as board, served(board=board.port) as server, opened(browser, server) as page:
+        until(page, "document.querySelector('#standing').textContent.includes('position lost')")
+        # Choose a branch of a target; the pulses are the command line's.
+        aim(page, 390, 80, 300)
+        page.get_by_role("radio", name="left, elbow down").click()
+        settled(page)
+        said = run("ik", "robots/three_dof.yaml", 390, 80, 300, "--branch", "left, elbow down", "--json").json
+        assert values(page, "#sliders input[type=number]") == [round(q, 4) for q in said["branches"][0]["joints"]]
+        page.get_by_role("radio", name="left, elbow up").click()
+        settled(page)
+        assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
+        # A lost position is not sent from; home is assumed only after it was said to be home.
+        page.click("#send")
+        until(page, "document.querySelector('#trouble').textContent.includes('position is lost')")
+        assert page.is_disabled("#assume")
+        page.check("#consent")
+        page.click("#assume")
+        idle(page, "assume home: done")
+        assert net(board) == [0, 0, 0]
+        page.click("#send")
+        idle(page, "send: done")
+        assert net(board) == COUNTS
+        assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
+        # STOP on the way home: the position stays known.
+        page.get_by_role("button", name="home", exact=True).click()
+        page.click("#send")
+        until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        page.click("#stop")
+        idle(page, "stopped")
+        at = net(board)
+        assert "position known" in page.inner_text("#standing")
+        assert at != COUNTS
+        # Jog as long as the button is held.
+        before = net(board)
+        page.select_option("#jog-joint", label="q1")
+        page.hover("#jog-up")
+        page.mouse.down()
+        time.sleep(0.6)
+        page.mouse.up()
+        idle(page, "jog: done")
+        after = net(board)
+        assert after[0] > before[0] + 50
+        assert after[1:] == before[1:]
+        board.wait(0.3)
+        assert net(board) == after
+        # A program of two moves, carried out.
+        page.get_by_role("button", name="home", exact=True).click()
+        page.click("#record")
+        page.wait_for_selector("#name-0")
+        aim(page, 390, 80, 300)
+        page.click("#record")
+        page.wait_for_selector("#name-1")
+        page.click("#run")
+        idle(page, "run: done")
+        assert net(board) == COUNTS
+
+
+def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
+    with served(board="sim") as server, opened(browser, server) as page:
+
+        def tab_to(selector: str) -> None:
+            for _ in range(120):
+                if page.evaluate("selector => document.activeElement.matches(selector)", selector):
+                    return
+                page.keyboard.press("Tab")
+            raise AssertionError(f"Tab does not reach {selector}")
+
+        # Joints: a slider by its arrow keys.
+        tab_to("#sliders input[type=range]")
+        before = value(page, "#box-0")
+        for _ in range(3):
+            page.keyboard.press("ArrowRight")
+        settled(page)
+        assert value(page, "#box-0") > before
+        # The tip: arrows and page keys where nothing has the focus, numbers in its boxes.
+        page.evaluate("document.activeElement.blur()")
+        z = value(page, "#target label:nth-child(3) input")
+        page.keyboard.press("PageDown")
+        settled(page)
+        assert value(page, "#target label:nth-child(3) input") == pytest.approx(z - 5)
+        tab_to("#target input")
+        for number in ("390", "80", "300"):
+            page.keyboard.press("Control+a")
+            page.keyboard.type(number)
+            page.keyboard.press("Tab")
+        settled(page)
+        page.evaluate("document.activeElement.blur()")
+        page.keyboard.press("3")
+        settled(page)
+        chosen = page.locator("#branches [aria-checked=true]")
+        assert "left, elbow down" in chosen.inner_text()
+        page.keyboard.press("4")
+        settled(page)
+        assert "left, elbow up" in chosen.inner_text()
+        # A program: R records, P plays.
+        page.keyboard.press("r")
+        page.wait_for_selector("#name-0")
+        page.keyboard.press("ArrowLeft")
+        settled(page)
+        page.keyboard.press("r")
+        page.wait_for_selector("#name-1")
+        page.wait_for_selector("#player:not([hidden])")
+        page.keyboard.press("p")
+        until(page, "document.querySelector('#play').textContent === 'Pause'")
+        page.keyboard.press("p")
+        until(page, "document.querySelector('#play').textContent === 'Play'")
+        # The board: send by Enter, STOP by Esc, jog while the space bar is down.
+        tab_to("#send")
+        page.keyboard.press("Enter")
+        until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        page.keyboard.press("Escape")
+        idle(page, "stopped")
+        tab_to("#jog-up")
+        page.keyboard.down(" ")
+        time.sleep(0.4)
+        page.keyboard.up(" ")
+        idle(page, "jog: done")
+        page.evaluate("document.activeElement.blur()")
+        page.keyboard.press("g")
+        idle(page, "grip: done")
+
+
+def test_the_handle_is_dragged_and_the_arm_follows_it(page: Page) -> None:
+    aim(page, 350, 0, 250)
+    page.click("[data-view=front]")
+    page.wait_for_timeout(200)
+    x, y = map(float, (page.get_attribute("#canvas", "data-handle") or "").split())
+    box = page.locator("#canvas").bounding_box()
+    assert box is not None
+    before = values(page, "#target input")
+    page.mouse.move(box["x"] + x, box["y"] + y - 45)  # the arrow of z
+    page.wait_for_timeout(100)
+    page.mouse.down()
+    for step in range(10):
+        page.mouse.move(box["x"] + x, box["y"] + y - 45 - 4 * step)
+    page.mouse.up()
+    settled(page)
+    after = values(page, "#target input")
+    assert after[2] > before[2] + 5
+    assert after[:2] == pytest.approx(before[:2], abs=0.01)
+    arm = armkin.load(str(ROOT / "robots/three_dof.yaml"))
+    q = [number * 3.141592653589793 / 180 for number in values(page, "#sliders input[type=number]")]
+    assert armkin.fk(arm, q)[:3, 3] == pytest.approx(after, abs=0.01)
+
+
+def test_what_cannot_be_reached_is_said(page: Page) -> None:
+    aim(page, 2000, 0, 300)
+    text = page.inner_text("#answer")
+    said = run("ik", "robots/three_dof.yaml", 2000, 0, 300, "--json").json
+    assert text.startswith("unreachable: 0 branches")
+    assert f"{said['closest']['distance_mm']:.4f} mm away" in text
+    page.click("#nearest")
+    settled(page)
+    assert values(page, "#sliders input[type=number]") == pytest.approx(said["closest"]["joints"], abs=1e-4)
+    page.fill("#box-1", "130")
+    settled(page)
+    assert page.inner_text("#outside") == "q2 = 130 deg is outside -20 to 120 deg"
+    assert page.get_attribute("#box-1", "aria-invalid") == "true"
+
+
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, colours: str) -> None:
+    with served(board="sim") as server, opened(browser, server, color_scheme=colours) as page:
+        aim(page, 390, 80, 300)
+        page.click("#record")
+        page.wait_for_selector("#name-0")
+        page.wait_for_selector("#player:not([hidden])")
+        found = Axe().run(page).response["violations"]
+        bad = {
+            one["id"]: [node["html"] for node in one["nodes"]]
+            for one in found
+            if one["impact"] in ("serious", "critical")
+        }
+        assert bad == {}
+        assert page.get_attribute("html", "data-theme") == colours
+
+
+def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> None:
+    """ARMKIN_UPDATE_SNAPSHOTS=1 takes it anew."""
+    picture, now = ROOT / "docs/teach.png", tmp_path / "teach.png"
+    with served("ur5e") as server, opened(browser, server, viewport={"width": 1280, "height": 800}) as page:
+        for k, angle in enumerate((20, -70, 80, -60, 70, 10)):
+            page.fill(f"#box-{k}", str(angle))
+        page.keyboard.press("Tab")
+        settled(page)
+        page.click("[data-view=space]")
+        page.evaluate("document.activeElement.blur()")
+        page.mouse.move(5, 500)
+        page.wait_for_timeout(300)
+        page.screenshot(path=now)
+    if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
+        picture.write_bytes(now.read_bytes())
+    shown, drawn = (image.imread(path)[..., :3] for path in (picture, now))
+    assert shown.shape == drawn.shape
+    assert np.abs(shown - drawn).mean() < 0.03  # another machine's fonts; an arm that stands elsewhere is more
+    assert "docs/teach.png" in (ROOT / "README.md").read_text()[:3000]
+
+
+def test_a_telephone_s_window(browser: Browser, server: Server) -> None:
+    with opened(browser, server, viewport={"width": 390, "height": 800}, has_touch=True) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        page.locator("#motors").scroll_into_view_if_needed()
+        box = page.locator("#stop").bounding_box()
+        assert box is not None
+        assert 0 <= box["y"] < 100  # STOP stays in sight
+        aim(page, 390, 80, 300)
+        assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
+
+
+def test_without_webgl_everything_else_works(browser: Browser) -> None:
+    blind = "HTMLCanvasElement.prototype.getContext = () => null"
+    with served(board="sim") as server, opened(browser, server, script=blind, quiet=False) as page:
+        assert page.is_visible("#flat")
+        aim(page, 390, 80, 300)
+        page.get_by_role("radio", name="left, elbow up").click()
+        settled(page)
+        page.click("#send")
+        idle(page, "send: done")
+        assert server.desk.stands() == tuple(COUNTS)
+
+
+def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
+    with served(board="sim") as server, opened(browser, server) as page:
+        base = server.address.split("/#")[0]
+        asked: list[str] = []
+        before = server.desk.act
+        server.desk.act = lambda name, tab, fields: asked.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
+        other = page.context.browser.new_context().new_page()  # type: ignore[union-attr]
+        evil = tmp_path / "evil.html"
+        evil.write_text(
+            f"""<body><iframe id=frame src="{base}/"></iframe>
+            <form id=form method=post enctype="text/plain" action="{base}/api/stop" target=hidden>
+            <input name='{{"q": "' value='"}}'></form><iframe name=hidden></iframe></body>"""
+        )
+        other.goto(f"file://{evil}")
+        tried = other.evaluate(
+            """async base => {
+              const send = async (options) => {
+                try { return (await fetch(base + "/api/stop", { method: "POST", body: "{}", ...options })).status; }
+                catch (error) { return "refused"; }
+              };
+              const key = { "Content-Type": "application/json", "X-Armkin-Key": "guess" };
+              document.getElementById("form").submit();
+              const events = new EventSource(base + "/events?tab=guess");
+              await new Promise((resolve) => { events.onerror = resolve; events.onopen = resolve; });
+              return [await send({ headers: key }), (await send({ mode: "no-cors" })) || "opaque", events.readyState];
+            }""",
+            base,
+        )
+        assert tried[0] == "refused"
+        assert tried[2] == 2  # closed
+        other.wait_for_timeout(300)
+        frame = other.frames[1]
+        assert "three_dof" not in (frame.evaluate("document.body ? document.body.innerText : ''") or "")
+        assert asked == []
+        other.context.close()
+
+
+def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
+    with served(board="sim") as server, opened(browser, server) as first, opened(browser, server) as second:
+        until(second, "document.querySelector('#control').textContent.includes('another page')")
+        assert second.evaluate("document.querySelector('#panels').inert")
+        aim(first, 390, 80, 300)
+        until(second, "document.querySelector('#box-0').value === '10.1529'")
+        first.click("#send")
+        until(second, "document.querySelector('#standing').textContent.startsWith('send')")
+        second.click("#stop")  # works in both
+        idle(first, "stopped")
+        second.click("#take")
+        until(first, "document.querySelector('#panels').inert")
+        until(second, "!document.querySelector('#panels').inert")
+
+
+def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
+    for target in ((390, 80, 300), (350, -50, 260)):
+        aim(page, *target)
+        page.click("#record")
+        settled(page)
+    page.wait_for_selector("#name-1")
+    page.fill("#name-1", "the other end")
+    page.keyboard.press("Tab")
+    until(page, "document.querySelector('#name-1').value === 'the other end'")
+    with page.expect_download() as download:
+        page.click("#save")
+    file = tmp_path / "path.yaml"
+    download.value.save_as(file)
+    plan = armkin.path(armkin.load(str(ROOT / "robots/three_dof.yaml")), str(file))
+    until(page, f"document.querySelector('#planned').textContent.startsWith('{plan.duration:.3f} s')")
+    page.click("#clear")
+    until(page, "!document.querySelector('#moves li')")
+    page.set_input_files("#load", str(file))
+    until(page, "document.querySelector('#name-1')?.value === 'the other end'")
+    page.click("#undo")
+    until(page, "!document.querySelector('#moves li')")
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "cobra600", "moveo", "panda", "pan_tilt"])
+def test_other_arms_have_their_page(browser: Browser, robot: str) -> None:
+    with served(robot) as server, opened(browser, server) as page:
+        settled_text = page.inner_text("#answer")
+        count = len(page.locator("#branches button").all())
+        if robot == "pan_tilt":
+            assert "no task fits" in settled_text
+            assert count == 0
+        else:
+            found = re.search(r"(\d+) branch", settled_text)
+            assert found is not None
+            assert int(found[1]) == count >= 1
+        if robot == "panda":
+            assert page.get_attribute("button[aria-label^='hold J3']", "aria-pressed") == "true"
+            page.click("button[aria-label^='hold J3']")
+            until(page, "!document.querySelector('#branches button')")
+            page.click("button[aria-label^='hold J1']")
+            page.wait_for_selector("#branches button")
