@@ -45,7 +45,7 @@ def test_hostile_file_is_refused_in_the_reviewed_words(name: str) -> None:
     text = message(CASES[name])
     seconds = time.perf_counter() - began
     assert text == snapshots()[f"[{name}]"]
-    assert text.count("\n") <= 1, "one line, or two"
+    assert len(text.splitlines()) <= 21, "all problems, a line each, and how many more"
     assert all(len(line) <= 240 for line in text.splitlines())
     assert seconds < 2  # 0.03 s at most on an idle machine
 
@@ -88,7 +88,7 @@ def test_an_error_carries_every_problem() -> None:
         robot_file.parse(text, "arm.yaml")
     problems = caught.value.problems
     assert [problem.split(": ")[0] for problem in problems] == [f"arm.yaml:{n}" for n in (10, 13, 23, 23)]
-    assert str(caught.value) == f"{problems[0]}\n3 more problems, on lines 13, 23"
+    assert str(caught.value) == "\n".join(problems)
     with pytest.raises(RobotFileError) as caught:
         robot_file.parse("name: 017", "arm.yaml")
     assert caught.value.problems == (str(caught.value),)
@@ -279,7 +279,7 @@ def test_mutated_files_load_or_are_refused(text: str, edits: list[tuple[float, i
         refusal = str(error)
     if robot is None:
         assert refusal.startswith("arm.yaml:")
-        assert refusal.count("\n") <= 1
+        assert len(refusal.splitlines()) <= 21
     else:
         assert 1 <= len(robot.joints) <= 12
         json.dumps(robot.model_dump(), allow_nan=False)

@@ -35,6 +35,9 @@ __all__ = [
 ]
 
 
+_TOLD = 20  # problems of one file that are told at once
+
+
 def read(path: str | os.PathLike[str]) -> RobotFile:
     """Read and validate a robot file, given its path or the name of a shipped robot.
 
@@ -106,13 +109,11 @@ def _located(name: str, line: int, text: str) -> str:
 
 
 def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
-    """The first problem in full, or two; of more, where they are."""
+    """All problems, a line each; of very many, the first and how many more there are."""
     told = tuple(_located(name, line, text) for line, text in problems)
-    message = "\n".join(told[:2])
-    if len(told) > 2:
-        lines = sorted({line for line, _ in problems[1:]})
-        places = ", ".join(str(line) for line in lines[:8]) + (", ..." if len(lines) > 8 else "")
-        message = f"{told[0]}\n{len(told) - 1} more problems, on line{'s' if len(lines) > 1 else ''} {places}"
+    message = "\n".join(told[:_TOLD])
+    if len(told) > _TOLD:
+        message += f"\nand {len(told) - _TOLD} more problems"
     return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(told))
 
 

@@ -10,15 +10,19 @@ import errno
 import hashlib
 import os
 import re
+import sys
 import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import IO, Any
+from typing import TYPE_CHECKING, Any
 
 from armkin.board.ports.port import BAUD, SIM
 from armkin.errors import LinkError, PortInUseError
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 _READ = 0.005  # [s] a read waits at most
 _MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
@@ -167,58 +171,64 @@ def list_ports() -> list[Found]:
 
 
 class _Lock:
-    """A file that says which process holds a port; locked as long as that process lives."""
+    """The right to a port, held as long as this process lives; a file beside it says which process that is."""
 
     def __init__(self, name: str) -> None:
-        self._file: IO[str] | None = None
-        if os.name != "posix" or "://" in name:
+        self._lock: BaseFileLock | None = None
+        if "://" in name:
             return
-        file = open(_lock_path(name), "a+", encoding="ascii")  # noqa: SIM115
-        if not _try_lock(file):
-            holder = _read_pid(file)
-            file.close()
+        lock = _acquired(name)
+        if lock is None:
+            holder = _read_pid(name)
             message = f"port {name} is in use by armkin (process {holder})"
             raise PortInUseError(message, advice="wait for it", port=name, process=holder)
-        file.seek(0)
-        file.truncate()
-        file.write(str(os.getpid()))
-        file.flush()
-        self._file = file
+        self._lock = lock
+        with suppress(OSError), open(_path(name, "pid"), "w", encoding="ascii") as file:
+            file.write(str(os.getpid()))
 
     def release(self) -> None:
         """Let others have the port."""
-        if self._file is not None:
-            self._file.close()  # the lock goes with it
-            self._file = None
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
 
 
 def holder(name: str) -> int | None:
     """Process that holds a port for armkin; None if none does."""
-    if os.name != "posix" or "://" in name or name == SIM:
+    if "://" in name or name == SIM:
         return None
     try:
-        with open(_lock_path(name), "a+", encoding="ascii") as file:
-            return None if _try_lock(file) else _read_pid(file)
+        lock = _acquired(name)
     except OSError:
         return None
+    if lock is None:
+        return _read_pid(name)
+    lock.release()
+    return None
 
 
-def _lock_path(name: str) -> str:
+def _acquired(name: str) -> BaseFileLock | None:
+    """The lock of a port, or None if another has it. (flock on POSIX, msvcrt.locking on Windows.)"""
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(_path(name, "lock"))
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        return None
+    return lock
+
+
+def _path(name: str, end: str) -> str:
     key = hashlib.sha256(os.path.realpath(name).encode("utf-8", "surrogateescape")).hexdigest()[:16]
-    return os.path.join(tempfile.gettempdir(), f"armkin-{os.getuid()}-{key}.lock")
+    user = os.getuid() if sys.platform != "win32" else "user"  # on Windows the folder is the user's own
+    return os.path.join(tempfile.gettempdir(), f"armkin-{user}-{key}.{end}")
 
 
-def _try_lock(file: IO[str]) -> bool:
-    import fcntl
-
+def _read_pid(name: str) -> int | None:
     try:
-        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
-def _read_pid(file: IO[str]) -> int | None:
-    file.seek(0)
-    text = file.read(20)
+        with open(_path(name, "pid"), encoding="ascii") as file:
+            text = file.read(20)
+    except (OSError, ValueError):
+        return None
     return int(text) if text.isdigit() else None
