@@ -92,7 +92,7 @@ class _CompiledTask:
         self.arm, self.name, self.n = arm, task, arm.n
         self.turned = actual(arm)  # formulas are those of actual joint values
         library = source.library(self.turned, *_class_of(self.turned, task))
-        code = toolchain.load(library.text, library.content)
+        code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._poses = code.arm_poses
         self._poses.argtypes, self._poses.restype = [size, *[pointer] * 3], size
@@ -101,7 +101,7 @@ class _CompiledTask:
             return
         self.task, self.geometry = solver(self.turned, task)
         self.goal_shape = (4, 4) if self.task.orientation == "full" else (len(self.task.labels),)
-        self.names = branch_names(self.turned, self.task, self.geometry, self.branches)
+        self.names = self._names(self.branches)
         self._batch = code.arm_batch
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 6], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
@@ -147,11 +147,13 @@ class _CompiledTask:
         if left and (out.state == UNREAD).any():
             target = np.ascontiguousarray(read_targets(self.task, target)[0])  # refuses what is no target
             left = self._run(target, each, out, workers, read=True)
-        q, complete = out.q, np.ones(len(target), bool)
+        q, complete = out.q, np.full(len(target), self.geometry.complete)
         if left:
             q = self._in_python(target, close.reshape(-1, self.n), out, complete)
         if self.arm.prismatic.any():
             complete[distance(self.arm, self.task, target) > solve.FAR] = False
+        if self.geometry.pairs is None:  # as many columns as the target with most branches has
+            q = out.narrow()
         if not self.geometry.ordered:
             out.branch[...] = follow(self.arm, self.task, q, target)
         B = q.shape[1]
@@ -166,7 +168,7 @@ class _CompiledTask:
             branch=out.branch.reshape(*lead, B),
             status=out.status.reshape(lead),
             free=out.free.reshape(*lead, self.n),
-            names=self.names if self.branches == B else branch_names(self.arm, self.task, self.geometry, B),
+            names=self._names(B),
             method=self.geometry.name,
             why=self.geometry.why,
             complete=complete.reshape(lead),
@@ -174,11 +176,16 @@ class _CompiledTask:
 
     def _quick(self, call: Any) -> Single | None:
         """The short way of one target, for arms whose branches and joint values need no more than C gives."""
-        if self.turned is not self.arm or not self.geometry.ordered:
+        if self.turned is not self.arm:
             return None
-        said = {"names": self.names, "method": self.geometry.name, "why": self.geometry.why}
-        same = {"arm": self.arm, "task": self.task, **said}
-        return Single(call, self.goal_shape, self.arm.home, self.branches, same)
+        names = None if self.geometry.pairs is not None else self._names
+        same = {"arm": self.arm, "task": self.task, "names": self.names}
+        same |= {"method": self.geometry.name, "why": self.geometry.why}
+        complete = self.geometry.complete
+        return Single(call, self.goal_shape, self.arm.home, self.branches, complete, same, names)
+
+    def _names(self, count: int) -> tuple[str, ...]:
+        return branch_names(self.turned, self.task, self.geometry, count)
 
     def _alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
         """One target the short way; None if there is more to it."""
@@ -253,6 +260,14 @@ class _Out:
             self.q = np.pad(self.q, ((0, 0), (0, more), (0, 0)), constant_values=math.nan)
             self.valid, self.within = (np.pad(a, ((0, 0), (0, more))) for a in (self.valid, self.within))
             self.branch = np.pad(self.branch, ((0, 0), (0, more)), constant_values=-1)
+
+    def narrow(self) -> Array:
+        """Leave columns away that no target needs; the joint values."""
+        B = int(self.valid.sum(axis=1).max(initial=0))
+        self.q, self.valid, self.within, self.branch = (
+            np.ascontiguousarray(a[:, :B]) for a in (self.q, self.valid, self.within, self.branch)
+        )
+        return self.q
 
 
 def _shared(part: Callable[[slice], int], count: int, workers: int) -> list[int]:

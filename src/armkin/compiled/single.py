@@ -18,11 +18,21 @@ class Single:
     """`arm_single` of parts/batch.c for one arm and task; every thread has a block of its own."""
 
     def __init__(
-        self, call: Callable[[int], int], shape: tuple[int, ...], home: Array, branches: int, same: dict[str, Any]
+        self,
+        call: Callable[[int], int],
+        shape: tuple[int, ...],
+        home: Array,
+        branches: int,
+        complete: bool,
+        same: dict[str, Any],
+        names: Callable[[int], tuple[str, ...]] | None,
     ) -> None:
-        """call: takes a block's address; shape: of a target; same: fields that all solutions share."""
-        self._call, self._shape, self._home, self._same = call, shape, home, same
-        self._n, self._branches = len(home), branches
+        """call: takes a block's address; shape: of a target; complete, same: fields that all solutions share.
+
+        names: of that many branches, for classes that list no more rows than a target has branches; else None.
+        """
+        self._call, self._shape, self._home, self._same, self._names = call, shape, home, same, names
+        self._n, self._branches, self._complete = len(home), branches, complete
         self._local = threading.local()
         size, n, B = int(np.prod(shape)), len(home), branches
         self._results = size + n
@@ -34,7 +44,7 @@ class Single:
         block = np.zeros(self._size)
         size = self._results - self._n
         results = block[self._results :]
-        results.view(np.bool_)[self._bytes + 3 * self._branches + self._n + 1] = True  # complete
+        results.view(np.bool_)[self._bytes + 3 * self._branches + self._n + 1] = self._complete
         parts = block[:size].reshape(self._shape), block[size : self._results], results, block.ctypes.data
         self._local.block = parts
         return parts
@@ -53,16 +63,20 @@ class Single:
         found = results.copy()
         flags, small = found.view(np.bool_), found.view(np.int8)
         n, B, at = self._n, self._branches, self._bytes
-        end = at + 3 * B + n
+        end, rows = at + 3 * B + n, B
+        said = self._same
+        if self._names is not None:
+            rows = int(flags[at : at + B].sum())
+            said = {**said, "names": self._names(rows)}
         out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
         out.__dict__.update(
-            self._same,
+            said,
             target=target,
             near=close,
-            q=found[: B * n].reshape(B, n),
-            valid=flags[at : at + B],
-            within_limits=flags[at + B : at + 2 * B],
-            branch=small[at + 2 * B : at + 3 * B],
+            q=found[: rows * n].reshape(rows, n),
+            valid=flags[at : at + rows],
+            within_limits=flags[at + B : at + B + rows],
+            branch=small[at + 2 * B : at + 2 * B + rows],
             free=flags[at + 3 * B : end],
             status=small[end : end + 1].reshape(()),
             complete=flags[end + 1 : end + 2].reshape(()),

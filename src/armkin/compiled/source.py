@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from armkin.export.c import kernel, program
+from armkin.export.c import elimination, kernel, program
+from armkin.export.c.parts import part
 from armkin.formula.c_code import number
 from armkin.inverse.solve import ACCEPTED, ACCEPTED_MM, FAR
 from armkin.inverse.tasks.task import LARGEST
@@ -20,35 +21,49 @@ if TYPE_CHECKING:
 PARTS = Path(__file__).parent / "parts"
 
 
+LANES = 32  # poses at once: vectors of any length, and blocks of some kilobytes; an elimination takes one at a time
+
+
 class Library(NamedTuple):
-    """A C file, its content's sha256, which it holds as `arm_content`, and branches: 0 if it has no `arm_batch`."""
+    """A C file to be built.
+
+    content: its sha256, which it holds as `arm_content`. branches: 0 if it has no `arm_batch`. level: of
+    optimisation: 3 makes vectors of a formula's lanes; an elimination gains nothing from it and takes seconds.
+    """
 
     text: str
     content: str
     branches: int
+    level: int
 
 
 def library(arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
     """The C file of an arm: fk alone without a task, or if the class has no form in C."""
-    solve, branches = ("", 0)
+    solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and program.has_form(geometry):
         solve, branches = program.candidates(arm, task, geometry, prefer=False)
     fields = {
         "about": f"{program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
+        "lanes": str(1 if branches and geometry is not None and geometry.pairs is None else LANES),
     }
     parts = [_part("head"), program.settings(), _fast_numbers(), kernel.forward_kinematics(arm), _part("fk")]
     if branches:
         assert task is not None
-        fields |= _of_task(arm, task, branches)
+        accepted = min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
+        if geometry is not None and geometry.pairs is None:
+            accepted, level = elimination.ACCEPTED, 2  # its own criteria have been met
+        fields |= _of_task(arm, task, branches, accepted)
+        # branches that come in no order are numbered by their places, until `follow` sees a path
+        fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
-        parts += [_part("sizes"), solve, program.part("copies"), _choose(arm, branches), _part(gather), _part("batch")]
+        parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), _part("batch")]
     text = program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
-    return Library(text.replace("@content@", content), content, branches)
+    return Library(text.replace("@content@", content), content, branches, level)
 
 
-def _of_task(arm: Arm, task: Task, branches: int) -> dict[str, str]:
+def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:
     """What the parts of `ik` are filled in with."""
     most = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
     if task.orientation == "axis":
@@ -57,7 +72,7 @@ def _of_task(arm: Arm, task: Task, branches: int) -> dict[str, str]:
         "branches": str(branches),
         "target": str(program.target_size(task)),
         "goal": str(kernel.goal_size(task)),
-        "accepted": number(min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2),
+        "accepted": number(accepted),
         "farthest": number(_farthest(arm)),
         "most": ", ".join(most),
         "axis": str(int(task.orientation == "axis")),
@@ -77,8 +92,8 @@ def _part(name: str) -> str:
 
 def _fast_numbers() -> str:
     """The numbers of double precision, with this file's own tan and atan2."""
-    numbers = program.part("numbers_double")
-    return numbers.partition("#ifndef ARM_TAN")[0] + program.part("fast_numbers")
+    numbers = part("numbers_double")
+    return numbers.partition("#ifndef ARM_TAN")[0] + part("fast_numbers")
 
 
 def _choose(arm: Arm, branches: int) -> str:

@@ -22,7 +22,7 @@ from armkin.errors import MissingExtraError
 
 # No fast-math: sums keep their order, infinities and what is not a number keep their meaning. That errno is not
 # set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
-FLAGS = ["-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
+FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
 
 
@@ -44,12 +44,13 @@ def compiler() -> str:
     )
 
 
-def load(source: str, content: str) -> ctypes.CDLL:
+def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """A C file as a loaded library: from the cache, or built now.
 
-    content: what the library must hold as `arm_content`. Raises MissingExtraError without a compiler, or if it fails.
+    content: what the library must hold as `arm_content`; level: of optimisation. Raises MissingExtraError
+    without a compiler, or if it fails.
     """
-    command = [compiler(), *FLAGS]
+    command = [compiler(), f"-O{level}", *FLAGS]
     key = "\0".join([source, *command, _version(command[0]), _processor()])
     name = f"{hashlib.sha256(key.encode()).hexdigest()}.so"
     folder = _folder()

@@ -37,6 +37,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             prepared.complete,
             rows=lambda T: _six(prepared, T),
             ordered=False,
+            elimination=prepared,
         )
     link, prismatic = _padded(arm)
     prepared = method.prepare(link, prismatic)

@@ -34,7 +34,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
 
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
             virtual = None if prefer[0] is None else Pair(1.0, 0.0)
-            found = solve(_pose(goal), [*prefer, virtual])
+            found = solve(pose_of(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
         return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered)
@@ -43,16 +43,23 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
 
     def rows(goal: Array) -> Rows:
         T = np.empty((len(goal), 4, 4))
-        pose.write(_pose(list(goal.T)), T)
+        pose.write(pose_of(list(goal.T)), T)
         found = solve_rows(T)
         return found._replace(q=found.q[:, :, :5])
 
     return Geometry(
-        inner.name, why, inner.complete, rows=rows, labels=inner.labels, branches=inner.branches, ordered=inner.ordered
+        inner.name,
+        why,
+        inner.complete,
+        rows=rows,
+        labels=inner.labels,
+        branches=inner.branches,
+        ordered=inner.ordered,
+        elimination=inner.elimination,
     )
 
 
-def _pose(goal: list[Entry]) -> pose.Pose:
+def pose_of(goal: list[Entry]) -> pose.Pose:
     """A pose at x y z whose z axis is ax ay az; x is across, without a jump near the poles' axis (Duff et al. 2017)."""
     x, y, z = goal[3:6]
     sign = np.copysign(1.0, z)

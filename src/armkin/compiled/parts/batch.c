@@ -45,7 +45,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
                     row[place * ARM_JOINTS + j] = q[(b * ARM_JOINTS + j) * ARM_LANES + i];
                 is_valid[place] = 1;
                 is_within[place] = (uint8_t)inside[b * ARM_LANES + i];
-                index[place] = (int8_t)b;
+                index[place] = (int8_t)@index@;
                 place++;
             }
             status[at] = place ? 0 : 3;

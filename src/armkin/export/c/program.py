@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from armkin import __version__
 from armkin.errors import UsageError
-from armkin.export.c import kernel
+from armkin.export.c import elimination, kernel
 from armkin.export.c.golden import golden_test
+from armkin.export.c.parts import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_code import number
 from armkin.inverse.branches.names import branch_names
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-PARTS = Path(__file__).parent / "parts"
 # What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
 # rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
 _DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 1e-6, "LARGEST": LARGEST}
@@ -83,18 +83,21 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
     """The function `arm_candidates` of an arm's class, and how many branches it has.
 
-    Raises UsageError if the class has no form in C.
+    Raises UsageError if the class has no form in C, or none in single precision.
     """
-    if has_form(geometry):
+    if geometry.pairs is not None:
         return kernel.candidates(arm, task, geometry, single, prefer)
-    raise UsageError(
-        f"{arm.name}: its class ({geometry.name}) has no form in C yet; the task {task.name} is solved in Python alone"
-    )
+    if not has_form(geometry):
+        raise UsageError(f"{arm.name}: {geometry.name} has no form in C; task {task.name} is solved in Python alone")
+    if single:
+        raise UsageError(f"{arm.name}: {geometry.name} needs double precision; leave --float away")
+    return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
 
 
 def has_form(geometry: Geometry) -> bool:
     """Whether a class of arms can be written in C."""
-    return geometry.pairs is not None
+    found = geometry.elimination
+    return geometry.pairs is not None or (found is not None and elimination.has_form(found))
 
 
 def settings(single: bool = False) -> str:
@@ -107,11 +110,6 @@ def settings(single: bool = False) -> str:
 def target_size(task: Task) -> int:
     """Numbers of a target as people give it."""
     return 16 if task.orientation == "full" else len(task.labels)
-
-
-def part(name: str) -> str:
-    """A part in C that is the same for all arms, with @names@ to be filled in."""
-    return (PARTS / f"{name}.c").read_text(encoding="utf-8")
 
 
 def identifier(name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.subproblems import Candidates, Prefer
@@ -43,4 +43,5 @@ class Geometry:
     rows: Callable[[Array], Rows] | None = None
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
+    elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

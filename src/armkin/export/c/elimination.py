@@ -1,0 +1,124 @@
+"""The general elimination as C: the method is the same for all arms (parts/elimination.c), its constants are data.
+
+See `armkin.inverse.elimination.method` for the method and why it is complete.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.export.c.parts import part
+from armkin.formula import c_code, recording
+from armkin.inverse import tool_axis
+from armkin.inverse.elimination.merge import _WEIGHTS as WEIGHTS
+from armkin.inverse.elimination.merge import MOST
+from armkin.inverse.elimination.method import SHAKES, Elimination, _shaken
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.inverse.elimination.pencil import Pencil
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+BRANCHES = MOST
+ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
+PASSES = 4  # of the seven; what they leave open is told as doubt
+
+
+def has_form(elimination: Elimination) -> bool:
+    """Whether all pencils carry the pose where parts/elimination.c expects it: in La, Lb or Le, at full rank."""
+    plans = elimination.plans
+    return bool(plans) and all(p.role.slot == 1 or (p.role.at_an_end and p.ends.rank == 9) for p in plans[:PASSES])
+
+
+def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PASSES) -> str:
+    """`arm_candidates` of an arm that the elimination solves, and all that it needs."""
+    plans = elimination.plans[:passes]
+    pencils = list({id(plan): plan for plan in plans}.values())
+    place = {id(pencil): k for k, pencil in enumerate(pencils)}
+    loop = elimination.loop
+    sizes = {
+        "PASSES": len(plans),
+        "MOST": max(-(-pencil.size // 4) * 4 for pencil in pencils),  # rows are worked on by fours
+        "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
+        "ANSWERS": len(plans) * max(pencil.size for pencil in pencils),
+    }
+    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2}
+    lines = [f"#define ARM_{name} {value}" for name, value in sizes.items()]
+    lines += [f"#define ARM_{name} {c_code.number(value)}" for name, value in numbers.items()]
+    moves = np.concatenate([_frame(_shaken(np.eye(4), shake)) for shake in SHAKES[: len(plans)]])
+    lines += [
+        "",
+        "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
+        _array("from_base", _frame(inverse(loop.base))),
+        _array("from_tool", _frame(inverse(loop.tool))),
+        _array("loop_links", np.concatenate([_frame(link) for link in loop.links])),
+        _flags("loop_slides", loop.prismatic),
+        _array("weights", WEIGHTS),
+        _array("shakes", SHAKES[: len(plans)]),
+        _array("shaking", moves),
+        "",
+        *(_pencil(k, pencil) for k, pencil in enumerate(pencils)),
+        f"static const arm_pencil arm_pencils[] = {{{', '.join(f'ARM_PENCIL_{k}' for k in range(len(pencils)))}}};",
+        _flags("plan", [place[id(plan)] for plan in plans]),
+        "",
+    ]
+    text = part("pencil") + "\n".join(lines) + "\n" + part("linear_algebra") + part("elimination")
+    if task.orientation == "axis":
+        text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
+    return text
+
+
+def _pencil(number: int, pencil: Pencil) -> str:
+    """One pencil's arrays, and the macro that initialises its struct."""
+    slot, ends = pencil.role.slot, pencil.ends
+    arrays = {
+        "links": np.concatenate([_frame(link) for link in pencil.links]),
+        "first": ends.factors[0] if slot != 1 else None,
+        "second": ends.factors[1] if slot == 0 else None,
+        "N": ends.N if slot == 1 else None,
+        "recover": ends.recover if slot == 1 else None,
+        "columns": pencil.columns,
+        "mix": pencil.mix,
+        "K_re": pencil.K_re if pencil.K_re.size else None,
+        "K_im": pencil.K_im if pencil.K_re.size else None,
+        "W": pencil.W,
+    }
+    texts = [_array(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
+    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
+    role = pencil.role
+    fields = [
+        c_code.number(float(pencil.psi)),
+        *map(str, (slot, int(role.backward), role.hidden, role.dialytic, 15 - ends.rank, r, w, pencil.size)),
+        f"{{{', '.join(map(str, role.order))}}}",
+        f"{{{', '.join(str(int(p)) for p in pencil.prismatic)}}}",
+        *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),
+    ]
+    return "\n".join([*texts, f"#define ARM_PENCIL_{number} {{{', '.join(fields)}}}", ""])
+
+
+def _with_virtual_joint() -> str:
+    """`arm_candidates` of five joints and the tool's axis, by way of the pose that `armkin.inverse.tool_axis` makes."""
+    code = c_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k}]" for k in range(6)])
+    lines = [*code.lines, *(f"goal[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
+    return part("virtual_joint").replace("@lines@", "\n    ".join(lines))
+
+
+def _frame(motion: ArrayLike) -> np.ndarray:
+    """The upper three rows of a motion (4, 4), flat."""
+    return np.asarray(motion, dtype=float)[:3].ravel()
+
+
+def _array(name: str, values: ArrayLike) -> str:
+    flat = [c_code.number(float(v)) for v in np.asarray(values, dtype=float).ravel()]
+    rows = [", ".join(flat[k : k + 5]) for k in range(0, len(flat), 5)]
+    return f"static const double arm_{name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};"
+
+
+def _flags(name: str, values: Iterable[int]) -> str:
+    numbers = [str(int(v)) for v in values]
+    return f"static const unsigned char arm_{name}[{len(numbers)}] = {{{', '.join(numbers)}}};"

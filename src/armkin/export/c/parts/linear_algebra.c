@@ -1,0 +1,314 @@
+/* to -= factor what, from about `from` to `end`, a multiple of four: by fours, of which compilers make vectors. Up to three
+   numbers before `from` change, too. */
+ARM_INLINE void arm_subtract(double *ARM_RESTRICT to, const double *ARM_RESTRICT what, double factor, int from, int end)
+{
+    int b, j;
+    for (b = from & ~3; b < end; b += 4)
+        for (j = b; j < b + 4; j++)
+            to[j] -= factor * what[j];
+}
+
+/* Gaussian elimination with row pivots of an n x n system whose right sides stand from the column `right` on, rows m long;
+   right and m are multiples of four. Afterwards the right sides hold the solution. Returns 0 if a pivot vanishes. */
+ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
+{
+    int i, j, k;
+    for (k = 0; k < n; k++) {
+        int best = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(a[i * m + k]) > fabs(a[best * m + k]))
+                best = i;
+        if (!(fabs(a[best * m + k]) > 1e-300))
+            return 0;
+        if (best != k)
+            for (j = k; j < m; j++) {
+                const double swap = a[k * m + j];
+                a[k * m + j] = a[best * m + j];
+                a[best * m + j] = swap;
+            }
+        for (i = k + 1; i < n; i++)
+            arm_subtract(a + i * m, a + k * m, a[i * m + k] / a[k * m + k], k, m);
+    }
+    for (k = n - 1; k >= 0; k--) {
+        const double scale = 1 / a[k * m + k];
+        for (j = right; j < m; j++)
+            a[k * m + j] *= scale;
+        for (i = 0; i < k; i++)
+            arm_subtract(a + i * m, a + k * m, a[i * m + k], right, m);
+    }
+    return 1;
+}
+
+/* The right singular vector of the smallest singular value of a 12 x 12 matrix: inverse iteration on A^T A. */
+static void arm_null_vector(double *a, double *v)
+{
+    int row[12], i, j, k;
+    double w[12], lower[144], size = 0;
+    for (i = 0; i < 12; i++)
+        row[i] = i;
+    for (k = 0; k < 12; k++) { /* P A = L U, U in place; row[i]: where the i-th row stands */
+        int best = k;
+        double pivot;
+        for (i = k + 1; i < 12; i++)
+            if (fabs(a[row[i] * 12 + k]) > fabs(a[row[best] * 12 + k]))
+                best = i;
+        i = row[k];
+        row[k] = row[best];
+        row[best] = i;
+        pivot = a[row[k] * 12 + k];
+        if (!(fabs(pivot) > 1e-14)) /* rounding's size, and not zero: an exact root has no last pivot */
+            pivot = a[row[k] * 12 + k] = 1e-14;
+        for (i = k + 1; i < 12; i++) {
+            const double factor = a[row[i] * 12 + k] / pivot;
+            lower[row[i] * 12 + k] = factor;
+            arm_subtract(a + row[i] * 12, a + row[k] * 12, factor, k, 12);
+        }
+    }
+    for (i = 0; i < 12; i++)
+        v[i] = 1.0 + 0.37 * i - 0.11 * i * i; /* any start that no arm is made for */
+    for (i = 0; i < 12; i++) { /* U^T y = v */
+        const double *high = a + row[i] * 12;
+        w[i] = v[i] / high[i];
+        for (j = i + 1; j < 12; j++)
+            v[j] -= high[j] * w[i];
+    }
+    for (k = 11; k >= 0; k--) { /* L^T z = y; the permutations of A^-T and A^-1 cancel */
+        const double *low = lower + row[k] * 12;
+        for (i = 0; i < k; i++)
+            w[i] -= low[i] * w[k];
+    }
+    for (i = 0; i < 12; i++)
+        size = fabs(w[i]) > size ? fabs(w[i]) : size;
+    for (i = 0; i < 12; i++)
+        w[i] /= size;
+    for (i = 0; i < 12; i++) /* L y = z */
+        for (k = 0; k < i; k++)
+            w[i] -= lower[row[i] * 12 + k] * w[k];
+    size = 0;
+    for (i = 11; i >= 0; i--) { /* U v = y */
+        double sum = w[i];
+        for (k = i + 1; k < 12; k++)
+            sum -= a[row[i] * 12 + k] * v[k];
+        v[i] = sum / a[row[i] * 12 + i];
+        size = fabs(v[i]) > size ? fabs(v[i]) : size;
+    }
+    for (i = 0; i < 12; i++)
+        v[i] /= size;
+}
+
+/* Similarity transformations that make the rows and columns of a matrix about equally long (Osborne 1960). */
+static void arm_balance(double *a, int n)
+{
+    int i, j, done = 0, round;
+    for (round = 0; round < 20 && !done; round++) {
+        done = 1;
+        for (i = 0; i < n; i++) {
+            double c = 0, r = 0, f = 1, before;
+            for (j = 0; j < n; j++)
+                if (j != i) {
+                    c += fabs(a[j * ARM_MOST + i]);
+                    r += fabs(a[i * ARM_MOST + j]);
+                }
+            if (!(c > 0) || !(r > 0))
+                continue;
+            before = c + r;
+            for (; c < r / 2; c *= 4)
+                f *= 2;
+            for (; c >= r * 2; c /= 4)
+                f /= 2;
+            if ((c + r) / f < 0.95 * before) {
+                done = 0;
+                for (j = 0; j < n; j++)
+                    a[i * ARM_MOST + j] /= f;
+                for (j = 0; j < n; j++)
+                    a[j * ARM_MOST + i] *= f;
+            }
+        }
+    }
+}
+
+/* To upper Hessenberg form by eliminations with row pivots (Wilkinson, The Algebraic Eigenvalue Problem, 6.8). */
+static void arm_hessenberg(double *a, int n)
+{
+    int i, j, m;
+    for (m = 1; m < n - 1; m++) {
+        int best = m;
+        for (i = m + 1; i < n; i++)
+            if (fabs(a[i * ARM_MOST + m - 1]) > fabs(a[best * ARM_MOST + m - 1]))
+                best = i;
+        if (best != m) {
+            for (j = m - 1; j < n; j++) {
+                const double swap = a[best * ARM_MOST + j];
+                a[best * ARM_MOST + j] = a[m * ARM_MOST + j];
+                a[m * ARM_MOST + j] = swap;
+            }
+            for (j = 0; j < n; j++) {
+                const double swap = a[j * ARM_MOST + best];
+                a[j * ARM_MOST + best] = a[j * ARM_MOST + m];
+                a[j * ARM_MOST + m] = swap;
+            }
+        }
+        if (!(fabs(a[m * ARM_MOST + m - 1]) > 0))
+            continue;
+        for (i = m + 1; i < n; i++) {
+            const double factor = a[i * ARM_MOST + m - 1] / a[m * ARM_MOST + m - 1];
+            if (!(fabs(factor) > 0))
+                continue;
+            arm_subtract(a + i * ARM_MOST, a + m * ARM_MOST, factor, m, ARM_MOST);
+            a[i * ARM_MOST + m - 1] = 0;
+            for (j = 0; j < n; j++)
+                a[j * ARM_MOST + m] += factor * a[j * ARM_MOST + i];
+        }
+    }
+}
+
+/* Eigenvalues of an upper Hessenberg matrix by Francis' double-shift QR steps (Martin, Peters & Wilkinson 1970).
+   Returns 0 if they do not converge. */
+static int arm_eigenvalues(double *a, int n, double *re, double *im)
+{
+    const double rounding = 2.220446049250313e-16;
+    double norm = 0, shift = 0;
+    int b, i, j, k, l, m, last = n - 1, steps = 0;
+    for (i = 0; i < n; i++)
+        for (j = i > 0 ? i - 1 : 0; j < n; j++)
+            norm += fabs(a[i * ARM_MOST + j]);
+    while (last >= 0) {
+        double p = 0, q = 0, r = 0, x, y, w, z;
+        for (l = last; l > 0; l--) { /* the lowest row from which on nothing is left below the diagonal */
+            double size = fabs(a[(l - 1) * ARM_MOST + l - 1]) + fabs(a[l * ARM_MOST + l]);
+            if (!(size > 0))
+                size = norm;
+            if (fabs(a[l * ARM_MOST + l - 1]) <= rounding * size) {
+                a[l * ARM_MOST + l - 1] = 0;
+                break;
+            }
+        }
+        x = a[last * ARM_MOST + last];
+        if (l == last) { /* one root */
+            re[last] = x + shift;
+            im[last] = 0;
+            last--;
+            steps = 0;
+            continue;
+        }
+        y = a[(last - 1) * ARM_MOST + last - 1];
+        w = a[last * ARM_MOST + last - 1] * a[(last - 1) * ARM_MOST + last];
+        if (l == last - 1) { /* two */
+            p = (y - x) / 2;
+            q = p * p + w;
+            z = sqrt(fabs(q));
+            x += shift;
+            if (q >= 0) {
+                z = p + (p < 0 ? -z : z);
+                re[last - 1] = re[last] = x + z;
+                if (fabs(z) > 0)
+                    re[last] = x - w / z;
+                im[last - 1] = im[last] = 0;
+            } else {
+                re[last - 1] = re[last] = x + p;
+                im[last - 1] = z;
+                im[last] = -z;
+            }
+            last -= 2;
+            steps = 0;
+            continue;
+        }
+        if (steps == 60)
+            return 0;
+        if (steps % 10 == 9) { /* an exceptional shift */
+            double size;
+            shift += x;
+            for (i = 0; i <= last; i++)
+                a[i * ARM_MOST + i] -= x;
+            size = fabs(a[last * ARM_MOST + last - 1]) + fabs(a[(last - 1) * ARM_MOST + last - 2]);
+            x = y = 0.75 * size;
+            w = -0.4375 * size * size;
+        }
+        steps++;
+        for (m = last - 2; m >= l; m--) { /* where two small entries follow each other the step may start */
+            const double *d = a + m * ARM_MOST + m;
+            double u, v, size;
+            z = d[0];
+            r = x - z;
+            u = y - z;
+            p = (r * u - w) / d[ARM_MOST] + d[1];
+            q = d[ARM_MOST + 1] - z - r - u;
+            r = d[2 * ARM_MOST + 1];
+            size = fabs(p) + fabs(q) + fabs(r);
+            p /= size;
+            q /= size;
+            r /= size;
+            if (m == l)
+                break;
+            u = fabs(d[-1]) * (fabs(q) + fabs(r));
+            v = fabs(p) * (fabs(d[-ARM_MOST - 1]) + fabs(z) + fabs(d[ARM_MOST + 1]));
+            if (u <= rounding * v)
+                break;
+        }
+        for (i = m + 2; i <= last; i++) {
+            a[i * ARM_MOST + i - 2] = 0;
+            if (i > m + 2)
+                a[i * ARM_MOST + i - 3] = 0;
+        }
+        for (k = m; k < last; k++) {
+            double *up = a + k * ARM_MOST, *mid = up + ARM_MOST, *low = mid + ARM_MOST, size;
+            const int three = k < last - 1, end = last < k + 3 ? last : k + 3;
+            if (k > m) {
+                p = up[k - 1];
+                q = mid[k - 1];
+                r = three ? low[k - 1] : 0;
+                x = fabs(p) + fabs(q) + fabs(r);
+                if (!(x > 0))
+                    continue;
+                p /= x;
+                q /= x;
+                r /= x;
+            }
+            size = sqrt(p * p + q * q + r * r);
+            if (p < 0)
+                size = -size;
+            if (k > m)
+                up[k - 1] = -size * x;
+            else if (l < m)
+                up[k - 1] = -up[k - 1];
+            p += size;
+            x = p / size;
+            y = q / size;
+            z = r / size;
+            q /= p;
+            r /= p;
+            if (three) {
+                const double below = k > 0 ? up[k - 1] : 0;
+                for (b = k & ~3; b < ARM_MOST; b += 4) /* by fours; what lies outside the block is not read again */
+                    for (j = b; j < b + 4; j++) {
+                        const double t = up[j] + q * mid[j] + r * low[j];
+                        up[j] -= t * x;
+                        mid[j] -= t * y;
+                        low[j] -= t * z;
+                    }
+                if (k > 0)
+                    up[k - 1] = below;
+                for (i = l; i <= end; i++) {
+                    double *c = a + i * ARM_MOST + k;
+                    const double t = x * c[0] + y * c[1] + z * c[2];
+                    c[0] -= t;
+                    c[1] -= t * q;
+                    c[2] -= t * r;
+                }
+            } else {
+                for (j = k; j <= last; j++) {
+                    const double t = up[j] + q * mid[j];
+                    up[j] -= t * x;
+                    mid[j] -= t * y;
+                }
+                for (i = l; i <= end; i++) {
+                    double *c = a + i * ARM_MOST + k;
+                    const double t = x * c[0] + y * c[1];
+                    c[0] -= t;
+                    c[1] -= t * q;
+                }
+            }
+        }
+    }
+    return 1;
+}
