@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from armkin.export.c import elimination, kernel, program
-from armkin.export.c.parts import part
+from armkin.export.c.text import part
 from armkin.formula.c_code import number
 from armkin.inverse.solve import ACCEPTED, ACCEPTED_MM, FAR
 from armkin.inverse.tasks.task import LARGEST

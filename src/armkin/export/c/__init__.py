@@ -1,6 +1,8 @@
 """An arm as C99 that needs nothing but libm.
 
-program.py   the files: header, source, test program
-kernel.py    recorded formulas as functions of C
-parts/       what is the same for all arms, in C
+program.py      the files: header, source, test program
+kernel.py       recorded formulas as functions of C
+elimination.py  the general elimination: constants as data
+golden.py       what the test program compares with
+text.py         parts/: what is the same for all arms, in C
 """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.export.c.parts import part
+from armkin.export.c.text import part
 from armkin.formula import c_code, recording
 from armkin.inverse import tool_axis
 from armkin.inverse.elimination.merge import _WEIGHTS as WEIGHTS

@@ -10,7 +10,7 @@ from armkin import __version__
 from armkin.errors import UsageError
 from armkin.export.c import elimination, kernel
 from armkin.export.c.golden import golden_test
-from armkin.export.c.parts import part
+from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_code import number
 from armkin.inverse.branches.names import branch_names

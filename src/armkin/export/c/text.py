@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+PARTS = Path(__file__).parent / "parts"
+
 
 def part(name: str) -> str:
     """A part's text, with @names@ to be filled in."""
-    return (Path(__file__).parent / f"{name}.c").read_text(encoding="utf-8")
+    return (PARTS / f"{name}.c").read_text(encoding="utf-8")
