@@ -20,6 +20,7 @@ COMMANDS = {
     "plot": "A picture of the arm.",
     "teach": "A page in the browser: see the arm, choose a branch, send it.",
     "robots": "The robots that come with armkin, and what each can do.",
+    "new": "A robot file from a DH table, commented.",
     "info": "What a robot file says, checked.",
     "import": "A robot file from a URDF.",
     "export": "The arm in other words: URDF, DH tables, screws, JSON, C99.",

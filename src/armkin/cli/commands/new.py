@@ -1,0 +1,212 @@
+"""`armkin new`."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armkin.cli import output
+from armkin.cli.numbers import number, of_pi, whole
+from armkin.cli.options import Out
+from armkin.errors import FileError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.robot_file.new import Row
+
+_COLUMNS = ("alpha", "a", "d", "theta", "type", "lower", "upper", "home", "name")
+_VARIABLE = re.compile(r"([+-]?)(?:q|theta|th|d|s|\u03b8)_?[0-9]{0,2}\*? *(?:([+-]) *([0-9.pi/*\u03c0]{1,20}))?", re.I)
+_LARGEST_FILE = 1_000_000
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The arm's name; the file is NAME.yaml.")],
+    dh: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--dh",
+            metavar="ALPHA,A,D[,THETA]",
+            help="A row of the DH table, in degrees and mm. Repeatable; d3 for d makes a prismatic joint.",
+        ),
+    ] = None,
+    batch: Annotated[
+        str | None,
+        typer.Option(
+            "--batch",
+            metavar="FILE|-",
+            help="The table as CSV: alpha,a,d[,theta], or a heading with these, type, lower, upper, home, name.",
+        ),
+    ] = None,
+    convention: Annotated[
+        str | None,
+        typer.Option("--convention", metavar="NAME", help="standard, or modified (Craig). Never guessed."),
+    ] = None,
+    source: Annotated[str, typer.Option("--source", metavar="TEXT", help="Where the numbers come from.")] = "",
+    out: Out = None,
+) -> None:
+    """A robot file from a DH table, commented.
+
+    Without --dh or --batch it asks on the terminal. Entries may be written as papers do: pi/2 for an angle,
+    q2 + 90 or d3 for the variable. What the table does not say stands in the file as comments.
+    """
+    from armkin.robot_file import parse
+    from armkin.robot_file.new import text
+
+    path = _path(name, out)
+    if dh and batch is not None:
+        raise UsageError("--dh and --batch: give one of the two")
+    if not dh and batch is None:
+        convention, table = _asked(convention)
+    elif convention is None:
+        raise UsageError(
+            "--convention is missing: standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz); the table's source says"
+        )
+    else:
+        table = _options(dh) if dh else _csv(batch or "-")
+    if convention not in ("standard", "modified"):
+        raise UsageError(f"--convention {convention}: must be standard or modified")
+    rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
+    made = text(os.path.basename(name), convention, rows, source)
+    parse(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
+    with output.destination(path) as write:
+        write(made)
+    if path != "-":
+        output.note(f"wrote {path}; armkin info {path} prints it as papers do, armkin fk {path} home where it stands")
+
+
+def _path(name: str, out: str | None) -> str:
+    base = os.path.basename(name)
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,79}", base) or base.endswith((".yaml", ".yml")):
+        plain = re.sub(r"\.ya?ml$", "", base)
+        raise UsageError(f"NAME: '{name}' is the arm's name, letters and digits" + f"; write {plain}" * (plain != base))
+    path = out or f"{name}.yaml"
+    if path != "-" and os.path.exists(path):
+        raise FileError(f"{path} is there already; give another name or --out FILE", file=path)
+    return path
+
+
+def _options(words: Sequence[str]) -> list[dict[str, str]]:
+    table = []
+    for i, word in enumerate(words, 1):
+        cells = [cell.strip() for cell in word.split(",")]
+        if len(cells) not in (3, 4):
+            raise UsageError(f"--dh {word}: row {i} takes alpha,a,d or alpha,a,d,theta with commas, got {len(cells)}")
+        table.append(dict(zip(_COLUMNS, cells, strict=False)))
+    return table
+
+
+def _csv(source: str) -> list[dict[str, str]]:
+    try:
+        if source == "-":
+            text = sys.stdin.read(_LARGEST_FILE) if sys.stdin is not None else ""
+        else:
+            with open(source, encoding="utf-8-sig") as file:
+                text = file.read(_LARGEST_FILE)
+    except (OSError, ValueError) as error:
+        raise FileError(f"{source}: cannot read: {getattr(error, 'strerror', None) or error}", file=source) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    try:
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, skipinitialspace=True)]
+    except csv.Error as error:
+        raise UsageError(f"{source}: this is no CSV: {error}") from None
+    heading: Sequence[str] = _COLUMNS
+    if rows and {"alpha", "a", "d"} <= {cell.lower() for cell in rows[0]}:
+        heading = [cell.lower() for cell in rows.pop(0)]
+        if unknown := [cell for cell in heading if cell not in _COLUMNS]:
+            raise UsageError(f"{source}: there is no column {unknown[0]}; the columns are {', '.join(_COLUMNS)}")
+    if not rows:
+        raise UsageError(f"{source}: no rows; give one of alpha,a,d,theta for each joint")
+    for i, row in enumerate(rows, 1):
+        if not 3 <= len(row) <= len(heading):
+            raise UsageError(f"{source}: row {i} has {len(row)} cells; it takes {','.join(heading)}")
+    return [dict(zip(heading, row, strict=False)) for row in rows]
+
+
+def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
+    """The table by questions on the terminal; an answer that does not do is asked for again."""
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise UsageError("no table: give --dh ALPHA,A,D,THETA for each joint, or --batch FILE (a CSV)")
+
+    def ask(question: str, default: str, check: Callable[[str], object]) -> str:
+        while True:
+            answer = str(typer.prompt(question, default=default, err=True)).strip()
+            try:
+                check(answer)
+                return answer
+            except UsageError as error:
+                output.warn(str(error))
+
+    def known(answer: str) -> None:
+        if answer not in ("standard", "modified"):
+            raise UsageError("write standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz); the table's source says")
+
+    def limits(answer: str) -> None:
+        if answer != "none":
+            _limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
+
+    convention = convention or ask("convention, standard or modified", "standard", known)
+    count = whole(ask("how many joints", "3", lambda n: whole(n, "joints", 1, 12)), "joints", 1, 12)
+    table = []
+    for i in range(1, count + 1):
+        row = {
+            "alpha": ask(f"joint {i}: alpha [deg]", "0", lambda word: _entry(word, "alpha")),
+            "a": ask(f"joint {i}: a [mm]", "0", lambda word: _entry(word, "a")),
+            "d": ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _entry(word, "d")),
+            "theta": ask(f"joint {i}: theta offset [deg]", "0", lambda word: _entry(word, "theta")),
+        }
+        span = ask(f"joint {i}: limits LOWER,UPPER, or none", "none", limits)
+        if span != "none":
+            row |= dict(zip(("lower", "upper"), span.split(","), strict=True))
+        table.append(row)
+    return convention, table
+
+
+def _row(cells: Mapping[str, str], i: int) -> Row:
+    from armkin.robot_file.new import Row
+
+    where = f"row {i}: "
+    values = {key: _entry(cells.get(key) or "0", f"{where}{key}") for key in ("alpha", "a", "d", "theta")}
+    for key in ("alpha", "a"):
+        if values[key][1]:
+            raise UsageError(f"{where}{key}: '{cells[key]}' is a variable; only theta or d can be")
+    kind = (cells.get("type") or "").lower()
+    if kind not in ("", "revolute", "prismatic", "r", "p"):
+        raise UsageError(f"{where}type: '{cells['type']}' must be revolute or prismatic")
+    slides = kind in ("prismatic", "p") or (not kind and values["d"][1])
+    if values["d"][1] and values["theta"][1]:
+        raise UsageError(f"{where}both theta and d are variables; a joint has one")
+    limits = _limits(cells, where)
+    home = number(cells.get("home") or "0", f"{where}home")
+    if limits is not None and not cells.get("home") and not limits[0] <= home <= limits[1]:
+        home = limits[0]
+        output.note(f"{where}0 is outside the limits: home is {home:g}")
+    numbers = {key: value for key, (value, _) in values.items()}
+    return Row(cells.get("name") or f"q{i}", **numbers, prismatic=slides, limits=limits, home=home)
+
+
+def _limits(cells: Mapping[str, str], where: str) -> tuple[float, float] | None:
+    lower, upper = cells.get("lower") or "", cells.get("upper") or ""
+    if not lower and not upper:
+        return None
+    if not (lower and upper):
+        raise UsageError(f"{where}: give both lower and upper, or neither")
+    return number(lower, f"{where}lower"), number(upper, f"{where}upper")
+
+
+def _entry(word: str, name: str) -> tuple[float, bool]:
+    """An entry of the table as papers write it: its constant, and whether the joint's variable is in it."""
+    if (angle := of_pi(word)) is not None and not name.endswith((" a", " d")):
+        return angle, False
+    found = _VARIABLE.fullmatch(word.strip())
+    if found is None or not word.strip():
+        return number(word, name), False
+    if found[1] == "-":
+        raise UsageError(f"{name}: '{word}' counts against its row; write the constant here and sign: -1 in the file")
+    constant = found[3] or "0"
+    angle = of_pi(constant)
+    return (number(constant, name) if angle is None else angle) * (-1.0 if found[2] == "-" else 1.0), True

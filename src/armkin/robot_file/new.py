@@ -1,0 +1,95 @@
+"""A robot file written from a DH table: complete as far as the table goes, the rest as comments to fill in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table: degrees and mm."""
+
+    name: str
+    alpha: float
+    a: float
+    d: float
+    theta: float = 0.0
+    prismatic: bool = False
+    limits: tuple[float, float] | None = None
+    home: float = 0.0
+
+
+_HEAD = {
+    "standard": "standard DH: each row is Rz(theta) Tz(d) Tx(a) Rx(alpha)",
+    "modified": "modified DH (Craig): each row is Rx(alpha) Tx(a) Rz(theta) Tz(d), alpha and a of the link before",
+}
+
+_AXES = ("X", "Y", "Z", "A", "E0", "E1")  # an example for each drive
+
+_TAIL = """
+# A fixed frame before joint 1 and one after the last joint (the tool's tip), in mm and degrees.
+# base: {xyz: [0, 0, 0], rpy: [0, 0, 0]}
+# tool: {xyz: [0, 0, 0], rpy: [0, 0, 0]}
+
+# What `armkin ik` solves for. Without it the structure decides; `armkin info` shows the choice.
+# task: xyz
+
+# Joint values by name: `armkin fk FILE park`.
+# poses: {park: [%(home)s]}
+
+# For `armkin send`: the board. (`armkin schema` lists every key; examples/every_key.yaml in armkin's sources shows
+# them all: limit switches for `armkin home`, servos, motors that turn several joints.)
+# board: {kind: uno_cnc_shield, driver: A4988}
+# gripper: {kind: servo, axis: S0, travel: [0, 180], pulse_us: [500, 2500], open: 30, closed: 120}
+"""
+
+
+def text(name: str, convention: str, rows: Sequence[Row], source: str = "") -> str:
+    """The file of a table; name, source: as the file shall say; convention: standard or modified."""
+    lines = [
+        "# Millimetres and degrees throughout. `armkin info` prints the table as papers do: compare it line by line.",
+        f"name: {name}",
+        f"source: {_quoted(source)}" if source else "# source: where the numbers come from",
+        f"convention: {convention}   # {_HEAD[convention]}",
+        "joints:",
+    ]
+    for i, row in enumerate(rows):
+        lines += _joint(row, _AXES[i % len(_AXES)], with_comments=i == 0)
+    return "\n".join(lines) + "\n" + _TAIL % {"home": ", ".join(_number(row.home) for row in rows)}
+
+
+def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
+    unit = "mm" if row.prismatic else "deg"
+    dh = ", ".join(f"{key}: {_number(getattr(row, key))}" for key in ("alpha", "a", "d", "theta"))
+    lower, upper = row.limits or (-90.0, 90.0)
+    lead = ", lead: 8" if row.prismatic else ""
+    entries = [
+        ("type: prismatic", "its value is added to d", row.prismatic),
+        (f"dh: {{{dh}}}", "theta, d: the constant part; the joint's value is added", True),
+        (f"limits: [{_number(lower)}, {_number(upper)}]", f"{unit}; absent: unlimited", row.limits is not None),
+        (f"home: {_number(row.home)}", "pulses are counted from here", True),
+        ("sign: -1", "if the joint counts against its row", False),
+        ("max_speed: 60", f"{unit}/s, for send", False),
+        ("max_accel: 120", f"{unit}/s2, for send", False),
+        (f"drive: {{axis: {axis}, full_steps: 200, microsteps: 16, gear: 1{lead}}}", "for pulses and send", False),
+    ]
+    lines = [f"  - name: {row.name}"]
+    for entry, comment, active in entries:
+        if active:
+            lines.append(f"    {entry}" + (f"   # {comment}" if with_comments else ""))
+        elif entry != "type: prismatic":
+            lines.append(f"    # {entry}" + (f"   # {comment}" if with_comments else ""))
+    return lines
+
+
+def _number(value: float) -> str:
+    """A number as people write it, and as YAML 1.1 reads it back: 1e-05 would be text there."""
+    short = f"{value:.10g}"
+    if "e" in short:
+        short = f"{value:.20f}".rstrip("0").rstrip(".")
+    return "0" if short in ("-0", "") else short
+
+
+def _quoted(words: str) -> str:
+    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
