@@ -32,6 +32,7 @@ MAY_IMPORT: dict[str, str] = {
     "motion": "errors formula model forward inverse/tasks inverse motors path_file",
     "reach": "errors files formula model forward motors",
     "export": "errors formula robot_file model forward inverse/tasks",
+    "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
     "compiled": "errors formula model forward inverse inverse/tasks inverse/branches inverse/closed export/c",

@@ -15,6 +15,7 @@ TYPE_CHECKING = False  # type checkers know better; importing typing would doubl
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from armkin.calibration.procedure import calibrate as calibrate
     from armkin.compiled.arm import CompiledArm as CompiledArm
     from armkin.compiled.arm import compile as compile
     from armkin.errors import ArmkinError as ArmkinError
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 _HOME = {
     "CompiledArm": "compiled.arm",
     "compile": "compiled.arm",
+    "calibrate": "calibration.procedure",
     "ArmkinError": "errors",
     "FileError": "errors",
     "LinkError": "errors",

@@ -27,8 +27,8 @@ LEAST = 1e-11  # [mm] a distance below is rounding
 _GEOMETRY = ("convention", "base", "tool", "zero_pose", "joints")
 
 
-def screws(arm: Arm) -> dict[str, Any]:
-    """The arm as a robot file with screws: keys and values.
+def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
+    """The arm as a robot file with screws: keys and values; tool: by default the file's own.
 
     >>> import armkin
     >>> screws(armkin.load("robots/three_dof.yaml"))["joints"][1]["screw"]
@@ -40,8 +40,9 @@ def screws(arm: Arm) -> dict[str, Any]:
         T = T @ links[i]
         direction, point = [tidy(x, 15) for x in T[:3, 2]], [tidy(x, 12) for x in T[:3, 3]]
         rows.append({"screw": {"w": [0, 0, 0], "v": direction} if arm.prismatic[i] else {"w": direction, "q": point}})
-    zero = T @ links[-1] @ inverse(_tool(arm))
-    return _file(arm, "screws", rows, arm.base, _tool(arm), {"zero_pose": pose(zero.tolist())})
+    tool = tool_of(arm) if tool is None else tool
+    zero = T @ links[-1] @ inverse(tool)
+    return _file(arm, "screws", rows, arm.base, tool, {"zero_pose": pose(zero.tolist())})
 
 
 def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
@@ -96,7 +97,7 @@ def _canonical(arm: Arm) -> Array:
     return links
 
 
-def _tool(arm: Arm) -> Array:
+def tool_of(arm: Arm) -> Array:
     """The fixed frame that the robot file has after its last joint."""
     if arm.file is None:
         return np.eye(4)
@@ -115,7 +116,7 @@ def _start(arm: Arm, link: Array) -> tuple[Array, float, float]:
 
 def _end(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
     """What of the last link belongs to the last row, and the tool that is left."""
-    tool = _tool(arm)
+    tool = tool_of(arm)
     inner = link @ inverse(tool)
     theta = math.atan2(inner[1, 0], inner[0, 0])
     if modified:
@@ -209,7 +210,9 @@ def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any
             joints.append(joint)
         return {"name": arm.name}, joints, {}
     data = arm.file.model_dump(exclude_unset=True, exclude_none=True)
-    joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw")} for joint in data["joints"]]
+    joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in data["joints"]]
+    for joint, ratio in zip(joints, arm.ratio.tolist(), strict=True):
+        joint |= {"ratio": ratio} if ratio != 1.0 else {}
     head = {k: v for k, v in data.items() if k in ("name", "description", "source", "task", "pitch_offset")}
     rest = {k: v for k, v in data.items() if k not in head and k not in _GEOMETRY}
     return head, joints, rest

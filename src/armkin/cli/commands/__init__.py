@@ -22,6 +22,7 @@ COMMANDS = {
     "robots": "The robots that come with armkin, and what each can do.",
     "new": "A robot file from a DH table, commented.",
     "info": "What a robot file says, checked.",
+    "calibrate": "A corrected robot file from measured tips.",
     "import": "A robot file from a URDF.",
     "export": "The arm in other words: URDF, DH tables, screws, JSON, C99.",
     "schema": "JSON Schema of robot files, for editors.",

@@ -1,0 +1,212 @@
+"""An arm with small corrections: five numbers a link, a ratio a joint, six for the base and six for the tool.
+
+Between the axes of joints i and i + 1 a link is A_i B_i, with A_i's x axis on their common normal (or towards the next
+joint, where the axes are within a few degrees of parallel) and A_i's origin on the next axis. A corrected arm is
+
+    Base(6) link[0] Z1(r1 c1 + z1) A_1 Tz(d) Tx(a) Rx(alpha) Ry(beta) B_1 Z2(r2 c2 + z2) ... link[n] Tool(6)
+
+with commanded joint values c. beta is Hayati's: without it a parallel axis could not tilt about the normal's direction
+(Hayati and Mirmirani, Improving the absolute positioning accuracy of robot manipulators, 1985). The set is complete but
+not minimal; the prior of `fit` decides between corrections that do the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.model.rotation import inverse, rotation_about
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+KINDS = ("base", "tool", "zeros", "ratios", "lengths", "twists")
+NEARLY_PARALLEL = 0.05  # [rad] below, the common normal is too far away to hang corrections on
+
+# The workshop prior: what a built arm differs from its table by (standard deviations). A base is put up by hand, and a
+# measuring tip is what its owner screwed on.
+LENGTH, TWIST, ZERO, SLIDE, RATIO = 0.5, math.radians(0.3), math.radians(1.0), 0.5, 0.003  # mm, rad, rad, mm, 1
+BASE, BASE_TURN, TOOL, TOOL_TURN = 200.0, math.radians(30.0), 20.0, math.radians(10.0)
+
+
+class Parameter(NamedTuple):
+    """One correction: its kind, its name for people, its unit, and how large workshops make it."""
+
+    kind: str
+    name: str
+    unit: str  # mm, rad or 1
+    prior: float
+
+
+class _Step(NamedTuple):
+    """A factor of the chain: a constant, or a motion along or about one of the axes x, y, z."""
+
+    constant: Array | None
+    axis: int = 2
+    turns: bool = True
+    joint: int = -1  # of a joint's own motion
+    parameter: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The corrected chain of one arm."""
+
+    arm: Arm
+    parameters: tuple[Parameter, ...]
+    steps: tuple[_Step, ...]
+
+    @cached_property
+    def prior(self) -> Array:
+        """(P,) standard deviations."""
+        return np.array([parameter.prior for parameter in self.parameters])
+
+    def indices(self, kind: str) -> NDArray[np.intp]:
+        """Which parameters are of a kind."""
+        return np.flatnonzero([parameter.kind == kind for parameter in self.parameters])
+
+    def poses(self, p: Array, c: Array) -> tuple[Array, Array]:
+        """Poses of commanded values c (M, n) with corrections p (P,), and their derivatives.
+
+        Returns (M, 4, 4) and (M, 6, P): what a unit of each correction moves the tip by (linear rows first) [mm]
+        and turns it by [rad], in the measuring frame.
+        """
+        M, n = c.shape
+        T = np.broadcast_to(np.eye(4), (M, 4, 4))
+        axes = np.zeros((len(self.parameters), M, 3))
+        points = np.zeros((len(self.parameters), M, 3))
+        turns = np.zeros(len(self.parameters), bool)
+        zeros, ratios = self.indices("zeros"), self.indices("ratios")
+        for step in self.steps:
+            if step.constant is not None:
+                T = T @ step.constant
+                continue
+            k = zeros[step.joint] if step.joint >= 0 else step.parameter
+            axes[k], points[k], turns[k] = T[:, :3, step.axis], T[:, :3, 3], step.turns
+            value: Array | float = p[k]
+            if step.joint >= 0:
+                j = step.joint
+                value = p[k] + (self.arm.ratio[j] + p[ratios[j]]) * c[:, j]
+            T = T @ _motion(step, value)
+        tip = T[:, :3, 3]
+        J = np.empty((M, 6, len(self.parameters)))
+        for k in range(len(self.parameters)):
+            if turns[k]:
+                J[:, :3, k] = np.cross(axes[k], tip - points[k])
+                J[:, 3:, k] = axes[k]
+            else:
+                J[:, :3, k] = axes[k]
+                J[:, 3:, k] = 0.0
+        for j in range(n):
+            J[:, :, ratios[j]] = J[:, :, zeros[j]] * c[:, j, None]
+        return T, J
+
+    def corrected(self, p: Array) -> tuple[Arm, Array]:
+        """The arm with corrections p, and its tool (4, 4)."""
+        arm, ratios = self.arm, self.indices("ratios")
+        links: list[Array] = []
+        T = np.eye(4)
+        for step in self.steps:
+            if step.constant is not None:
+                T = T @ step.constant
+            elif step.joint < 0:
+                T = T @ _motion(step, p[step.parameter])
+            else:
+                links.append(T @ _motion(step, p[self.indices("zeros")[step.joint]]))
+                T = np.eye(4)
+        links.append(T)
+        base = self._product("base", p) @ arm.base
+        sign = np.where(arm.dh_sign < 0, -1.0, 1.0)
+        zeros = p[self.indices("zeros")]
+        new = replace(
+            arm,
+            link=_frozen(np.array(links)),
+            base=_frozen(base),
+            ratio=_frozen(arm.ratio + p[ratios]),
+            dh_theta=_frozen(arm.dh_theta + np.where(arm.prismatic, 0.0, sign * zeros)),
+        )
+        return new, self._product("tool", p)
+
+    def _product(self, kind: str, p: Array) -> Array:
+        """The product of one kind's motions."""
+        T = np.eye(4)
+        for step in self.steps:
+            if step.parameter >= 0 and self.parameters[step.parameter].kind == kind:
+                T = T @ _motion(step, p[step.parameter])
+        return T
+
+
+def model(arm: Arm) -> Model:
+    """The arm with a correction at every place, all of them zero."""
+    parameters: list[Parameter] = []
+    steps: list[_Step] = []
+
+    def move(kind: str, name: str, unit: str, prior: float, axis: int) -> None:
+        steps.append(_Step(None, axis, unit == "rad", parameter=len(parameters)))
+        parameters.append(Parameter(kind, name, unit, prior))
+
+    def frame(kind: str, size: float, turn: float) -> None:
+        for axis in range(3):
+            move(kind, f"{kind} {'xyz'[axis]}", "mm", size, axis)
+        for axis in (2, 1, 0):
+            move(kind, f"{kind} {('roll', 'pitch', 'yaw')[axis]}", "rad", turn, axis)
+
+    frame("base", BASE, BASE_TURN)
+    steps.append(_Step(arm.link[0]))
+    for i, name in enumerate(arm.joint_names):
+        slides = bool(arm.prismatic[i])
+        steps.append(_Step(None, 2, not slides, joint=i))
+        parameters.append(Parameter("zeros", f"{name} zero", *(("mm", SLIDE) if slides else ("rad", ZERO))))
+        parameters.append(Parameter("ratios", f"{name} ratio", "1", RATIO))
+        if i == arm.n - 1:
+            break
+        A = _along(arm.link[i + 1], arm.reach)
+        steps.append(_Step(A))
+        move("lengths", f"{name} d", "mm", LENGTH, 2)
+        move("lengths", f"{name} a", "mm", LENGTH, 0)
+        move("twists", f"{name} alpha", "rad", TWIST, 0)
+        move("twists", f"{name} beta", "rad", TWIST, 1)
+        steps.append(_Step(inverse(A) @ arm.link[i + 1]))
+    steps.append(_Step(arm.link[-1]))
+    frame("tool", TOOL, TOOL_TURN)
+    return Model(arm, tuple(parameters), tuple(steps))
+
+
+def _along(link: Array, reach: float) -> Array:
+    """A_i: x along the common normal of a link's two axes, the origin on the second."""
+    z, p = link[:3, 2], link[:3, 3]
+    sine = math.hypot(z[0], z[1])
+    A = np.eye(4)
+    if sine > NEARLY_PARALLEL:
+        x = np.array([-z[1], z[0]]) / sine
+        after = float((p[:2] - (x @ p[:2]) * x) @ z[:2]) / sine**2
+        A[:3, 3] = p - after * z
+        if np.linalg.norm(A[:3, 3]) > 2 * reach:  # the normal is far off: stay with the file's origin
+            A[:3, 3] = p
+    else:
+        length = math.hypot(p[0], p[1])
+        x = p[:2] / length if length > 1e-9 * reach else np.array([1.0, 0.0])
+        A[:2, 3] = p[:2]
+    A[:2, 0], A[:2, 1] = x, (-x[1], x[0])
+    return A
+
+
+def _motion(step: _Step, value: Array | float) -> Array:
+    """Transforms along or about an axis: (4, 4), or (M, 4, 4) for values (M,)."""
+    T = np.zeros((*np.shape(value), 4, 4)) + np.eye(4)
+    if step.turns:
+        T[..., :3, :3] = rotation_about(step.axis, value)
+    else:
+        T[..., step.axis, 3] = value
+    return T
+
+
+def _frozen(values: Array) -> Array:
+    values.flags.writeable = False
+    return values

@@ -1,0 +1,163 @@
+"""Rows that cannot be right: said before anything is fitted, as a fit would only hide it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.calibration.fit import Measured
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+LEAST_ROWS = 4
+STILL = math.radians(0.1), 0.1  # [rad, mm] a joint that moves less does not move
+ON_A_LINE = 0.01  # of the rows' length, how thick a cloud on a line is at most
+FITS = 0.1  # of the rows' spread, a miss that needs no explanation
+EXPLAINS = 0.35  # of the miss as given, what another reading must leave to be the explanation
+
+
+def check(arm: Arm, data: Measured) -> None:
+    """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
+    if len(data) < LEAST_ROWS:
+        raise UsageError(f"{len(data)} rows are too few; measure at least {LEAST_ROWS}, better 20 to 60")
+    _moves(arm, data)
+    _spread(data)
+    _meaning(arm, data)
+
+
+def _moves(arm: Arm, data: Measured) -> None:
+    least = np.where(arm.prismatic, STILL[1], STILL[0])
+    still = np.flatnonzero(np.ptp(data.c, axis=0) < least)
+    if len(still):
+        names = ", ".join(arm.joint_names[j] for j in still)
+        raise UsageError(
+            f"{names} never move{'s' if len(still) == 1 else ''} in the rows: what belongs to "
+            f"{'it' if len(still) == 1 else 'them'} cannot be seen; measure poses that move every joint"
+        )
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    sizes = np.linalg.svd((data.c - data.c.mean(axis=0)) / unit, compute_uv=False)
+    if arm.n > 1 and sizes[1] < 1e-3 * sizes[0]:
+        raise UsageError(
+            "all joints move in step from row to row: their effects cannot be told apart; "
+            "measure poses that move them one by one or at random"
+        )
+
+
+def _spread(data: Measured) -> None:
+    centred = data.position - np.median(data.position, axis=0)
+    # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
+    near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
+    sizes = np.linalg.svd(centred[near] - centred[near].mean(axis=0), compute_uv=False)
+    if sizes[1] < ON_A_LINE * sizes[0] or sizes[0] == 0:
+        raise UsageError("the measured points lie on a line: a turn about it cannot be seen; measure points all around")
+
+
+class _Reading(NamedTuple):
+    """Another way to read the rows."""
+
+    says: str
+    c: Array
+    position: Array
+
+
+def _meaning(arm: Arm, data: Measured) -> None:
+    """Units and columns: whether another reading of the rows fits far better than the one given."""
+    from armkin.forward import position
+
+    expected = position(arm, data.c)
+    size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
+    miss, plain = _aligned(expected, data.position), _plain(expected, data.position)
+    says = ""
+    if plain > FITS * size:
+        says = _axes_in_place(expected, data.position, 0.2 * plain, FITS * size)
+    if not says and miss > FITS * size:
+        least = EXPLAINS * miss
+        for reading in _readings(arm, data):
+            moved = position(arm, reading.c)
+            off = _aligned(moved, reading.position) * size / max(_size(reading.position), 1e-12)
+            if off < least:
+                least, says = 0.999 * off, reading.says
+    if says:
+        raise UsageError(f"{says}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
+
+
+def _axes_in_place(expected: Array, measured: Array, most: float, largest: float) -> str:
+    """Whether the points fit without any motion once axes change places or one of them its sign; "" if not.
+
+    A measuring frame may stand anywhere; but one whose axes change places explains itself.
+    """
+    found = [
+        (_plain(expected, measured[:, order]), f"columns {_named(order)} of the measured points look like x y z")
+        for order in itertools.permutations(range(3))
+        if order != (0, 1, 2)
+    ]
+    found += [
+        (
+            _plain(expected, measured * flip),
+            f"the measured {axis} looks negative (or the first joint turns the other way)",
+        )
+        for flip, axis in _FLIPS
+    ]
+    off, says = min(found)
+    return says if off < min(most, largest) else ""
+
+
+_FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "z"))
+
+
+def _readings(arm: Arm, data: Measured) -> list[_Reading]:
+    c, x = data.c, data.position
+    degree = np.where(arm.prismatic, 1.0, math.pi / 180)
+    found = [
+        _Reading("the joint values look like radians where degrees are expected", c / degree, x),
+        _Reading("the joint values look like degrees where radians are expected", c * degree, x),
+        _Reading("the measured points look like metres where millimetres are expected", c, x * 1e3),
+        _Reading("the measured points look like micrometres where millimetres are expected", c, x * 1e-3),
+        _Reading("the measured points look like inches where millimetres are expected", c, x * 25.4),
+    ]
+    for i, j in itertools.combinations(range(arm.n), 2):
+        order = list(range(arm.n))
+        order[i], order[j] = j, i
+        names = f"{arm.joint_names[i]} and {arm.joint_names[j]}"
+        found.append(_Reading(f"the columns of {names} look swapped", c[:, order], x))
+    for j in range(arm.n):
+        sign = np.ones(arm.n)
+        sign[j] = -1.0
+        found.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
+    for axes in ((0, 2, 1), (2, 1, 0), (1, 0, 2)):
+        says = f"columns {_named(axes)} of the measured points look like x y z"
+        found.append(_Reading(says, c, x[:, axes]))
+    return found
+
+
+def _named(order: tuple[int, ...]) -> str:
+    return " ".join("xyz"[k] for k in order)
+
+
+def _size(x: Array) -> float:
+    return float(np.median(np.linalg.norm(x - np.median(x, axis=0), axis=1)))
+
+
+def _plain(expected: Array, measured: Array) -> float:
+    """The median miss, frames as they are."""
+    return float(np.median(np.linalg.norm(measured - expected, axis=1)))
+
+
+def _aligned(expected: Array, measured: Array) -> float:
+    """The median miss after the best rigid motion of the expected points (Kabsch, 1976), robustly."""
+    weight = np.ones(len(expected))
+    off = np.zeros(len(expected))
+    for _ in range(6):
+        a, b = (np.average(points, axis=0, weights=weight) for points in (expected, measured))
+        U, _s, Vt = np.linalg.svd((expected - a).T @ ((measured - b) * weight[:, None]))
+        turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt)) or 1.0])
+        R = (U @ turn @ Vt).T
+        off = np.linalg.norm(measured - b - (expected - a) @ R.T, axis=1)
+        weight = (1.0 + (off / (3.0 * np.median(off) + 1e-9)) ** 2) ** -2
+    return float(np.median(off))

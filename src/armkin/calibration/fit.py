@@ -1,0 +1,143 @@
+"""Robust damped Gauss-Newton with a prior.
+
+Minimised is sum rho(|r_k| / s) + sum (p_i / prior_i)^2, with Geman and McClure's rho(u) = u^2 / (1 + u^2 / K^2), whose
+weight (1 + u^2 / K^2)^-2 forgets rows that are far out (Geman and McClure, Statistical methods for tomographic image
+reconstruction, 1987), and the scale s from the median of the residuals. What the rows do not show stays where the prior
+has it: at the robot file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.calibration.chain import Model
+from armkin.formula.arrays import Array
+
+K = 4.0  # residuals beyond K scales lose three quarters of their weight
+MEDIAN = 1.5382  # of the length of three standard normal numbers
+FINEST = 0.005, 1e-5  # [mm, rad] no scale is smaller: what a measurement's last digit is worth
+STEPS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Commanded joint values and measured tips."""
+
+    c: Array  # (M, n) [rad | mm]
+    position: Array  # (M, 3) [mm]
+    rotation: Array | None = None  # (M, 3, 3)
+
+    def __len__(self) -> int:
+        return len(self.c)
+
+    def rows(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
+        """Some of the rows."""
+        return Measured(self.c[which], self.position[which], None if self.rotation is None else self.rotation[which])
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Corrections that fit some rows."""
+
+    p: Array  # (P,)
+    scale: tuple[float, float]  # [mm, rad] of the measurements' noise, each component
+    weights: Array  # (M,) in [0, 1]
+    normal: Array  # (F, F) normal matrix of the free parameters, prior included, in units of the prior
+    free: NDArray[np.intp]  # (F,)
+
+
+def residuals(model: Model, p: Array, data: Measured) -> tuple[Array, Array | None, Array]:
+    """What the model misses: (M, 3) [mm], (M, 3) [rad] or None, and the Jacobian (M, 6, P)."""
+    T, J = model.poses(p, data.c)
+    off = data.position - T[:, :3, 3]
+    if data.rotation is None:
+        return off, None, J
+    # Half the sum of the columns' cross products is the rotation vector to third order.
+    turned = 0.5 * np.cross(T[:, :3, :3], data.rotation, axis=1).sum(axis=2)
+    return off, turned, J
+
+
+def fit(
+    model: Model,
+    data: Measured,
+    free: NDArray[np.intp],
+    start: Array | None = None,
+    steps: int = STEPS,
+) -> Fit:
+    """The corrections of the free parameters that fit best; the others stay at `start` (0)."""
+    p = np.zeros(len(model.parameters)) if start is None else start.copy()
+    prior = model.prior[free]
+    damping = 1e-3
+    scale = (0.0, 0.0)
+    off, turned, J = residuals(model, p, data)
+    held = 0.0  # numbers that the fit itself has used up
+    for step in range(steps):
+        scale = _scales(off, turned, held)
+        weight, weight_turn = _weights(off, scale[0]), _weights(turned, scale[1])
+        H, g = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
+        z = p[free] / prior
+        cost = _cost(off, turned, scale, z)
+        with_prior = H + np.eye(len(free))
+        held = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
+        better = False
+        for _ in range(8):
+            move = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), g - z)
+            trial = p.copy()
+            trial[free] += move * prior
+            new = residuals(model, trial, data)
+            if _cost(new[0], new[1], scale, z + move) <= cost:
+                better = True
+                break
+            damping = max(damping, 1e-6) * 10
+        if not better:
+            break
+        p, (off, turned, J) = trial, new
+        damping *= 0.1
+        if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
+            break
+    scale = _scales(off, turned, held)
+    weight, weight_turn = _weights(off, scale[0]), _weights(turned, scale[1])
+    H, _ = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
+    return Fit(p, scale, np.minimum(weight, weight_turn), H + np.eye(len(free)), free)
+
+
+def _scales(off: Array, turned: Array | None, held: float) -> tuple[float, float]:
+    """The noise of a component from the median residual, larger by what the fit has used up."""
+    numbers = off.size + (0 if turned is None else turned.size)
+    used = np.sqrt(numbers / max(numbers - held, 0.25 * numbers))
+    size = float(np.median(np.linalg.norm(off, axis=1))) / MEDIAN * used
+    turn = 0.0 if turned is None else float(np.median(np.linalg.norm(turned, axis=1))) / MEDIAN * used
+    return max(size, FINEST[0]), max(turn, FINEST[1])
+
+
+def _weights(r: Array | None, scale: float) -> Array:
+    if r is None:
+        return np.ones(1)
+    u2 = np.einsum("mi,mi->m", r, r) / scale**2
+    return np.asarray((1.0 + u2 / K**2) ** -2)
+
+
+def _cost(off: Array, turned: Array | None, scale: tuple[float, float], z: Array) -> float:
+    total = float(z @ z)
+    for r, s in ((off, scale[0]), (turned, scale[1])):
+        if r is not None:
+            u2 = np.einsum("mi,mi->m", r, r) / s**2
+            total += float((u2 / (1.0 + u2 / K**2)).sum())
+    return total
+
+
+def _normal(
+    J: Array, off: Array, turned: Array | None, weight: Array, weight_turn: Array, scale: tuple[float, float]
+) -> tuple[Array, Array]:
+    """J^T W J and J^T W r in units of the prior and the scales, without the prior."""
+    rows = J[:, :3] * (np.sqrt(weight) / scale[0])[:, None, None]
+    values = off * (np.sqrt(weight) / scale[0])[:, None]
+    A, b = rows.reshape(values.size, J.shape[2]), values.reshape(-1)
+    if turned is not None:
+        rows = J[:, 3:] * (np.sqrt(weight_turn) / scale[1])[:, None, None]
+        values = turned * (np.sqrt(weight_turn) / scale[1])[:, None]
+        A, b = np.concatenate([A, rows.reshape(values.size, J.shape[2])]), np.concatenate([b, values.reshape(-1)])
+    return A.T @ A, A.T @ b

@@ -1,0 +1,89 @@
+"""Which corrections the rows justify: levels from few to all, compared on rows that were not used.
+
+The levels are those of Roth, Mooring and Ravani (An overview of robot calibration, 1987), finer: the file as it is;
+the base and the tool; the joints' zeros; their ratios; the links' lengths; their twists. A richer level is taken when
+it predicts rows it has not seen better than the simpler one, by more than chance (5-fold cross-validation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.calibration.chain import Model
+from armkin.calibration.fit import Fit, Measured, fit, residuals
+from armkin.formula.arrays import Array
+
+LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
+FOLDS = 5
+GAIN = 0.9  # a richer level must leave at most so much of the simpler one's squared error
+CERTAIN = 1.5  # and gain so many standard errors,
+FEW = 12.0  # and with few rows more: CERTAIN + FEW / rows
+CAP = 4.0  # errors beyond so many medians count as that: a row that is wrong decides nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The level chosen, and what each level's error is on rows that it has not seen."""
+
+    level: int
+    errors: Array  # (levels, M) [mm]
+    fit: Fit
+
+
+def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
+    """The level that the rows justify, fitted to all of them."""
+    parts = _parts(len(data))
+    # Fit all that is free first: every level starts from the pose of its base.
+    sets = [free_at(model, level, data, fixed) for level in range(len(LEVELS))]
+    errors = np.empty((len(LEVELS), len(data)))
+    fits: list[Fit | None] = []
+    for level, free in enumerate(sets):
+        if level and np.array_equal(free, sets[level - 1]):
+            errors[level] = errors[level - 1]
+            fits.append(fits[-1])
+            continue
+        start = fits[-1].p if fits and fits[-1] is not None else None
+        whole = fit(model, data, free, start)
+        fits.append(whole)
+        for held in parts:
+            used = np.setdiff1d(np.arange(len(data)), held)
+            p = fit(model, data.rows(used), free, start, steps=12).p if len(free) else whole.p
+            errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
+    level = 0
+    for richer in range(1, len(LEVELS)):
+        if not np.array_equal(sets[richer], sets[level]) and _better(errors[level], errors[richer]):
+            level = richer
+    chosen = fits[level]
+    assert chosen is not None
+    return Choice(level, errors, chosen)
+
+
+def free_at(model: Model, level: int, data: Measured, fixed: Collection[str]) -> NDArray[np.intp]:
+    """The free parameters of a level: its own kind's and the simpler levels'."""
+    kinds = ("base", "tool", "zeros", "ratios", "lengths", "twists")[: level + 1 if level else 0]
+    wanted = [
+        parameter.kind in kinds
+        and not {parameter.kind, parameter.name} & set(fixed)
+        # points alone do not show how the measuring tip is turned
+        and not (parameter.kind == "tool" and parameter.unit == "rad" and data.rotation is None)
+        for parameter in model.parameters
+    ]
+    return np.flatnonzero(wanted)
+
+
+def _parts(count: int) -> list[NDArray[np.intp]]:
+    """The rows in five parts of equal size, by chance (the same each time)."""
+    order = np.random.default_rng(1).permutation(count)
+    return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
+
+
+def _better(simple: Array, rich: Array) -> bool:
+    """Whether the richer level's errors on unseen rows are smaller by more than chance."""
+    a, b = (np.minimum(errors, CAP * np.median(errors)) ** 2 for errors in (simple, rich))
+    gain = a - b
+    chance = float(gain.std(ddof=1) / np.sqrt(len(gain)))
+    return bool(b.mean() <= GAIN * a.mean() and gain.mean() > (CERTAIN + FEW / len(gain)) * chance)

@@ -1,0 +1,177 @@
+"""`armkin.calibrate`: from commanded joints and measured tips to a corrected arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.calibration import sight
+from armkin.calibration.chain import KINDS, model
+from armkin.calibration.doubts import check
+from armkin.calibration.fit import Measured
+from armkin.calibration.levels import LEVELS, Choice, choose, free_at
+from armkin.errors import UsageError
+from armkin.export import tables
+from armkin.formula import arrays
+from armkin.formula.arrays import Array
+from armkin.forward import as_joints
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+FLAGGED = 0.1  # a row of less weight is called wrong
+HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
+
+# Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
+_PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")
+_LEVEL = ("xy", "xy_theta", "xyz_yaw")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration:
+    """A corrected arm, and what is known of it."""
+
+    arm: Arm
+    data: dict[str, Any]  # the robot file's keys and values
+    level: str  # the corrections that the rows justified: file, base and tool, zeros, ratios, lengths or twists
+    before: Array  # (M,) [mm] the file's error on each row
+    after: Array  # (M,) [mm] the calibrated arm's error on each row, fitted without it
+    flagged: NDArray[np.intp]  # rows that do not fit the others, from 0
+    noise: float  # [mm] of a measured coordinate
+    corrections: list[tuple[str, float, float, str]]  # name, value, standard deviation, unit (mm, rad, 1)
+    unseen: list[str]  # corrections that the rows do not show; they stay with the file
+    held: list[str]  # kinds that were not corrected
+
+    @property
+    def text(self) -> str:
+        """The corrected robot file."""
+        from armkin.robot_file.writing import text
+
+        return text(self.data)
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of corrections that were made."""
+        names = {name for name, *_ in self.corrections}
+        return list(dict.fromkeys(p.kind for p in model(self.arm).parameters if p.name in names))
+
+    def rms(self, which: str) -> float:
+        """Root mean square [mm] of `before` or `after`, flagged rows apart."""
+        errors = np.delete(self.before if which == "before" else self.after, self.flagged)
+        return float(np.sqrt(np.mean(errors**2)))
+
+    def __repr__(self) -> str:
+        """The gain on rows that were not used."""
+        rows = f"{len(self.before)} rows"
+        return f"<Calibration of {self.arm.name}: {rows}, {self.rms('before'):.3g} -> {self.rms('after'):.3g} mm>"
+
+
+def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str] = ()) -> Calibration:
+    """The arm that explains measured tips, as far as the rows justify it.
+
+    q: (M, n) [rad | mm] as commanded; measured: (M, 3) [mm] points or (M, 4, 4) poses; fix: kinds that stay as the
+    file has them (base, tool, zeros, ratios, lengths, twists). Rows that do not fit the others are forgotten. Raises
+    UsageError for rows that cannot be right: too few, on a line, a joint that never moves, other units or columns.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("robots/three_dof.yaml")
+    >>> q = np.random.default_rng(0).uniform(-1, 1, (30, 3))
+    >>> tips = armkin.fk(arm, q + [0, 0.02, 0])[:, :3, 3]  # the second zero is 0.02 rad off
+    >>> found = calibrate(arm, q, tips, fix=["base", "tool", "ratios", "lengths", "twists"])
+    >>> found.level, [round(value, 4) + 0.0 for _, value, _, _ in found.corrections]
+    ('zeros', [0.0, 0.02, 0.0])
+    """
+    fixed = _kinds(fix)
+    data = _measured(arm, q, measured)
+    check(arm, data)
+    corrections = model(arm)
+    hold, held = holding(arm, fixed)
+    choice = choose(corrections, data, hold)
+    _must_explain(data, choice)
+    found = choice.fit
+    new, tool = corrections.corrected(found.p)
+    doubts = sight.doubts(corrections, found) if len(found.free) else np.zeros(0)
+    listed = [
+        (corrections.parameters[k].name, float(found.p[k]), float(doubt), corrections.parameters[k].unit)
+        for k, doubt in zip(found.free, doubts, strict=True)
+    ]
+    return Calibration(
+        arm=new,
+        data=tables.screws(new, tables.tool_of(arm) @ tool),
+        level=LEVELS[choice.level],
+        before=choice.errors[0],
+        after=choice.errors[choice.level],
+        flagged=np.flatnonzero(found.weights < FLAGGED),
+        noise=found.scale[0],
+        corrections=listed,
+        unseen=sight.unseen(corrections, found),
+        held=held,
+    )
+
+
+def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterable[str] = ()) -> Array:
+    """The next poses to measure: (count, n) [rad | mm], those that tell most about all corrections, within limits.
+
+    q: (M, n) poses measured already; fix as in `calibrate`.
+    """
+    corrections = model(arm)
+    hold, _ = holding(arm, _kinds(fix))
+    before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
+    none = Measured(np.zeros((0, arm.n)), np.zeros((0, 3)))
+    return sight.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
+
+
+def holding(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
+    """What is not corrected, kinds and single corrections, and the kinds that the arm's task holds, in words."""
+    from armkin.inverse.tasks.fitting import task_for
+
+    try:
+        task = task_for(arm).name
+    except UsageError:
+        return fixed, []
+    hold, held = set(fixed), []
+    if task in _PARALLEL and "twists" not in fixed:
+        hold.add("twists")
+        held.append(f"twists: task {task} needs parallel axes")
+    if task in _LEVEL:
+        hold |= {"base roll", "base pitch"}
+        held.append(f"the base's roll and pitch: task {task} needs axes along z")
+    return hold, held
+
+
+def _kinds(fix: Iterable[str]) -> set[str]:
+    wanted = {fix} if isinstance(fix, str) else set(fix)
+    if unknown := sorted(wanted - set(KINDS)):
+        raise UsageError(f"there is no kind {unknown[0]} of corrections; there are {', '.join(KINDS)}")
+    if wanted == set(KINDS):
+        raise UsageError("all corrections are fixed; nothing is left to find")
+    return wanted
+
+
+def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measured:
+    c = as_joints(arm, q)
+    values = arrays.real(measured, "measured")
+    if c.ndim != 2:
+        raise UsageError(f"calibrate takes one row of joint values a pose: (M, {arm.n}); got {c.shape}")
+    shapes = ((len(c), 3), (len(c), 4, 4))
+    if values.shape not in shapes:
+        raise UsageError(f"measured has shape {values.shape}; expected {shapes[0]} or {shapes[1]}")
+    if not (np.isfinite(c).all() and np.isfinite(values).all()):
+        raise UsageError("a row holds nan or infinity; every number must be finite")
+    if values.ndim == 2:
+        return Measured(c, values)
+    return Measured(c, values[:, :3, 3], values[:, :3, :3])
+
+
+def _must_explain(data: Measured, choice: Choice) -> None:
+    spread = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
+    left = float(np.median(choice.errors[choice.level]))
+    if left > HOPELESS * spread:
+        raise UsageError(
+            f"the rows do not fit this arm: half of them stay more than {left:.3g} mm off, of points {spread:.3g} mm "
+            "around; check the robot file, the order of the columns and the units"
+        )

@@ -1,0 +1,85 @@
+"""What the rows show: which corrections they determine, which only as sums, and which poses would tell more.
+
+All from the fit's normal matrix in units of the prior: its inverse says how much of each correction's prior doubt is
+left (Hollerbach and Wampler, The calibration index and taxonomy for robot kinematic calibration methods, 1996).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.calibration.chain import Model
+from armkin.calibration.fit import FINEST, Fit
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+UNSEEN = 0.7  # of the prior's doubt left: the rows hardly speak of this correction
+TOGETHER = 0.9  # correlation of two corrections of which only the sum is seen
+CANDIDATES = 400
+UNLIMITED = np.pi, 200.0  # [rad, mm] how far an unlimited joint is moved for a suggestion
+
+
+def doubts(model: Model, found: Fit) -> Array:
+    """How large each free correction may still be: (F,) standard deviations [mm, rad, 1]."""
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(found.normal))) * model.prior[found.free])
+
+
+def unseen(model: Model, found: Fit) -> list[str]:
+    """Corrections that the rows do not show, in words; those of which they show the sum stand together."""
+    if not len(found.free):
+        return []
+    spread = np.linalg.inv(found.normal)
+    left = np.sqrt(np.diag(spread))
+    correlation = spread / np.outer(left, left)
+    names = [model.parameters[k].name for k in found.free]
+    weak = np.flatnonzero(left > UNSEEN)
+    told: list[str] = []
+    done: set[int] = set()
+    for k in weak:
+        if k in done:
+            continue
+        group = [k] + [j for j in np.flatnonzero(np.abs(correlation[k]) > TOGETHER) if j != k]
+        done.update(int(j) for j in group)
+        told.append(names[k] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
+    return told
+
+
+def suggestions(model: Model, count: int, free: NDArray[np.intp], before: Array | None = None) -> Array:
+    """Joint values (count, n) whose measurement would tell most, one after the other, within limits.
+
+    free: the corrections to see; before: (M, n) poses measured already. Each next pose is that of 400 random ones
+    with the largest gain of information, log det(I + J N^-1 J^T) (D-optimality, greedily).
+    """
+    if count < 1 or count > 1000:
+        raise UsageError(f"{count} poses cannot be suggested; ask for 1 to 1000")
+    arm = model.arm
+    span = np.where(arm.prismatic, UNLIMITED[1], UNLIMITED[0])
+    low = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - span, -span))
+    high = np.where(np.isfinite(arm.upper), arm.upper, np.where(np.isfinite(arm.lower), arm.lower + span, span))
+    step = np.where(arm.prismatic, 1.0, np.pi / 180)  # whole degrees and millimetres, as people type them
+    random = np.random.default_rng(3).uniform(low, high, (CANDIDATES, arm.n))
+    candidates = np.clip(np.round(random / step) * step, low, high)
+    J = _whitened(model, candidates, free)
+    N = np.eye(len(free))
+    if before is not None and len(before):
+        rows = _whitened(model, before, free).reshape(-1, len(free))
+        N += rows.T @ rows
+    chosen: list[int] = []
+    for _ in range(count):
+        gain = np.linalg.slogdet(np.eye(3) + J @ np.linalg.solve(N, np.swapaxes(J, 1, 2)))[1]
+        gain[chosen] = -np.inf if len(chosen) < CANDIDATES else gain[chosen]
+        k = int(np.argmax(gain))
+        chosen.append(k)
+        N = N + J[k].T @ J[k]
+    return np.asarray(candidates[chosen])
+
+
+def _whitened(model: Model, c: Array, free: NDArray[np.intp]) -> Array:
+    """What the corrections do to the tip, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
+    J = model.poses(np.zeros(len(model.parameters)), c)[1][:, :3, free]
+    return np.asarray(J * model.prior[free] / max(0.1, FINEST[0]))

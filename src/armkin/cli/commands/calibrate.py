@@ -1,0 +1,163 @@
+"""`armkin calibrate`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.batch import batch_rows
+from armkin.cli.options import Json, Out, Robot
+from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.calibration.procedure import Calibration
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+_UNITS = {"mm": ("mm", 1.0), "rad": ("deg", 1 / units.DEGREE), "1": ("%", 100.0)}
+
+
+def calibrate(
+    robot: Robot,
+    measured: Annotated[
+        str | None,
+        typer.Argument(metavar="CSV", help="One row a pose: joints as commanded, x y z of the tip as measured."),
+    ] = None,
+    poses: Annotated[
+        bool, typer.Option("--poses", help="The rows also have roll, pitch and yaw of the tool, in degrees.")
+    ] = False,
+    fix: Annotated[
+        str | None,
+        typer.Option(
+            "--fix", metavar="KIND,...", help="Leave as they are: base, tool, zeros, ratios, lengths, twists."
+        ),
+    ] = None,
+    suggest: Annotated[
+        int | None,
+        typer.Option("--suggest", metavar="N", help="Instead, the next N poses whose measurement tells most."),
+    ] = None,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """A corrected robot file from measured tips.
+
+    Rows that do not fit the others are forgotten, and corrections that the rows do not show stay with the file. How
+    much is corrected is decided on rows that the fit has not seen. --out NEW.yaml writes the robot file.
+    """
+    import numpy as np
+
+    import armkin
+
+    output.spare(robot, out)
+    arm = inputs.load(robot)
+    kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
+    names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
+    numbers: list[int] = []
+    rows: Array | None = None
+    if measured is not None:
+        chunks = list(batch_rows(measured, names, arm.name))
+        numbers = [number for chunk in chunks for number in chunk.numbers]
+        rows = np.concatenate([chunk.values for chunk in chunks])
+    if suggest is not None:
+        _suggest(arm, suggest, rows, kinds, json, out)
+        return
+    if rows is None:
+        raise UsageError(
+            f"a CSV file with columns {','.join(names)} is missing; --suggest 30 says which poses to measure"
+        )
+    q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
+    if poses:
+        tips = units.targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
+    found = armkin.calibrate(arm, q, tips, fix=kinds)
+    if out is not None:
+        from armkin.files import whole
+
+        with whole(out) as file:
+            file.write(_file(found, arm))
+    answer = _answer(arm, found, numbers, out)
+    with output.destination(None) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    for line in found.held:
+        output.note(f"not corrected: {line}")
+    if out is None:
+        output.note("--out NEW.yaml writes the corrected robot file")
+
+
+def _file(found: Calibration, arm: Arm) -> str:
+    from armkin.robot_file.writing import text
+
+    return text(
+        found.data,
+        [
+            f"{arm.name}, calibrated from {len(found.before)} measured poses by armkin calibrate.",
+            f"On rows not used: {found.rms('before'):.3f} mm rms before, {found.rms('after'):.3f} mm after.",
+        ],
+    )
+
+
+def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
+    from armkin.calibration.procedure import next_poses
+    from armkin.cli.batch import csv_line
+
+    before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
+    found = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()
+    with output.destination(out) as write:
+        if json:
+            answer = {**render.head(arm), "joint_units": units.names(arm), "poses": found}
+            write(f"{render.to_json(answer)}\n")
+        else:
+            write("\n".join([csv_line(arm.joint_names), *map(csv_line, found), ""]))
+
+
+def _answer(arm: Arm, found: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
+    import numpy as np
+
+    kept = np.delete(np.arange(len(found.before)), found.flagged)
+    corrections = []
+    for name, value, doubt, unit in found.corrections:
+        shown, size = _UNITS[unit]
+        corrections.append({"name": name, "value": value * size, "deviation": doubt * size, "unit": shown})
+    return {
+        **render.head(arm),
+        "rows": len(found.before),
+        "level": found.level,
+        "corrected": found.kinds,
+        **{
+            key: {
+                "median_mm": float(np.median(errors[kept])),
+                "rms_mm": float(np.sqrt(np.mean(errors[kept] ** 2))),
+                "max_mm": float(errors[kept].max()),
+            }
+            for key, errors in (("before", found.before), ("after", found.after))
+        },
+        "noise_mm": found.noise,
+        "flagged": [{"row": numbers[k], "off_mm": float(found.after[k])} for k in found.flagged],
+        "corrections": corrections,
+        "unseen": found.unseen,
+        "held": found.held,
+        "out": out,
+    }
+
+
+def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    rows = [["on rows not used", "before", "after", ""]]
+    for key, name in (("median_mm", "median"), ("rms_mm", "rms"), ("max_mm", "largest")):
+        rows.append([name, render.fixed(answer["before"][key], 3), render.fixed(answer["after"][key], 3), "mm"])
+    corrected = "corrected: " + (", ".join(answer["corrected"]) or "nothing, the file is as good")
+    lines = [f"{arm.name}: {answer['rows']} measured poses, {corrected}", "", render.table(rows, (0, 3)), ""]
+    if answer["corrections"]:
+        table = [["correction", "value", "+-", ""]]
+        for entry in answer["corrections"]:
+            numbers = (render.fixed(entry[key], 3) for key in ("value", "deviation"))
+            table.append([entry["name"], *numbers, entry["unit"]])
+        lines += [render.table(table, (0, 3)), ""]
+    if flagged := answer["flagged"]:
+        said = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
+        lines.append(render.wrapped(said, "forgotten rows: ", " " * 16))
+    if unseen := answer["unseen"]:
+        lines.append(render.wrapped(", ".join(unseen), "not seen in these rows: ", " " * 24))
+    lines.append(f"noise of a measured coordinate: {answer['noise_mm']:.3f} mm")
+    return "\n".join(lines) + "\n"
