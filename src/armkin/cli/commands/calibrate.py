@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.batch import batch_rows
+from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
 from armkin.model import units
