@@ -168,6 +168,14 @@ def test_a_program_is_carried_out_with_the_gripper_in_between(sim: Page) -> None
     assert state["error"] == ""
     assert state["joints"] == pytest.approx([10, 80, -80], abs=0.02)
     assert state["done_s"] == pytest.approx(state["total_s"], abs=0.2)
+    sim.act("program", do="clear")
+    sim.act("program", do="settings", blend=5)
+    for q in ([-20, 60, -70], [20, 45, -60]):
+        sim.act("program", do="record", kind="line", q=q)
+    assert sim.act("run", speed=100) == (200, {})
+    state = sim.idle()
+    assert state["error"] == ""
+    assert state["joints"] == pytest.approx([20, 45, -60], abs=0.02)
     sim.act("program", do="record", kind="joint", q=[10, 130, -80])
     sim.act("run", speed=100)
     after = sim.idle()

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armkin.board import following
 from armkin.board.firmware import gripping, homing, jogging
-from armkin.board.firmware.cutting import cut, plan
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits
-from armkin.motion.trajectory import Trajectory
 from armkin.teach import guard
 
 if TYPE_CHECKING:
@@ -131,8 +130,10 @@ class Board:
     def grip(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Open or close the gripper, or take a value; `assume`: it stands open now, if nothing is known of it."""
         value = fields.get("value")
+        if isinstance(value, str) and value not in ("open", "closed"):
+            raise UsageError("value: expected open, closed or a number")
         wanted = value if isinstance(value, str) else guard.number(fields, "value", -1e6, 1e6)
-        self._grip_count(wanted)
+        gripping.count_of(gripping.gripper_of(self.arm.name, self.pilot.configuration), wanted)
         assume = guard.flag(fields, "assume")
         self.check_file()
         self.pilot.submit("grip", lambda machine: self._grip(machine, wanted, assume))
@@ -165,9 +166,7 @@ class Board:
     def run(self, machine: Machine, goals: Array, speed: float) -> None:
         """Move through joint values (w, n), stopping at each."""
         self.prepare(machine)
-        clock, least = machine.info.clock, machine.info.min_interval
-        moves = plan(self.arm, machine.counts(), goals, speed=speed, clock=clock, min_interval=least)
-        machine.run([moves], self._progress)
+        machine.run([machine.plan(machine.counts(), goals, speed=speed)], self._progress)
 
     def prepare(self, machine: Machine) -> None:
         """Switch the motors on; LinkError if the position is lost."""
@@ -178,40 +177,12 @@ class Board:
         machine.prepare()
 
     def _run_program(self, machine: Machine, speed: float) -> None:
-        """Every part is planned and cut before the first one moves: the gripper's moves stand between them."""
+        """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
-        assert plan.trajectory is not None
-        clock, least = machine.info.clock, machine.info.min_interval
-        at, joints, first = np.array(machine.counts()), plan.trajectory.start, 0
-        parts = []
-        for marker in [*plan.markers, None]:
-            last = len(plan.trajectory.stretches) if marker is None else marker.before
-            part = Trajectory(self.arm, joints, plan.trajectory.stretches[first:last])
-            cuts = cut(part, at, clock=clock, min_interval=least)
-            parts.append((cuts, None if marker is None else marker.value))
-            at, joints, first = cuts.end, part.end, last
-            if marker is not None:
-                self._grip_count(marker.value)
-        before = 0.0
-        for cuts, value in parts:
-            if cuts.duration:
-                began = before
-                machine.run([cuts], lambda done, _, began=began: self._progress(began + done, plan.duration))  # type: ignore[misc]
-                before += cuts.duration
-            if value is not None:
-                self._grip(machine, value, assume=False)
-
-    def _grip_count(self, value: str | float) -> int:
-        """Counts of a gripper's value; UsageError if the arm has no gripper, or it does not go there."""
-        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
-        named = {"open": gripper.open, "closed": gripper.closed}
-        if isinstance(value, str):
-            if value not in named:
-                raise UsageError("value: expected open, closed or a number")
-            return named[value]
-        low, high = sorted((gripper.value(gripper.open), gripper.value(gripper.closed)))
-        return gripper.count(guard.number({"value": value}, "value", low, high))
+        following.check_gripper(plan, machine.configuration)
+        laid = following.parts(plan, machine.counts(), machine.lay)
+        following.follow(machine, plan, laid, self._progress)
 
     def _grip(self, machine: Machine, value: str | float, assume: bool) -> None:
         gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
@@ -222,7 +193,7 @@ class Board:
                 "a servo jumps there at once, at its full speed: keep your fingers out"
             )
         gripping.prepare(machine, gripper, gripper.open if assume and not known else None)
-        gripping.grip(machine, gripper, self._grip_count(value))
+        gripping.grip(machine, gripper, gripping.count_of(gripper, value))
 
     def _move(self, machine: Machine, q: Array, speed: float) -> None:
         self.run(machine, q[None], speed)
