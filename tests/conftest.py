@@ -1,5 +1,9 @@
 """Its being here puts this folder on the import path: helpers such as `command_line` are modules in it."""
 
+from __future__ import annotations
+
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,8 +14,42 @@ if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
     _FILES = Path(__file__).parent.rglob("test_*.py")
     collect_ignore = [str(path) for path in _FILES if any(word in path.read_text("utf-8") for word in _NEEDS)]
 
+# Helpers that compile the firmware, or run it in the emulator.
+_HELPERS = {"emulator", "measure", "bare_host"}
+_NO_COMPILER = "needs avr-gcc and simavr: install the packages of the README's apt-get line"
+
 
 @pytest.fixture(autouse=True)
 def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """ARMKIN_PORT is somebody's arm."""
     monkeypatch.delenv("ARMKIN_PORT", raising=False)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of the firmware; without its compiler they are skipped, and say why."""
+    for item in items:
+        if not _needs_emulator(item):
+            continue
+        item.add_marker(pytest.mark.emulator)
+        # One worker has them all: they keep real time, and share what is compiled.
+        item.add_marker(pytest.mark.xdist_group("emulator"))
+        if shutil.which("avr-gcc") is None:
+            item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
+
+
+def _needs_emulator(item: pytest.Item) -> bool:
+    if "firmware" in Path(item.path).parts:
+        return True
+    used = vars(item.module).values() if isinstance(item, pytest.Function) else ()
+    return any({getattr(x, "__name__", None), getattr(x, "__module__", None)} & _HELPERS for x in used)
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """`-n auto`, which is the default here: all cores for folders, one process for a few named tests.
+
+    Snapshots are written by one process, too.
+    """
+    named = [word for word in config.invocation_params.args if "::" in word or word.endswith(".py")]
+    if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS") or 0 < len(named) <= 2:
+        return 0
+    return min(os.cpu_count() or 1, 8)
