@@ -54,7 +54,7 @@ def position(arm: Arm, q: ArrayLike) -> Array:
     >>> position(armkin.load("robots/planar_2dof.yaml"), np.deg2rad([20, 50])).round(6).tolist()
     [290.544567, 350.311815, 0.0]
     """
-    return _batched(arm, as_joints(arm, q), (3,), _point)
+    return _batched(arm, as_joints(arm, q), (3,), point_formula)
 
 
 def frames(arm: Arm, q: ArrayLike) -> Array:
@@ -187,7 +187,7 @@ def _rows(P: Pose) -> list[Entry]:
     return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
 
 
-def _point(arm: Arm, q: list[Entry]) -> list[Entry]:
+def point_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """The tool's position, from the tool back to the base: a point is cheaper to carry than a pose."""
     p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
     for i in reversed(range(arm.n)):

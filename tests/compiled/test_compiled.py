@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -199,3 +200,26 @@ def test_without_a_compiler_one_line_says_what_to_install() -> None:
     )
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith("armkin.errors.MissingExtraError: a C compiler is needed and none is installed: apt install")
+
+
+def test_the_command_line_says_the_same_with_it(tmp_path: Path) -> None:
+    from command_line import run
+
+    rows = tmp_path / "rows.csv"
+    rows.write_text("".join(f"{x},80,{300 + x / 7}\n" for x in range(150, 460, 10)))
+    for words in (
+        ["ik", "robots/three_dof.yaml", "--batch", str(rows), "--all-branches"],
+        ["fk", "robots/three_dof.yaml", "--batch", str(rows), "--json"],
+        ["workspace", "robots/three_dof.yaml", "--samples", "2000", "--json"],
+    ):
+        plain, compiled = run(*words), run(*words, "--compiled")
+        assert compiled.code == plain.code
+        numbers, fast = (
+            [float(word) for word in re.findall(r"-?\d+\.\d+(?:e-?\d+)?", re.sub('"seconds": [0-9.e-]+', "", text))]
+            for text in (plain.out, compiled.out)
+        )
+        assert len(numbers) > 8
+        np.testing.assert_allclose(fast, numbers, atol=1e-6)
+    refused = run("ik", "robots/panda.yaml", "1", "2", "3", "0", "0", "0", "--sweep", "J1=1:2:3", "--compiled")
+    assert refused.code == 2
+    assert "every value would be another arm to compile" in refused.err

@@ -44,6 +44,10 @@ Out = Annotated[
     str | None,
     typer.Option("--out", "-o", metavar="FILE|-", help="Write to a file, which appears whole or not at all."),
 ]
+Compiled = Annotated[
+    bool,
+    typer.Option("--compiled", help="By machine code that this computer's C compiler builds: for batches."),
+]
 Target = Annotated[
     list[str] | None,
     typer.Argument(metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."),

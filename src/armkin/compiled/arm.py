@@ -68,6 +68,10 @@ class CompiledArm:
         """Pose of the tool, as `armkin.fk`: q (..., n) [rad | mm] -> (..., 4, 4) [mm]."""
         return self._of(None).fk(q, workers)
 
+    def position(self, q: ArrayLike, *, workers: int = 1) -> Array:
+        """Position of the tool alone: q (..., n) [rad | mm] -> (..., 3) [mm]."""
+        return self._of(None).position(q, workers)
+
     def ik(
         self, targets: ArrayLike, task: str | None = None, near: ArrayLike | None = None, *, workers: int = 1
     ) -> Solutions:
@@ -91,11 +95,12 @@ class _CompiledTask:
     def __init__(self, arm: Arm, task: str | None) -> None:
         self.arm, self.name, self.n = arm, task, arm.n
         self.turned = actual(arm)  # formulas are those of actual joint values
-        library = source.library(self.turned, *_class_of(self.turned, task))
+        library = source.library(arm, self.turned, *_class_of(self.turned, task))
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
-        self._poses = code.arm_poses
-        self._poses.argtypes, self._poses.restype = [size, *[pointer] * 3], size
+        self._poses, self._points = code.arm_poses, code.arm_points
+        for function in (self._poses, self._points):
+            function.argtypes, function.restype = [size, *[pointer] * 3], size
         self.branches = library.branches
         if not self.branches:
             return
@@ -109,18 +114,28 @@ class _CompiledTask:
 
     def fk(self, q: ArrayLike, workers: int) -> Array:
         """Poses (..., 4, 4) of joint values (..., n)."""
+        return self._of_joints(self._poses, forward.fk, (4, 4), q, workers)
+
+    def position(self, q: ArrayLike, workers: int) -> Array:
+        """Positions (..., 3) of the tool for joint values (..., n)."""
+        return self._of_joints(self._points, forward.position, (3,), q, workers)
+
+    def _of_joints(
+        self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
+    ) -> Array:
+        """A function of joint values: in C, and in Python for angles that C leaves."""
         values = forward.as_joints(self.arm, q)
-        flat = np.ascontiguousarray(values.reshape(-1, self.n) * self.arm.ratio)
-        out, wild = np.empty((len(flat), 4, 4)), np.empty(len(flat), np.uint8)
+        flat = np.ascontiguousarray(values.reshape(-1, self.n))
+        out, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
 
         def part(rows: slice) -> int:
             pointers = (a[rows].ctypes.data for a in (flat, out, wild))
-            return int(self._poses(rows.stop - rows.start, *pointers))
+            return int(call(rows.stop - rows.start, *pointers))
 
         if sum(_shared(part, len(flat), workers)):
             far = np.flatnonzero(wild)
-            out[far] = forward.fk(self.turned, flat[far])
-        return out.reshape(*values.shape[:-1], 4, 4)
+            out[far] = python(self.arm, flat[far])
+        return out.reshape(*values.shape[:-1], *shape)
 
     def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int) -> Solutions:
         """All branches of targets in the task's shape."""

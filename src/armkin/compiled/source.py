@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PARTS = Path(__file__).parent / "parts"
 
 
-LANES = 32  # poses at once: vectors of any length, and blocks of some kilobytes; an elimination takes one at a time
+LANES = 32  # poses at once: vectors of any length, and blocks of some kilobytes
 
 
 class Library(NamedTuple):
@@ -37,22 +37,27 @@ class Library(NamedTuple):
     level: int
 
 
-def library(arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
-    """The C file of an arm: fk alone without a task, or if the class has no form in C."""
+def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
+    """The C file of an arm: fk alone without a task, or if the class has no form in C.
+
+    commanded: the arm; arm: the same in actual joint values, `armkin.model.arm.actual`, of which the branches are.
+    """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and program.has_form(geometry):
         solve, branches = program.candidates(arm, task, geometry, prefer=False)
     fields = {
         "about": f"{program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
-        "lanes": str(1 if branches and geometry is not None and geometry.pairs is None else LANES),
+        "lanes": str(LANES),
     }
-    parts = [_part("head"), program.settings(), _fast_numbers(), kernel.forward_kinematics(arm), _part("fk")]
+    parts = [_part("head"), program.settings(), _fast_numbers()]
+    parts += [kernel.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
+    parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
     if branches:
         assert task is not None
         accepted = min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
         if geometry is not None and geometry.pairs is None:
-            accepted, level = elimination.ACCEPTED, 2  # its own criteria have been met
+            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, "1"  # its own criteria have been met
         fields |= _of_task(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
@@ -88,6 +93,11 @@ def _farthest(arm: Arm) -> float:
 
 def _part(name: str) -> str:
     return (PARTS / f"{name}.c").read_text(encoding="utf-8")
+
+
+def _of_joints(what: str, formula: str, size: int) -> str:
+    """A loop over a batch of joint values."""
+    return program.filled(_part("of_joints"), {"what": what, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:

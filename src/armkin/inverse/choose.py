@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -41,6 +41,7 @@ class Request:
     branch: str | None = None  # name of the branch wanted
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
+    ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
 
     @property
     def near_out(self) -> list[float]:
@@ -90,7 +91,7 @@ def solve(request: Request, targets: Array) -> list[Answer]:
     parts: list[list[tuple[int, Answer, set[str]]]] = [[] for _ in targets]
     for held in _holds(request):
         one = lock(arm, held) if held else arm
-        s = ik(one, targets, request.task, near=near[_kept(arm, held)])
+        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)])
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}

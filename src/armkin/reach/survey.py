@@ -6,13 +6,14 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.forward import position
+from armkin.forward import position as position_of
 from armkin.reach import cloud as clouds
 from armkin.reach.measures import MEASURES, measure
 from armkin.reach.sampling import Random, Sampling, grid
@@ -50,6 +51,7 @@ def workspace(
     volume: bool = True,
     keep: int = 0,
     progress: Callable[[int], None] | None = None,
+    position: Callable[[Array], Array] | None = None,
 ) -> Workspace:
     """Sample an arm's joints within their limits and see where the tip comes.
 
@@ -57,7 +59,8 @@ def workspace(
     grid_points: points on every joint instead, or one number for all.
     measures: of "manipulability" and "step_error", worked out for every sample.
     out: a .csv, .npz or .ply file for all samples. keep: how many samples the result holds.
-    progress: called with the number of samples done.
+    progress: called with the number of samples done. position: the tip (N, 3) for joint values (N, n), by default
+    `armkin.forward.position`; `armkin.compile(arm).position` is faster.
 
     Memory does not grow with the number of samples. The volume does not depend on it from 100,000 on; below,
     its error grows: see `extent`.
@@ -68,11 +71,12 @@ def workspace(
         if name not in MEASURES:
             raise UsageError(f"there is no measure '{name}'; there are {', '.join(MEASURES)}")
     functions = [measure(arm, name) for name in measures]
+    tip_of = position or partial(position_of, arm)
     tally = _Tally(arm, sampling.count, len(functions), keep, seed)
     with ExitStack() as stack:
         write = None if out is None else stack.enter_context(clouds.cloud(out, arm, sampling.count, measures))
         for q in sampling.chunks():
-            tip = position(arm, q)
+            tip = tip_of(q)
             values = [function(q) for function in functions]
             tally.add(q, tip, values)
             if write is not None:

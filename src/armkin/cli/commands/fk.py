@@ -10,7 +10,7 @@ import typer
 from armkin.cli import inputs, output, piped, render
 from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
-from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
+from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe
 from armkin.cli.render import fixed
 from armkin.model import units
 
@@ -23,6 +23,7 @@ def fk(
     robot: RobotOrPipe = None,
     q: Joints = None,
     frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
+    compiled: Compiled = False,
     json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
@@ -36,7 +37,7 @@ def fk(
     else:
         arm, values = piped.poses(robot, q)
         if len(values) == 1:
-            [answer] = _answers(arm, one_row(values[0]), frames)
+            [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out) as write:
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"])
@@ -46,20 +47,21 @@ def fk(
         chunks,
         out,
         json,
-        lambda chunk: _answers(arm, chunk, frames),
+        lambda chunk: _answers(arm, chunk, frames, compiled),
         [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
         lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
     )
     tally.warn_of_limits()
 
 
-def _answers(arm: Arm, chunk: Chunk, with_frames: bool) -> Iterator[Fk]:
+def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
     import armkin
     from armkin.model import rotation
 
     q = units.joints_in(arm, chunk.values)
     F = armkin.frames(arm, q) if with_frames else None
-    T = (armkin.fk(arm, q) if F is None else F[:, -1]) + 0.0  # no -0.0
+    poses = armkin.compile(arm).fk(q) if compiled else armkin.fk(arm, q) if F is None else F[:, -1]
+    T = poses + 0.0  # no -0.0
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations = render.violations(arm, chunk.values, q)

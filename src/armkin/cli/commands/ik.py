@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -14,6 +15,7 @@ from armkin.cli.options import (
     AllBranches,
     Batch,
     BranchName,
+    Compiled,
     JsonLines,
     Lock,
     Near,
@@ -24,12 +26,14 @@ from armkin.cli.options import (
     TaskName,
 )
 from armkin.cli.render import fixed
+from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Closest, Ik
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
+    from armkin.inverse.solutions import Solutions
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -47,6 +51,7 @@ def ik(
     task: TaskName = None,
     lock: Lock = None,
     sweep: Sweep = None,
+    compiled: Compiled = False,
     json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
@@ -71,6 +76,10 @@ def ik(
         held=held,
         swept=holding.sweeps(arm, sweep, held),
     )
+    if compiled:
+        if sweep:
+            raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
+        request = replace(request, ik=_compiled)
     if batch is not None:
         inputs.no_numbers(target)
         tally = run_batch(
@@ -100,6 +109,13 @@ def ik(
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None and answer["closest"] is not None:
         raise choose.refusal(request, found, answer["closest"]["distance_mm"])
+
+
+def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Solutions:
+    """`armkin.ik` by machine code."""
+    import armkin
+
+    return armkin.compile(arm).ik(targets, task, near)
 
 
 def _answers(

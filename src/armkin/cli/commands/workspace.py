@@ -10,7 +10,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import is_number, whole
-from armkin.cli.options import Json, Robot
+from armkin.cli.options import Compiled, Json, Robot
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def workspace(
             help="What colours the picture: manipulability (default), step_error, reach, z.",
         ),
     ] = None,
+    compiled: Compiled = False,
     json: Json = False,
 ) -> None:
     """Where the tip can reach: bounds, volume, a cloud of points.
@@ -88,6 +89,7 @@ def workspace(
             count,
             grid_points=points,
             seed=whole(seed, "--seed", 0, 2**53),
+            position=armkin.compile(arm).position if compiled else None,
             measures=measures,
             out=out,
             keep=150_000 if plot is not None else 0,

@@ -72,6 +72,11 @@ def forward_kinematics(arm: Arm, single: bool = False) -> str:
     return _of_joints(arm, "arm_pose", forward.tip_formula, "T", single)
 
 
+def position(arm: Arm) -> str:
+    """`arm_point`, of 3 numbers."""
+    return _of_joints(arm, "arm_point", forward.point_formula, "p", False)
+
+
 def jacobian(arm: Arm, single: bool = False) -> str:
     """`arm_slope`, of 6 n numbers row by row."""
     return _of_joints(arm, "arm_slope", forward.jacobian_formula, "J", single)

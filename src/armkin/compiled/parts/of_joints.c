@@ -1,8 +1,8 @@
-/* Poses (n, 4, 4) of joint values (n, ARM_JOINTS). Returns how many have an angle beyond ARM_WILD, or none at all;
+/* @what@ (n, @size@) of joint values (n, ARM_JOINTS). Returns how many have an angle beyond ARM_WILD, or none at all;
    these are marked. */
-int64_t arm_poses(int64_t n, const double *joints, double *pose, uint8_t *wild)
+int64_t @formula@s(int64_t n, const double *joints, double *out, uint8_t *wild)
 {
-    double q[ARM_JOINTS * ARM_LANES], T[16 * ARM_LANES];
+    double q[ARM_JOINTS * ARM_LANES], found[@size@ * ARM_LANES];
     int64_t start, left = 0;
     int i, j;
     for (start = 0; start < n; start += ARM_LANES) {
@@ -16,10 +16,10 @@ int64_t arm_poses(int64_t n, const double *joints, double *pose, uint8_t *wild)
             wild[start + i] = far;
             left += far;
         }
-        arm_pose(q, T, count);
+        @formula@(q, found, count);
         for (i = 0; i < count; i++)
-            for (j = 0; j < 16; j++)
-                pose[(start + i) * 16 + j] = T[j * ARM_LANES + i];
+            for (j = 0; j < @size@; j++)
+                out[(start + i) * @size@ + j] = found[j * ARM_LANES + i];
     }
     return left;
 }
