@@ -1,15 +1,36 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and never in place of a robot file or of what was read."""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import IO, Any, Literal
 
-from armkin.errors import FileError
+from armkin.errors import FileError, UsageError
+
+_APPEND = {"w": "a", "wb": "ab"}
+
+
+_ROBOT = re.compile(rb"^convention[ \t]*:", re.MULTILINE), re.compile(rb"^joints[ \t]*:", re.MULTILINE)
+_HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are shorter
+_kept: dict[tuple[int, int], str] = {}  # files that the running command reads
+
+
+def keep(path: str | os.PathLike[str]) -> None:
+    """Remember a file that is read: `whole` does not replace it, however it is spelled or linked."""
+    with suppress(OSError, ValueError):
+        found = os.stat(path)
+        if stat.S_ISREG(found.st_mode):
+            _kept[found.st_dev, found.st_ino] = os.fspath(path)
+
+
+def forget() -> None:
+    """Forget what was kept: a new command begins."""
+    _kept.clear()
 
 
 @contextmanager
@@ -18,17 +39,22 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
 
     The text (UTF-8) or bytes go to a temporary file in the same folder, which is renamed at the end and
     removed if the block raises; a file of that name stays as it was until then. What is not a regular
-    file (a pipe, /dev/null) is written as it stands. Raises FileError, also for a full disk.
+    file (a pipe, /dev/null) is written as it stands, and so is what stdout or stderr are redirected to.
+    Raises FileError, also for a full disk; UsageError for a robot file, a file that the command reads, and a
+    file that may not be written.
     """
     name = os.fspath(path)
     if "\0" in name:
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
     try:
         real = os.path.realpath(name)  # through a link: what it points to is replaced, not the link
-        if os.path.exists(real) and not stat.S_ISREG(os.stat(real).st_mode):
-            with _open(real, mode) as file:
+        there = os.stat(real) if os.path.exists(real) else None
+        if there is not None and (not stat.S_ISREG(there.st_mode) or _is_stream(there)):
+            with _open(real, _APPEND[mode] if stat.S_ISREG(there.st_mode) else mode) as file:
                 yield file
             return
+        if there is not None:
+            _check_replaceable(name, real, there)
         handle, temporary = tempfile.mkstemp(prefix=".armkin-", suffix=".part", dir=os.path.dirname(real))
         try:
             with _open(handle, mode) as file:
@@ -43,10 +69,30 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
         raise FileError(f"{name}: cannot write: {error.strerror or error}", file=name) from None
 
 
-def _open(file: str | int, mode: Literal["w", "wb"]) -> IO[Any]:
-    if mode == "wb":
-        return open(file, "wb")
-    return open(file, "w", encoding="utf-8", newline="\n")
+def _is_stream(there: os.stat_result) -> bool:
+    """Whether a file is what stdout or stderr are redirected to: `--out /dev/stdout >> log`."""
+    for number in (1, 2):
+        with suppress(OSError):
+            if os.path.samestat(there, os.fstat(number)):
+                return True
+    return False
+
+
+def _check_replaceable(name: str, real: str, there: os.stat_result) -> None:
+    if (there.st_dev, there.st_ino) in _kept:
+        raise UsageError(f"{name} is what this command reads; give the output another name", file=name)
+    if not there.st_mode & 0o222:
+        raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
+    with open(real, "rb") as file:
+        head = file.read(_HEAD)
+    if all(key.search(head) for key in _ROBOT):
+        raise UsageError(f"{name} is a robot file, which no output replaces; give another name", file=name)
+
+
+def _open(file: str | int, mode: str) -> IO[Any]:
+    if "b" in mode:
+        return open(file, mode)
+    return open(file, mode, encoding="utf-8", newline="\n")
 
 
 def _permissions(path: str) -> int:

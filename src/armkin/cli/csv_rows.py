@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, NamedTuple
 
+from armkin import files
 from armkin.cli import output
 from armkin.cli.numbers import LARGEST, numbers
 from armkin.errors import FileError, UsageError
@@ -142,6 +143,13 @@ def batch_rows(
     names, what, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
+    files.keep(source)  # before an output of that name is opened
+    return _batch_rows(source, names, what, named)
+
+
+def _batch_rows(
+    source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None
+) -> Iterator[Chunk]:
     columns = Columns(names, what, named)
     first, empty = 1, True
     with _opened(source) as file:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+from armkin import files
 from armkin.cli import unit_notes
 from armkin.cli.numbers import NOT_FINITE, is_number, listed, numbers
 from armkin.errors import UsageError
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
 def load(robot: str) -> Arm:
     """The arm of a robot file, or of a shipped robot."""
     from armkin.model.build import load
+    from armkin.robot_file.catalogue import locate
 
     if not robot:
         raise UsageError("the robot file's name is empty; name a file, for example robots/three_dof.yaml")
     if is_number(robot) and not os.path.exists(robot):
         raise UsageError(f"ROBOT comes first, then the numbers: '{robot}' is no robot file")
+    files.keep(locate(robot))
     arm = load(robot)
     unit_notes.robot_file(arm)
     return arm

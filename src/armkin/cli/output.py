@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
+from armkin import files
 from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
@@ -20,9 +21,7 @@ def destination(path: str | None) -> Iterator[Write]:
     if path == "":
         raise UsageError("--out needs the name of a file")
     if path is not None and path != "-":
-        from armkin.files import whole
-
-        with whole(path) as file:
+        with files.whole(path) as file:
             yield file.write
     elif sys.stdout is None:
         raise FileError("standard output is closed; give --out FILE or open it")
@@ -40,16 +39,11 @@ def beside(path: str | None) -> Iterator[Write]:
         yield write
 
 
-def spare(robot: str | None, out: str | None) -> None:
-    """Refuse to write over the robot file."""
-    if out and robot and os.path.isfile(out) and os.path.isfile(robot) and os.path.samefile(out, robot):
-        raise UsageError(f"--out {out} is the robot file; give another name")
-
-
 def for_programs(wanted: bool) -> None:
     """Begin a command. Under --json an error is one JSON object: notes and warnings wait, and go into it."""
     global _waiting
     _waiting = [] if wanted else None
+    files.forget()
 
 
 def warn(message: str) -> None:

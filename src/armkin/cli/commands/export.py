@@ -53,7 +53,6 @@ def export(
         raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(asked)}" if asked else ""))
     if single and not c:
         raise UsageError("--float goes with --c alone")
-    output.spare(robot, out)
     kinds[asked[0]][1](inputs.load(robot))
 
 

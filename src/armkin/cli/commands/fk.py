@@ -29,7 +29,6 @@ def fk(
     out: Out = None,
 ) -> None:
     """Where the tool is for given joint values."""
-    output.spare(robot, out)
     if batch is not None:
         inputs.no_numbers(q)
         arm = inputs.load(inputs.named(robot))

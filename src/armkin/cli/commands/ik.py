@@ -64,7 +64,6 @@ def ik(
     from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
 
-    output.spare(robot, out)
     arm = inputs.load(robot)
     what = task_for(arm, task)
     held = holding.locks(arm, lock)

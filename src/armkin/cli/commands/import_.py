@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armkin import files
 from armkin.cli import output
 from armkin.cli.options import Out
 from armkin.errors import UsageError
@@ -37,7 +38,7 @@ def import_(
     from armkin.robot_file import urdf
     from armkin.robot_file.writing import text
 
-    output.spare(file, out)
+    files.keep(file)
     try:
         found = urdf.read(file, base=base, tip=tip, snap=snap)
     except UsageError as error:

@@ -41,7 +41,6 @@ def pulses(
     """
     from armkin.motors import motor_names
 
-    output.spare(robot, out)
     if batch is not None:
         inputs.no_numbers(q)
         arm = inputs.load(inputs.named(robot))
