@@ -70,7 +70,7 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
 
 
 def _is_stream(there: os.stat_result) -> bool:
-    """Whether a file is what stdout or stderr are redirected to: `--out /dev/stdout >> log`."""
+    """Whether a file is what stdout or stderr are redirected to: writing to /dev/stdout that goes to a log."""
     for number in (1, 2):
         with suppress(OSError):
             if os.path.samestat(there, os.fstat(number)):
@@ -79,14 +79,14 @@ def _is_stream(there: os.stat_result) -> bool:
 
 
 def _check_replaceable(name: str, real: str, there: os.stat_result) -> None:
-    if (there.st_dev, there.st_ino) in _kept:
-        raise UsageError(f"{name} is what this command reads; give the output another name", file=name)
     if not there.st_mode & 0o222:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
     with open(real, "rb") as file:
         head = file.read(_HEAD)
     if all(key.search(head) for key in _ROBOT):
         raise UsageError(f"{name} is a robot file, which no output replaces; give another name", file=name)
+    if (there.st_dev, there.st_ino) in _kept:
+        raise UsageError(f"{name} is what this command reads; give the output another name", file=name)
 
 
 def _open(file: str | int, mode: str) -> IO[Any]:

@@ -59,6 +59,7 @@ def _fits(value: Any, hint: Any) -> bool:
     return isinstance(value, dict if is_typeddict(hint) or get_origin(hint) is dict else list)
 
 
+GRBL, BUS = "tests/robots/three_dof_grbl.yaml", "tests/robots/bus_arm.yaml"
 CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Fk, ("fk", DOF, -30, 5, -5)),
     (answers.Fk, ("fk", DOF, 0, 130, 0, "--frames")),
@@ -78,6 +79,13 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.StatusOfBoard, ("status", DOF, "--port", "sim")),
     (answers.Stands, ("jog", DOF, "q1", 5, "--seconds", 0.2, "--port", "sim")),
     (answers.Grip, ("grip", DOF, "closed", "--port", "sim")),
+    (answers.StatusOfGrbl, ("status", GRBL, "--port", "sim")),
+    (answers.StatusOfServos, ("status", BUS, "--port", "sim")),
+    (answers.Send, ("send", GRBL, -30, 5, -5, "--port", "sim")),
+    (answers.Send, ("send", BUS, 10, -5, "--port", "sim")),
+    (answers.GripOfServo, ("grip", BUS, "closed", "--port", "sim")),
+    (answers.Setup, ("setup", GRBL, "--port", "sim")),
+    (answers.Zero, ("zero", BUS, "--port", "sim")),
     *((answers.Info, ("info", path.stem)) for path in sorted((ROOT / "robots").glob("*.yaml"))),
 ]
 

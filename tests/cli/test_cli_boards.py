@@ -15,34 +15,12 @@ from armkin.robot_file.edit import replaced
 from command_line import ROOT, THREE_DOF, run
 from pty_port import PtyPort
 
-BUS = """name: bus_arm   # an arm of bus servos
-convention: standard
-joints:
-  - name: j1
-    dh: {alpha: 90, a: 0, d: 60}
-    limits: [-150, 150]
-    max_speed: 90
-    max_accel: 300
-    drive: {kind: bus, id: 1, counts: 4096, zero: 2058}   # its own
-  - name: j2
-    dh: {alpha: 0, a: 110, d: 0}
-    limits: [-150, 150]
-    max_speed: 90
-    max_accel: 300
-    drive:
-      kind: bus
-      id: 2
-      counts: 4096
-      invert: true
-      zero: 2068   # turned the other way
-board: {kind: feetech}
-gripper: {kind: bus, id: 6, counts: 4096, zero: 2048, open: 60, closed: 0}
-"""
+BUS = (ROOT / "tests/robots/bus_arm.yaml").read_text()
 
 
 @pytest.fixture
 def grbl(tmp_path: Path) -> str:
-    text = (ROOT / THREE_DOF).read_text().replace("{kind: uno_cnc_shield, driver: A4988}", "{kind: grbl}")
+    text = (ROOT / "tests/robots/three_dof_grbl.yaml").read_text()
     path = tmp_path / "grbl.yaml"
     path.write_text(text)
     return str(path)

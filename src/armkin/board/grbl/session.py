@@ -57,7 +57,7 @@ class Session:
                 break
         else:
             raise LinkError(
-                f"{self.port.name} does not answer as GRBL does: is it the right port, and {BAUD} its --baud?"
+                f"{self.port.name} does not answer as GRBL does: is it the right port, and its rate {self.port.baud}?"
             )
         for line in self.ask("$I"):
             if match := re.match(r"\[VER:([^:\]]*)", line):
