@@ -13,7 +13,9 @@
     └── LinkError          the port, or the board behind it
         ├── PortInUseError      another armkin has the port
         ├── PositionLostError   nobody knows where the arm stands
-        └── PositionKnownError  the arm stands elsewhere than somebody vouches for
+        ├── PositionKnownError  the arm stands elsewhere than somebody vouches for
+        ├── GripperLostError    nobody knows where the gripper stands
+        └── GripperKnownError   its position is known, so that nobody may vouch for another
 
 A message says what is wrong, where and what is allowed, in one or two lines, in words that hold for a
 program, too; `fields` says the same in values. Only the command line maps these classes to exit codes and
@@ -113,3 +115,11 @@ class PositionLostError(LinkError):
 
 class PositionKnownError(LinkError):
     """The arm's position is known, so that nobody may vouch for another; fields: joints."""
+
+
+class GripperLostError(LinkError):
+    """Nobody knows where the gripper stands."""
+
+
+class GripperKnownError(LinkError):
+    """The gripper's position is known, so that nobody may vouch for another."""

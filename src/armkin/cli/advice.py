@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 from armkin.errors import (
     ArmkinError,
+    GripperKnownError,
+    GripperLostError,
     NoBranchError,
     NoHomingError,
     PortInUseError,
@@ -60,4 +62,6 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
     PositionLostError: _lost,
     PositionKnownError: lambda error: "leave --assume-home out",
+    GripperLostError: lambda error: "add --assume open (or closed, or a value)",
+    GripperKnownError: lambda error: "leave --assume out",
 }

@@ -48,7 +48,7 @@ class Rehearsal:
             return self._told()
 
     def save(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The text of a path file, for `armkin path` and `armkin send --path`."""
+        """The text of a path file, for `armkin path` and `armkin send`."""
         with self._lock:
             return {"text": self.program.text(), "name": f"{self.arm.name}_path.yaml"}
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.feetech import registers
 from armkin.board.feetech.bus import Bus
-from armkin.errors import LinkError, UsageError
+from armkin.errors import LinkError, PositionKnownError, UsageError
+from armkin.model.units import joints_out
 from armkin.motion.plan import plan as plan_joints
 from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
@@ -150,7 +151,8 @@ class ServoMachine:
     def prepare(self, *, assume_home: bool = False) -> bool:
         """Switch the motors on where they stand; False: the position is always known."""
         if assume_home:
-            raise LinkError("bus servos know their position: there is nothing to assume; leave it out")
+            joints = joints_out(self.arm, self.joints()).tolist()
+            raise PositionKnownError("bus servos know their position: there is nothing to assume", joints=joints)
         self._read()
         self._check()
         self._send(self._counts, np.zeros(len(self.ids)))  # so that none jumps to an old goal

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware.segments import line
-from armkin.errors import LinkError, UsageError
+from armkin.errors import GripperKnownError, GripperLostError, UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration, Grip
@@ -45,11 +45,11 @@ def prepare(machine: Machine, gripper: Grip, start: int | None) -> None:
     """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
     is_known = known(machine, gripper)
     if is_known and start is not None:
-        raise LinkError("the gripper's position is known: --assume is only for a lost one; leave it out")
+        raise GripperKnownError("the gripper's position is known, and only a lost one may be assumed")
     if not is_known and start is None and not machine.session.port.simulated:
-        raise LinkError(
-            "the gripper's position is lost: add --assume open (or closed, or a value)\n"
-            "a servo jumps there at once, at its full speed: keep your fingers out"
+        raise GripperLostError(
+            "the gripper's position is lost: a servo jumps to where it is taken to stand at once, at its full speed: "
+            "keep your fingers out"
         )
     if not machine.configured:
         machine.configure()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.errors import LinkError, UsageError
+from armkin.errors import PositionLostError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -20,9 +20,11 @@ def prepare(machine: Machine) -> None:
         return
     if not machine.configured:
         if machine.info.known:
-            raise LinkError(
-                f"the board knows the position of another arm, or {machine.arm.path} has changed:\n"
-                "armkin home or armkin send --assume-home configures it anew"
+            raise PositionLostError(
+                f"the board knows the position of another arm, or {machine.arm.path} has changed",
+                robot_file=machine.arm.path,
+                port=machine.port.name,
+                homing=all(machine.arm.homing),
             )
         machine.configure()
     machine.enable(machine.configuration.axes)

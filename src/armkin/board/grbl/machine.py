@@ -17,7 +17,8 @@ from armkin.board.grbl import lines, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.gcode import Job
 from armkin.board.grbl.session import GrblError, Session
-from armkin.errors import LinkError
+from armkin.errors import LinkError, PositionKnownError, PositionLostError
+from armkin.model.units import joints_out
 from armkin.motion.plan import plan as plan_joints
 from armkin.motors import joints as joints_of
 from armkin.motors import pulses
@@ -69,7 +70,8 @@ class GrblMachine:
         """Where the arm has come to rest, and what that means for the next command."""
         if self._offset is None:
             return "the arm's position is lost: home it, or put it in its home pose and say so"
-        return f"the arm stands at {list(self.counts())} steps, its position is known: the next command starts there"
+        where = _listed(self.arm, joints_out(self.arm, self.joints()).tolist())
+        return f"the arm stands at {where}, its position is known: the next command starts there"
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
@@ -114,11 +116,17 @@ class GrblMachine:
             raise LinkError(f"GRBL is in state {status.state}, not Idle: home it, or unlock it once you know why")
         self._read()
         if assume_home and self._offset is not None:
-            raise LinkError("the position is known: to assume it is only for a lost one; leave it out")
+            joints = joints_out(self.arm, self.joints()).tolist()
+            raise PositionKnownError(f"the position is known ({_listed(self.arm, joints)})", joints=joints)
         if self._offset is not None:
             return False
         if not (assume_home or self.port.simulated):
-            raise LinkError("the arm's position is lost: home it, or put it in its home pose and say so")
+            raise PositionLostError(
+                "the arm's position is lost",
+                robot_file=self.arm.path,
+                port=self.port.name,
+                homing=all(self.arm.homing),
+            )
         self.vouch(np.asarray(pulses(self.arm, self.arm.home), dtype=np.int64))
         return True
 
@@ -254,3 +262,8 @@ class GrblMachine:
             self.session.reset()
         except LinkError:
             return  # in an alarm, or gone: forgotten all the same
+
+
+def _listed(arm: Arm, joints: list[float]) -> str:
+    """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90``."""
+    return ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in zip(arm.joint_names, joints, strict=True))

@@ -80,8 +80,6 @@ def path(
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
     if port is not None and lock:
         raise UsageError("--lock plans only: leave --port out")
-    if out:
-        output.spare(robot, out)
     if plot is not None:
         from armkin.plot import canvas
 
