@@ -51,7 +51,6 @@ def calibrate(
 
     import armkin
 
-    output.spare(robot, out)
     arm = inputs.load(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
