@@ -164,7 +164,7 @@ def test_the_page_may_load_nothing_else_and_is_not_framed(server: Server) -> Non
     assert headers["X-Content-Type-Options"] == "nosniff"
     policy = headers["Content-Security-Policy"]
     nonce = policy.split("'nonce-")[1].split("'")[0]
-    assert data.count(f'nonce="{nonce}"'.encode()) == 2
+    assert data.count(f'nonce="{nonce}"'.encode()) == data.count(b"nonce=") >= 2
     assert "unsafe" not in policy
     assert "frame-ancestors 'none'" in policy
     again = ask(server, "GET", "/")[1]["Content-Security-Policy"]

@@ -11,7 +11,7 @@ from armkin.teach import guard
 from armkin.teach.guard import RefusedError
 from armkin.teach.look import Question, look
 from armkin.teach.rehearsal import Rehearsal
-from armkin.teach.scene import scene
+from armkin.teach.scene import first_lock, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
 if TYPE_CHECKING:
@@ -60,12 +60,16 @@ class Desk:
         self.tabs.check_control(tab)
         return self.actions[name](tab, fields)
 
+    def warm(self) -> None:
+        """Have the first page's answer ready, while its browser still loads the files."""
+        with self._solving:
+            if not self._shown:
+                held = first_lock(self.arm)
+                self._shown = look(self.arm, Question(self.arm.home, held=() if held is None else (held,)))
+
     def _open(self) -> dict[str, Any]:
         tab = self.tabs.open()
-        if not self._shown:
-            drawn = scene(self.arm)
-            held = (drawn["lock"],) if drawn["lock"] else ()
-            self._shown = look(self.arm, Question(self.arm.home, held=held))
+        self.warm()
         board = None if self.board is None else self.board.pilot.state()
         return {
             "tab": tab.id,

@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armkin import path_file
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
-from armkin.motion.path import path
-from armkin.path_file.model import KINDS
 from armkin.teach import guard
 from armkin.teach.look import target_out
 
@@ -26,6 +23,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.path_plan import PathPlan
+    from armkin.path_file import PathFile
 
 MOST = 2000  # moves
 SAMPLES = 1500  # of a plan that the page plays
@@ -87,7 +85,7 @@ class Program:
         try:
             edits[what](fields)
             if self.moves:
-                path_file.validated(self.document())
+                self.file()
         except Exception:
             self._restore(before)
             raise
@@ -98,10 +96,18 @@ class Program:
         """The program as a path file has it."""
         return {"robot": self.arm.name, **self.head, "moves": self.moves}
 
+    def file(self) -> PathFile:
+        """The program as a path file's model. Raises PathFileError if it is none."""
+        from armkin import path_file
+
+        return path_file.validated(self.document())
+
     def text(self) -> str:
         """The program as the text of a path file; names are comments."""
+        from armkin.path_file import PathFile
+
         lines = [f"robot: {self.arm.name}"]
-        keys = [key for key in path_file.PathFile.model_fields if key in self.head]
+        keys = [key for key in PathFile.model_fields if key in self.head]
         lines += [f"{key}: {_flow(self.head[key])}" for key in keys]
         lines.append("moves:")
         for move, name in zip(self.moves, self.names, strict=True):
@@ -112,6 +118,8 @@ class Program:
 
     def load(self, text: str, name: str) -> None:
         """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
+        from armkin import path_file
+
         file = path_file.parse(text, name)
         if file.robot is not None and file.robot != self.arm.name and file.robot != self.arm.path:
             raise UsageError(f"{name} is a path of {file.robot}, this is {self.arm.name}")
@@ -132,7 +140,9 @@ class Program:
         """The motion; start: (n,) [rad | mm] where the arm stands, None: in its home pose; speed: a fraction."""
         if not self.moves:
             raise UsageError("the program has no moves: record one")
-        return path(self.arm, path_file.validated(self.document()), start=start, speed=speed)
+        from armkin.motion.path import path
+
+        return path(self.arm, self.file(), start=start, speed=speed)
 
     # Edits
 
@@ -239,6 +249,8 @@ def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
 
 
 def _kind(move: Mapping[str, Any]) -> str:
+    from armkin.path_file.model import KINDS
+
     return next(kind for kind in KINDS if kind in move)
 
 

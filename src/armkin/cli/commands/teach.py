@@ -25,6 +25,8 @@ def teach(
     It is served on 127.0.0.1 until Ctrl-C; its address holds the key that every action needs. A board is touched
     with --port alone.
     """
+    import threading
+
     from armkin.teach.desk import Desk
     from armkin.teach.server import Server
 
@@ -33,6 +35,7 @@ def teach(
         with Server(desk) as server:
             with output.destination(None) as write:
                 write(f"{server.address}\n")
+            threading.Thread(target=desk.warm, daemon=True).start()
             if open:
                 import webbrowser
 
