@@ -72,7 +72,7 @@ def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path
     assert shutil.which(compiler[0]), f"{compiler[0]} is not installed: see the README's line of system packages"
     single = "gcc" in compiler[0] and robot not in GENERAL
     if robot in GENERAL and compiler[0] == "avr-gcc":
-        with pytest.raises(armkin.UsageError, match="needs double precision; leave --float away"):
+        with pytest.raises(armkin.UsageError, match="needs double precision"):
             program(armkin.load(ROBOTS / f"{robot}.yaml"), "arm.c", None, single=True)
         return
     source = written(tmp_path, robot, single)
