@@ -13,6 +13,7 @@
     └── LinkError          the port, or the board behind it
         ├── PortInUseError      another armkin has the port
         ├── PositionLostError   nobody knows where the arm stands
+        ├── HomingIncompleteError  some joints were homed, others are still lost
         ├── PositionKnownError  the arm stands elsewhere than somebody vouches for
         ├── GripperLostError    nobody knows where the gripper stands
         └── GripperKnownError   its position is known, so that nobody may vouch for another
@@ -111,6 +112,10 @@ class PortInUseError(LinkError):
 
 class PositionLostError(LinkError):
     """Nobody knows where the arm stands; fields: robot_file, port, homing (whether it can home)."""
+
+
+class HomingIncompleteError(LinkError):
+    """Some joints were homed, others are still lost; fields: joints (the lost ones), homing, robot_file."""
 
 
 class PositionKnownError(LinkError):

@@ -57,6 +57,16 @@ BOARDS = {
 }
 
 
+def board_name(number: int) -> str:
+    """A board that says its number, in words.
+
+    >>> board_name(3), board_name(9)
+    ('uno_servos', 'a board unknown to this armkin (number 9)')
+    """
+    kind = next((board.kind for board in BOARDS.values() if board.number == number), None)
+    return f"a board unknown to this armkin (number {number})" if kind is None else kind
+
+
 @dataclass(frozen=True)
 class ForeignBoard:
     """A board with somebody else's firmware, or a bus of servos."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -17,18 +17,23 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def open_port(name: str, *, board: Board, baud: int = BAUD, paced: bool = False) -> Port:
+def open_port(
+    name: str, *, board: Board, baud: int = BAUD, paced: bool = False, switches: Switches | None = None
+) -> Port:
     """Open a port by name: /dev/ttyACM0, COM3, socket://host:4000, sim.
 
-    board: what `sim` pretends to be; paced: `sim` takes the time that a real board would. Raises LinkError with
-    what to do.
+    board: what `sim` pretends to be; paced: `sim` takes the time that a real board would; switches: the levels
+    of its limit inputs. Raises LinkError with what to do.
     """
     if name == SIM:
         from armkin.board.sim.board import SimBoard
         from armkin.board.sim.port import PacedSimPort, SimPort
 
-        return (PacedSimPort if paced else SimPort)(SimBoard(board))
+        return (PacedSimPort if paced else SimPort)(SimBoard(board, switches))
     return SerialPort(name, baud)
+
+
+Switches = Callable[[int, Sequence[int]], bool]  # number of an input, net steps of all axes -> level
 
 
 @contextmanager
@@ -66,7 +71,9 @@ def open_machine(
     stop: asked all the time; when it says yes, the arm is held, StoppedError raised, and the machine's
     `status` is that of the arm at rest.
     """
-    link = open_port(port, board=configuration.board, baud=baud)
+    from armkin.board.firmware.homing import switches
+
+    link = open_port(port, board=configuration.board, baud=baud, switches=switches(arm, configuration))
     try:
         machine = Machine(link, arm, configuration, stop)
         try:

@@ -12,6 +12,7 @@ from armkin.errors import (
     ArmkinError,
     GripperKnownError,
     GripperLostError,
+    HomingIncompleteError,
     NoBranchError,
     NoHomingError,
     PortInUseError,
@@ -58,7 +59,16 @@ _ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError)
 _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     RedundantArmError: _redundant,
     NoBranchError: lambda error: "ik --all-branches lists all branches, also those outside limits",
-    NoHomingError: lambda error: "give --assume-home to the next send",
+    NoHomingError: lambda error: (
+        "add --rest-at-home if these joints stand in their home pose"
+        if error.fields.get("some")
+        else "give --assume-home to the next send"
+    ),
+    HomingIncompleteError: lambda error: (
+        f"armkin home {error.fields['robot_file']} {' '.join(error.fields['joints'])}"
+        if error.fields["homing"]
+        else f"armkin home {error.fields['robot_file']} --rest-at-home, with these joints in their home pose"
+    ),
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
     PositionLostError: _lost,
     PositionKnownError: lambda error: "leave --assume-home out",

@@ -16,14 +16,16 @@ import numpy as np
 from armkin.board.firmware import protocol
 from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock import joint_index
-from armkin.motors import pulses
+from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
+    from armkin.board.backend import Progress
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
     from armkin.model.arm import Arm
 
 _SLOW = 26  # /256: the second approach runs at a tenth
+_GENTLE = 0.25  # of max_speed, on the way to the home pose
 _MARGIN = 1.25  # of the joint's range: how far a switch may be
 
 
@@ -53,39 +55,54 @@ class Search:
         )
 
 
-def searches(arm: Arm, configuration: Configuration, names: Sequence[str] = ()) -> list[Search]:
+def searches(
+    arm: Arm, configuration: Configuration, names: Sequence[str] = (), *, rest_at_home: bool = False
+) -> list[Search]:
     """The searches of the named joints (all, by default) in their order.
 
-    Raises UsageError that names the joint which has no homing.
+    rest_at_home: leave joints without homing out. Raises UsageError that names the joint which has no homing.
     """
     for name in names:
         joint_index(arm, name)
     wanted = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
     wanted = [j for group in _groups(arm, wanted) for j in group]
     bare = [arm.joint_names[j] for j in wanted if arm.homing[j] is None]
-    if bare:
+    if rest_at_home and len(bare) < len(wanted):
+        wanted = [j for j in wanted if arm.homing[j] is not None]
+    elif bare:
         raise NoHomingError(
             f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home pose",
             advice="then Machine.prepare(assume_home=True)",
             joints=bare,
             file=arm.path,
+            some=len(bare) < len(wanted),
         )
     orders = {j: homing.order for j, homing in enumerate(arm.homing) if homing is not None}
     wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))
     return [_search(arm, configuration, j) for j in wanted]
 
 
-def home(machine: Machine, names: Sequence[str] = (), announce: Callable[[str], None] = lambda name: None) -> None:
-    """Home joints and tell the board where they stand; all positions of theirs are lost until then."""
+def home(
+    machine: Machine,
+    names: Sequence[str] = (),
+    announce: Callable[[str], None] = lambda name: None,
+    *,
+    rest_at_home: bool = False,
+) -> None:
+    """Home joints and tell the board where they stand; all positions of theirs are lost until then.
+
+    rest_at_home: the joints that have no switch stand in their home pose, says the operator.
+    """
     arm = machine.arm
-    todo = searches(arm, machine.configuration, names)
+    todo = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
     if not machine.configured:
         machine.configure()
     machine.enable(machine.configuration.axes)
     q = arm.home.copy()
     axes = list(machine.configuration.axes)
     per_count = np.linalg.pinv(arm.motor_gain)
-    for group in _groups(arm, [search.joint for search in todo]):
+    turn = {search.joint: i for i, search in enumerate(todo)}
+    for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
             status, edge = machine.home(search.frame)
@@ -93,6 +110,46 @@ def home(machine: Machine, names: Sequence[str] = (), announce: Callable[[str], 
             q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
         machine.vouch(dict(zip([axes[k] for k in motors], pulses(arm, q)[motors].tolist(), strict=True)))
+    if rest_at_home:
+        left = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
+        machine.vouch(dict(zip([axes[k] for k in left], pulses(arm, q)[left].tolist(), strict=True)))
+
+
+def lost_joints(machine: Machine) -> list[str]:
+    """Names of the joints that a motor of unknown position turns."""
+    arm, known = machine.arm, machine.status.known if machine.configured else 0
+    lost = [not known >> axis & 1 for axis in machine.configuration.axes]
+    moved = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
+    return [name for name, unknown in zip(arm.joint_names, moved, strict=True) if unknown]
+
+
+def go_home(machine: Machine, progress: Progress = lambda done, total: None) -> None:
+    """Move an arm whose position is known to its home pose, at a quarter of its speed."""
+    machine.run([machine.plan(machine.counts(), machine.arm.home[None], speed=_GENTLE)], progress)
+
+
+def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[int]], bool]:
+    """The limit inputs' levels of a simulated arm that was switched on in its home pose.
+
+    The result takes the number of an input and the net steps of all axes since then.
+    """
+    joint_of = {
+        configuration.board.switches.index(homing.switch): j
+        for j, homing in enumerate(arm.homing)
+        if homing is not None
+    }
+    start, axes = pulses(arm, arm.home), list(configuration.axes)
+
+    def level(number: int, net: Sequence[int]) -> bool:
+        j = joint_of.get(number)
+        homing = None if j is None else arm.homing[j]
+        if j is None or homing is None:
+            return True
+        value = joints(arm, start + np.array([net[axis] for axis in axes]))[j]
+        pressed = (value - _at(arm, j)) * homing.direction >= 0
+        return bool(pressed) == (homing.normally == "closed")  # a pressed switch opens, or closes to ground
+
+    return level
 
 
 def _groups(arm: Arm, wanted: Sequence[int]) -> list[list[int]]:

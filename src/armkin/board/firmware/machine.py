@@ -17,6 +17,7 @@ from armkin.board.firmware import cutting, protocol
 from armkin.board.firmware.protocol import Error, Flag, Segment, State, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
+from armkin.hardware import board_name
 from armkin.model.units import joints_out
 from armkin.motors import joints as joints_of
 from armkin.motors import pulses
@@ -65,8 +66,8 @@ class Machine:
         expected, board = configuration.board.number, self.info.board
         if board != expected:
             raise LinkError(
-                f"{port.name} is another board than {arm.name}'s {configuration.board.kind} "
-                f"(board {board}, not {expected}): choose another port, or correct board: in {arm.path}",
+                f"{port.name} is {board_name(board)}, {arm.name}'s board is {configuration.board.kind}: choose "
+                f"another port, or correct board: in {arm.path}",
                 port=port.name,
                 board=board,
                 expected=expected,

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import completion, inputs, linking, output, render
 from armkin.cli.linking import Baud, PortName
 from armkin.cli.options import Json, Robot
-from armkin.errors import UsageError
+from armkin.errors import HomingIncompleteError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.board.foreign import Foreign
+    from armkin.model.arm import Arm
+
+_REHEARSAL = "the simulated arm starts in its home pose; its switches are where the robot file says"
 
 
 def home(
@@ -21,36 +28,68 @@ def home(
             metavar="[JOINT...]", help="These joints only. [default: all]", autocompletion=completion.joints
         ),
     ] = None,
+    rest_at_home: Annotated[
+        bool,
+        typer.Option("--rest-at-home", help="The joints without a switch stand in their home pose: take my word."),
+    ] = False,
+    stay: Annotated[bool, typer.Option("--stay", help="Stay at the switches; do not move to the home pose.")] = False,
     baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Find the limit switches, and with them the position.
 
     Each joint approaches its switch, backs off and touches it again slowly, in the order of the robot
-    file's homing. Keep clear of the arm: it moves as far as it must.
+    file's homing; then the arm moves to its home pose. Keep clear of it: it moves as far as it must. With
+    --port sim the switches are where the robot file says.
     """
-    from armkin.board.firmware import homing
-    from armkin.board.moving import where
-
     arm = inputs.load(robot)
     other = linking.foreign(arm)
     if other is not None:
-        if joints:
-            raise UsageError(f"boards of kind {other.board.kind} home all joints at once: leave {' '.join(joints)} out")
-        with linking.backend(arm, other, port, baud) as backend:
-            other.home(backend)
-            told = {**render.head(arm), "port": backend.port.name, **where(backend)}
-        with output.destination(None) as write:
-            write(render.to_json(told) + "\n" if json else linking.where_text(arm, told))
-        return
-    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
-    homing.searches(arm, configuration, joints or ())  # refuses before a port is opened
-    with linking.machine(arm, configuration, port, baud) as machine:
-        homing.home(machine, joints or (), lambda name: output.note(f"homing {name}"))
-        found = where(machine)
+        found = _of_others(arm, other, port, baud, joints, rest_at_home)
+    else:
+        found = _ours(arm, port, baud, joints or (), rest_at_home, stay)
     with output.destination(None) as write:
-        write(
-            render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"
-            if json
-            else linking.where_text(arm, found)
-        )
+        write(render.to_json(found) + "\n" if json else linking.where_text(arm, found))
+
+
+def _ours(
+    arm: Arm, port: str | None, baud: int | None, joints: Sequence[str], rest_at_home: bool, stay: bool
+) -> dict[str, Any]:
+    """Home the arm on a board with armkin's firmware."""
+    from armkin.board.firmware import homing
+    from armkin.board.moving import where
+
+    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
+    homing.searches(arm, configuration, joints, rest_at_home=rest_at_home)  # refuses before a port is opened
+    with linking.machine(arm, configuration, port, baud, simulated=_REHEARSAL) as machine:
+        homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
+        lost = homing.lost_joints(machine)
+        if lost:
+            done = [name for name in arm.joint_names if name not in lost]
+            raise HomingIncompleteError(
+                f"homed {', '.join(done) or 'nothing'}; the position of {', '.join(lost)} is still lost",
+                advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
+                joints=lost,
+                homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
+                robot_file=arm.path,
+            )
+        if not stay:
+            output.note("moving to the home pose")
+            homing.go_home(machine)
+        return {**render.head(arm), "port": machine.port.name, **where(machine)}
+
+
+def _of_others(
+    arm: Arm, other: Foreign, port: str | None, baud: int | None, joints: Sequence[str] | None, rest_at_home: bool
+) -> dict[str, Any]:
+    """Home the arm on a board that homes by itself, all joints at once."""
+    from armkin.board.moving import where
+
+    kind = other.board.kind
+    if joints:
+        raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(joints)} out")
+    if rest_at_home:
+        raise UsageError(f"boards of kind {kind} home all joints at once: leave --rest-at-home out")
+    with linking.backend(arm, other, port, baud) as backend:
+        other.home(backend)
+        return {**render.head(arm), "port": backend.port.name, **where(backend)}

@@ -1,0 +1,101 @@
+"""`armkin home`, rehearsed on the simulated board with switches where the robot file says."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from command_line import ROOT, THREE_DOF, run
+from pty_board import PtyBoard
+
+LOWER, UPPER = (-20, 75, -105), (20, 105, -75)  # where the switches are, not far from home
+WRIST = """  - name: q4
+    dh: {alpha: 0, a: 50, d: 0, theta: 0}
+    limits: [-90, 90]
+    home: 10
+    max_speed: 60
+    max_accel: 120
+    drive: {axis: A, full_steps: 200, microsteps: 16, gear: 4}
+"""
+
+
+def arm_with_switches(folder: Path, *, four: bool, normally: str = "closed", upper: bool = False) -> str:
+    """The three-axis arm with a switch on every axis; four: and a wrist that has none."""
+    text = (ROOT / THREE_DOF).read_text().replace("task: xyz\n", "")
+    for axis, at in zip("XYZ", UPPER if upper else LOWER, strict=True):
+        way = 1 if upper else -1
+        homing = f"{{switch: {axis}, direction: {way}, at: {at}, speed: 40, backoff: 3, normally: {normally}}}"
+        text = text.replace(f"    drive: {{axis: {axis},", f"    homing: {homing}\n    drive: {{axis: {axis},")
+    head, joints, tail = text.partition("\n# The paper has a gripper")
+    path = folder / "switched.yaml"
+    path.write_text(head + (WRIST if four else "") + joints + tail)
+    return str(path)
+
+
+@pytest.mark.parametrize(("normally", "upper"), list(itertools.product(("open", "closed"), (False, True))))
+def test_homing_is_rehearsed_and_ends_in_the_home_pose(tmp_path: Path, normally: str, upper: bool) -> None:
+    path = arm_with_switches(tmp_path, four=False, normally=normally, upper=upper)
+    done = run("home", path, "--port", "sim", "--json")
+    assert done.code == 0
+    assert (done.json["position"], done.json["pulses"]) == ("known", [0, 0, 0])
+    assert [line for line in done.err.splitlines() if "homing" in line] == [f"note: homing q{i}" for i in (1, 2, 3)]
+    stays = run("home", path, "--port", "sim", "--stay", "--json").json["joints"]
+    at = UPPER if upper else LOWER
+    step = np.rad2deg(armkin.load(path).motor_gain.max(axis=1) ** -1)
+    assert np.all(np.abs(np.subtract(stays, at)) < 1.0 + 2 * step)  # stops behind the edge, within a degree
+
+
+def test_a_joint_without_a_switch_rests_at_home(tmp_path: Path) -> None:
+    path = arm_with_switches(tmp_path, four=True)
+    refused = run("home", path, "--port", "sim")
+    assert refused.code == 2
+    assert "no homing: for q4" in refused.err
+    assert "--rest-at-home" in refused.err
+    done = run("home", path, "--port", "sim", "--rest-at-home", "--json")
+    assert done.code == 0
+    assert done.json["joints"] == pytest.approx([0, 90, -90, 10])
+
+
+def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: Path) -> None:
+    path = arm_with_switches(tmp_path, four=True)
+    some = run("home", path, "q1", "q2", "q3", "--port", "sim")
+    assert (some.code, some.out) == (5, "")
+    assert "homed q1, q2, q3; the position of q4 is still lost" in some.err
+    assert f"armkin home {path} --rest-at-home" in some.err
+    one = run("home", arm_with_switches(tmp_path, four=False), "q2", "--port", "sim")
+    assert one.code == 5
+    assert f"armkin home {path} q1 q3" in one.err
+
+
+def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path) -> None:
+    """The shield's fourth axis has no input: three switches, and a word for the rest."""
+    from armkin.board.firmware.configuration import configure
+    from armkin.board.firmware.homing import switches
+
+    path = arm_with_switches(tmp_path, four=True)
+    arm = armkin.load(path)
+    with PtyBoard() as board:
+        with board.lock:
+            board.board._switch = switches(arm, configure(arm))
+        assert run("home", path, "--port", board.port, "--rest-at-home").code == 0
+        done = run("send", path, 10, 80, -80, 0, "--port", board.port, "--json")
+        assert (done.code, done.json["position"]) == (0, "known")
+
+
+def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
+    path = arm_with_switches(tmp_path, four=False)
+    text = Path(path).read_text()
+    for switch, order in (("X", 3), ("Y", 1), ("Z", 2)):
+        text = text.replace(f"{{switch: {switch},", f"{{switch: {switch}, order: {order},")
+    Path(path).write_text(text)
+    said = run("home", path, "--port", "sim").err
+    assert [line[-2:] for line in said.splitlines() if "homing" in line] == ["q2", "q3", "q1"]
+
+
+def test_a_wrong_board_is_called_by_its_name() -> None:
+    with PtyBoard("uno_servos") as board:
+        result = run("status", THREE_DOF, "--port", board.port)
+    assert result.code == 5
+    assert f"{board.port} is uno_servos, three_dof's board is uno_cnc_shield" in result.err
