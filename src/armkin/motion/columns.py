@@ -39,6 +39,7 @@ class Columns:
     q: Array  # (N, B, n), principal values; nan where there is no branch
     name: NDArray[np.int16]  # (N, B) index into names, -1: none
     status: NDArray[np.int8]  # (N,)
+    within: Bool  # (N, B) within limits, of some copy
     names: tuple[str, ...] = ()
     complete: bool = True
     partner: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))  # (N - 1, B) column, or -1
@@ -47,6 +48,11 @@ class Columns:
     def valid(self) -> Bool:
         """Where a branch is: (N, B)."""
         return np.asarray(~np.isnan(self.q[:, :, 0]))
+
+    def rows(self, rows: Int) -> Columns:
+        """Some samples, without their links."""
+        parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within[rows])
+        return Columns(*parts, self.names, self.complete)
 
 
 def levers(arm: Arm) -> Array:
@@ -70,13 +76,17 @@ def levers(arm: Arm) -> Array:
 def chord_bound(lever: Array, D: Array) -> Array:
     """How far the tip may leave its chord on straight joint steps D (..., n): (...) [mm]."""
     size = np.abs(D)
-    return np.asarray(0.125 * ((size @ lever) * size).sum(axis=-1))
+    return np.asarray(0.125 * np.einsum("...i,...i->...", size @ lever, size))
 
 
 def change(arm: Arm, a: Array, b: Array) -> Array:
     """From joint values to others, the shorter way round: (..., n)."""
-    D = b - a
-    return np.asarray(np.where(arm.prismatic, D, D - TURN * np.rint(D / TURN)))
+    D: Array = b - a
+    turns = D * (~arm.prismatic / TURN)
+    np.rint(turns, out=turns)
+    turns *= TURN
+    D -= turns
+    return D
 
 
 def linked(
@@ -88,8 +98,7 @@ def linked(
     """
     work = _Linking(arm, targets, task, tolerance, near, float(s[-1]))
     work.start(s)
-    while work.divide():
-        pass
+    work.settle()
     return work.columns
 
 
@@ -109,6 +118,14 @@ class _Linking:
         self.lever = levers(arm)
         self.length = length
         self.added = 0
+        self.fresh = np.zeros(0, bool)  # samples that were added
+        self.wide = [  # joints whose copies overlap: a run may end at a limit though another copy is legal
+            j
+            for j in range(arm.n)
+            if not arm.prismatic[j]
+            and arm.upper[j] - arm.lower[j] > TURN - 1e-6
+            and np.isfinite(arm.upper[j] - arm.lower[j])
+        ]
 
     def start(self, s: Array) -> None:
         """Solve the first samples and link them."""
@@ -119,6 +136,49 @@ class _Linking:
         self.torn = np.zeros(N - 1, bool)  # steps with a branch that has no partner
         self.crossing = np.zeros(N - 1, bool)  # steps in which a joint passes a limit
         self._link()
+
+    def settle(self) -> None:
+        """Divide the steps that need it, apart from all the others, three samples around each."""
+        c = self.columns
+        steps = np.flatnonzero(self.torn | self.crossing)
+        if not len(steps):
+            return
+        rows = np.stack([np.maximum(steps - 1, 0), steps, steps + 1], axis=1).ravel()
+        part = _Linking(self.arm, self.targets, self.task, self.tolerance, self.near, self.length)
+        part.columns = c.rows(rows)
+        part.columns.partner = c.partner[rows[:-1]]
+        part.columns.partner[2::3] = -1  # between the groups
+        part.open = np.zeros(len(rows) - 1, bool)
+        part.torn, part.crossing = part.open.copy(), part.open.copy()
+        part.torn[1::3], part.crossing[1::3] = self.torn[steps], self.crossing[steps]
+        part.fresh = np.zeros(len(rows), bool)
+        group = np.repeat(np.arange(len(steps)), 3)
+        while part.divide():
+            group = np.insert(group, part.where, group[np.maximum(part.where - 1, 0)])
+        self._put(part, steps, group)
+
+    def _put(self, part: _Linking, steps: Int, group: Int) -> None:
+        """Take over what was added to the steps, and their links."""
+        c, p = self.columns, part.columns
+        B = max(c.q.shape[1], p.q.shape[1])
+        q, name, partner = _widened(c.q, B), _widened(c.name, B, -1), _widened(c.partner, B, -1)
+        new = part.fresh
+        at = np.repeat(steps + 1, np.bincount(group[new], minlength=len(steps)))
+        links = np.append(_widened(p.partner, B, -1), np.full((1, B), -1, np.int16), axis=0)
+        # the left end of each step is the second sample of its group
+        second = np.flatnonzero(~new)[1::3]
+        partner = partner.copy()
+        partner[steps] = links[second]
+        self.columns = Columns(
+            np.insert(c.s, at, p.s[new]),
+            np.insert(q, at, _widened(p.q, B)[new], axis=0),
+            np.insert(name, at, _widened(p.name, B, -1)[new], axis=0),
+            np.insert(c.status, at, p.status[new]),
+            np.insert(_widened(c.within, B, 0), at, _widened(p.within, B, 0)[new], axis=0),
+            c.names,
+            c.complete and p.complete,
+            np.insert(partner, at, links[new], axis=0),
+        )
 
     def divide(self) -> bool:
         """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done."""
@@ -131,7 +191,8 @@ class _Linking:
         f = np.arange(1, _PARTS) / _PARTS
         new = (c.s[todo, None] + h[todo, None] * f).ravel()
         found = self._solved(new)
-        where = np.repeat(todo + 1, _PARTS - 1)
+        self.where = where = np.repeat(todo + 1, _PARTS - 1)
+        self.fresh = np.insert(self.fresh, where, True)
         self.added += len(new)
         B = max(c.q.shape[1], found.q.shape[1])
         q, name = _widened(c.q, B), _widened(c.name, B, -1)
@@ -140,6 +201,7 @@ class _Linking:
             np.insert(q, where, _widened(found.q, B), axis=0),
             np.insert(name, where, _widened(found.name, B, -1), axis=0),
             np.insert(c.status, where, found.status),
+            np.insert(_widened(c.within, B, 0), where, _widened(found.within, B, 0), axis=0),
             c.names,
             c.complete and found.complete,
             np.insert(_widened(c.partner, B, -1), where, -1, axis=0),
@@ -154,7 +216,7 @@ class _Linking:
 
     def _solved(self, s: Array) -> Columns:
         found = ik(self.arm, self.targets(s), self.task, near=self.near)
-        q, name = found.q, found.branch.astype(np.int16)
+        q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
         singular = np.flatnonzero(found.status == Status.SINGULAR)
         if len(singular):
             # Exactly on a singularity some joints are free: a hair beside it they are not.
@@ -163,25 +225,30 @@ class _Linking:
             beside = ik(self.arm, self.targets(aside), self.task, near=self.near)
             good = beside.status != Status.SINGULAR
             B = max(q.shape[1], beside.q.shape[1])
-            q, name = _widened(q, B).copy(), _widened(name, B, -1).copy()
+            q, name, within = _widened(q, B).copy(), _widened(name, B, -1).copy(), _widened(within, B, 0).copy()
+            within[singular[good]] = _widened(beside.within_limits, B, 0)[good]
             q[singular[good]] = _widened(beside.q, B)[good]
             name[singular[good]] = _widened(beside.branch.astype(np.int16), B, -1)[good]
-        return _in_columns(found, s, q, name)
+        return _in_columns(found, s, q, name, within)
 
     def _link(self) -> None:
         """Find partners in the open steps."""
-        c, arm = self.columns, self.arm
+        c = self.columns
         rows = np.flatnonzero(self.open)
         valid = c.valid
-        here, there = valid[rows], valid[rows + 1]
-        D = change(arm, c.q[rows], c.q[rows + 1])
+        every = len(rows) == len(self.open)
+        left, right = (slice(None, -1), slice(1, None)) if every else (rows, rows + 1)
+        D = change(self.arm, c.q[left], c.q[right])
         with np.errstate(invalid="ignore"):
             good = chord_bound(self.lever, D) <= self.tolerance
         column = np.arange(c.q.shape[1], dtype=np.int16)
-        c.partner[rows] = np.where(good, column, -1)
-        straight = np.all(good | ~(here | there), axis=1)
+        c.partner[rows] = np.where(good, column, np.int16(-1))
+        straight = (good == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows] = False
-        self.crossing[rows] = self._crosses(c.q[rows], D, good).any(axis=1)
+        flips = (c.within[left] != c.within[right]) & good
+        if self.wide:
+            flips |= self._crosses(c.q[left], D, good)
+        self.crossing[rows] = flips.any(axis=1)
         for i in rows[~straight]:
             self._match(int(i), valid)
         self.open[:] = False
@@ -193,7 +260,7 @@ class _Linking:
         D = change(arm, c.q[i, left][:, None], c.q[i + 1, right][None])
         ok = chord_bound(self.lever, D) <= self.tolerance
         guess = np.zeros((len(left), arm.n))
-        if i > 0:
+        if i > 0 and c.s[i] > c.s[i - 1]:
             ratio = (c.s[i + 1] - c.s[i]) / (c.s[i] - c.s[i - 1])
             for k, b in enumerate(left):
                 before = np.flatnonzero(c.partner[i - 1] == b)
@@ -210,29 +277,33 @@ class _Linking:
         self.torn[i] = matched < max(len(left), len(right))
 
     def _crosses(self, q: Array, D: Array, good: Bool) -> Bool:
-        """Which linked columns of steps have a joint that passes one of its limits, whole turns apart: (M, B)."""
+        """Which linked columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
         out = np.zeros(good.shape, bool)
-        for j in range(self.arm.n):
+        for j in self.wide:
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                if not np.isfinite(limit):
-                    continue
-                a, b = q[..., j] - limit, q[..., j] + D[..., j] - limit
+                a = (q[..., j] - limit) / TURN
                 with np.errstate(invalid="ignore"):
-                    apart = a * b < 0 if self.arm.prismatic[j] else np.floor(a / TURN) != np.floor(b / TURN)
-                out |= apart & good
+                    out |= (np.floor(a) != np.floor(a + D[..., j] / TURN)) & good
         return out
 
 
-def _in_columns(found: Solutions, s: Array, q: Array, name: NDArray[np.int16]) -> Columns:
+def _in_columns(found: Solutions, s: Array, q: Array, name: NDArray[np.int16], within: Bool) -> Columns:
     """Rows of solutions with every named branch in the column of its number."""
-    N, B, n = q.shape
+    B = q.shape[1]
     wide = max(B, int(name.max(initial=-1)) + 1)
-    place = np.where(name >= 0, name, 0).astype(np.intp)
-    out, labels = np.full((N, wide, n), np.nan), np.full((N, wide), -1, np.int16)
-    row, column = np.nonzero((name >= 0) & ~np.isnan(q[:, :, 0]))
-    out[row, place[row, column]] = q[row, column]
-    labels[row, place[row, column]] = name[row, column]
-    return Columns(s, out, labels, found.status.astype(np.int8), found.names, bool(np.all(found.complete)))
+    status, complete = found.status.astype(np.int8), bool(np.all(found.complete))
+    moved = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
+    q, name, within = (_widened(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within, 0)))
+    if len(moved):
+        q, name, within = q.copy(), name.copy(), within.copy()
+        old_q, old_name, old_within = q[moved], name[moved], within[moved]
+        q[moved], name[moved], within[moved] = np.nan, -1, False
+        row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
+        place = old_name[row, column]
+        q[moved[row], place] = old_q[row, column]
+        name[moved[row], place] = place
+        within[moved[row], place] = old_within[row, column]
+    return Columns(s, q, name, status, within, found.names, complete)
 
 
 def _widened(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]

@@ -1,0 +1,82 @@
+"""How far a path can be carried, by brute force: every branch, every whole-turn copy, every edge between samples.
+
+Nothing of `armkin.motion` is used here. An edge is accepted where the tip, on twenty points of the straight joint
+step, stays within the tolerance of the straight line between its ends, and the joints move little.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+import armkin
+from armkin.model.arm import Arm
+
+TURN = 2 * np.pi
+FAR = 0.3  # [rad] or a tenth of the reach: no honest step between close samples is larger
+
+
+@dataclass
+class Nodes:
+    """Legal joint values at every sample."""
+
+    q: list[np.ndarray]  # of (k, n)
+
+
+def legal_copies(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
+    """All copies of joint values within the limits, unlimited joints as they are."""
+    choices = []
+    for j, value in enumerate(q):
+        low, high = arm.lower[j] - 1e-9, arm.upper[j] + 1e-9
+        if arm.prismatic[j] or not (np.isfinite(low) and np.isfinite(high)):
+            choices.append([value] if low <= value <= high else [])
+        else:
+            first, last = int(np.ceil((low - value) / TURN)), int(np.floor((high - value) / TURN))
+            choices.append([value + TURN * k for k in range(first, last + 1)])
+    return [np.array(row) for row in itertools.product(*choices)]
+
+
+def nodes(arm: Arm, targets: np.ndarray, task: str | None = None) -> Nodes:
+    """All legal joint values at all targets."""
+    found = armkin.ik(arm, targets, task)
+    out = []
+    for row, valid in zip(found.q, found.valid, strict=True):
+        rows = [copy for q in row[valid] for copy in legal_copies(arm, q)]
+        out.append(np.array(rows).reshape(-1, arm.n))
+    return Nodes(out)
+
+
+def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which nodes (k, n) go on to which (m, n): (k, m) bool."""
+    D = b[None] - a[:, None]
+    free = ~arm.prismatic & ~np.isfinite(arm.lower) & ~np.isfinite(arm.upper)
+    D = np.where(free, D - TURN * np.rint(D / TURN), D)
+    near = (
+        (np.abs(D) / np.where(arm.prismatic, arm.reach / 10, FAR)).max(axis=2) < 1
+        if D.size
+        else np.zeros(D.shape[:2], bool)
+    )
+    for i, k in np.argwhere(near):
+        f = np.linspace(0, 1, 22)[:, None]
+        T = armkin.fk(arm, a[i] + f * D[i, k])
+        p = T[:, :3, 3]
+        chord = p[:1] + f * (p[-1:] - p[:1])
+        near[i, k] = np.linalg.norm(p - chord, axis=1).max() <= tolerance
+    return near
+
+
+def reach(arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = None) -> int:
+    """The last sample that any run from the first sample arrives at; -1: no legal start."""
+    n = nodes(arm, targets, task)
+    if not len(n.q[0]):
+        return -1
+    alive = np.ones(len(n.q[0]), bool)
+    for i in range(len(targets) - 1):
+        if not len(n.q[i + 1]):
+            return i
+        alive = edges(arm, n.q[i][alive], n.q[i + 1], tolerance).any(axis=0)
+        if not alive.any():
+            return i
+    return len(targets) - 1
