@@ -125,3 +125,20 @@ def test_the_robot_file_is_not_written_over(tmp_path: Path, pick: Path) -> None:
     mine = tmp_path / "mine.yaml"
     mine.write_text((ROOT / THREE_DOF).read_text())
     assert run("path", mine, pick, "--out", mine).code == 2
+
+
+def test_send_follows_a_path_file_and_rounds_waypoints(pick: Path, tmp_path: Path) -> None:
+    along = run("send", THREE_DOF, "--path", pick, "--port", "sim", "--json")
+    assert along.code == 0, along.err
+    assert along.json["pulses"] == [0, 0, 0]
+    dry = run("send", THREE_DOF, "--path", pick, "--dry-run", "--json").json
+    assert dry["length_mm"] == along.json["length_mm"]
+    assert run("send", THREE_DOF, "1", "2", "3", "--path", pick, "--dry-run").code == 2
+    rows = tmp_path / "rows.csv"
+    rows.write_text("q1,q2,q3\n20,90,-90\n20,70,-90\n0,70,-90\n0,90,-90\n")
+    stops = run("send", THREE_DOF, "--batch", rows, "--port", "sim", "--json").json
+    flows = run("send", THREE_DOF, "--batch", rows, "--port", "sim", "--json", "--blend", 8)
+    assert flows.code == 0, flows.err
+    assert flows.json["pulses"] == stops["pulses"] == [0, 0, 0]  # a closed way
+    assert flows.json["duration_s"] < 0.8 * stops["duration_s"]
+    assert run("send", THREE_DOF, 1, 2, 3, "--blend", 8, "--dry-run").code == 2

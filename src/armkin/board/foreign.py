@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.errors import UsageError
 from armkin.hardware import FOREIGN, ForeignBoard
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,10 @@ class Foreign:
     def plan(self, start: Sequence[int], targets: Array, speed: float) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
         counts = np.asarray(start, dtype=np.int64)
-        trajectory = plan_joints(self.arm, joints(self.arm, counts), targets, speed=speed)
+        return self.lay(plan_joints(self.arm, joints(self.arm, counts), targets, speed=speed), counts)
+
+    def lay(self, trajectory: Trajectory, counts: NDArray[np.int64]) -> Planned:
+        """A trajectory that starts at counts (motors,)."""
         if self.board.kind == "grbl":
             from armkin.board.grbl.gcode import Job
 

@@ -6,23 +6,29 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.cutting import plan
+from armkin.board.firmware.cutting import cut, plan
 from armkin.board.foreign import Foreign
 from armkin.board.told import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
+from armkin.motion.corners import rounded
+from armkin.motion.path import HOLD
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from armkin.board.backend import Backend, Planned
     from armkin.board.firmware.configuration import Configuration
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
 
 _AHEAD = 1000  # rows that are read before they are planned
 
@@ -30,22 +36,25 @@ _AHEAD = 1000  # rows that are read before they are planned
 class Planner:
     """Plans for one arm at one speed, and what they come to."""
 
-    def __init__(self, arm: Arm, board: Configuration | Foreign, speed: float) -> None:
-        self.arm, self.speed = arm, speed
+    def __init__(self, arm: Arm, board: Configuration | Foreign, speed: float, blend: float = 0.0) -> None:
+        """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
+        self.arm, self.speed, self.blend = arm, speed, blend
         self.done: list[Planned] = []
         self._plan: Callable[[Sequence[int], Array, float], Planned]
+        self._lay: Callable[[Trajectory, NDArray[np.int64]], Planned]
         if isinstance(board, Foreign):
-            self._plan = board.plan
+            self._plan, self._lay = board.plan, board.lay
         else:
             self.use(board.board.clock, board.board.min_interval)
 
     def use(self, clock: int, min_interval: int) -> None:
         """Take the figures of the board that is there."""
 
-        def cut(start: Sequence[int], q: Array, speed: float) -> Planned:
+        def cut_moves(start: Sequence[int], q: Array, speed: float) -> Planned:
             return plan(self.arm, start, q, speed=speed, clock=clock, min_interval=min_interval)
 
-        self._plan = cut
+        self._plan = cut_moves
+        self._lay = partial(cut, clock=clock, min_interval=min_interval)
 
     def counts(self, q: Array) -> list[int]:
         """Counts at joint values."""
@@ -53,7 +62,11 @@ class Planner:
 
     def plan(self, start: Sequence[int], q: Array) -> Planned:
         """A plan through joint values (w, n) [rad | mm]."""
-        return self._plan(start, q, self.speed)
+        if not self.blend:
+            return self._plan(start, q, self.speed)
+        counts = np.asarray(start, dtype=np.int64)
+        way = rounded(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
+        return self._lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
         """The same plans, remembered for the summary."""

@@ -119,11 +119,40 @@ def path(
     _carried_out(arm, moves, options, port, baud, out, plot, assume_home=assume_home, json=json)
 
 
+def sent(
+    robot: str | None,
+    file: str,
+    port: str | None,
+    speed: str,
+    dry_run: bool,
+    start: str | None,
+    trace: str | None,
+    baud: int | None,
+    *,
+    assume_home: bool,
+    json: bool,
+) -> None:
+    """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
+    if robot is None:
+        raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
+    arm = inputs.load(robot)
+    moves = _moves(arm, file, None, None)
+    options: dict[str, Any] = {"speed": (_positive(speed, "--speed") or 100.0) / 100}
+    if not dry_run:
+        _carried_out(arm, moves, options, port, baud, trace, None, assume_home=assume_home, json=json)
+        return
+    if start is not None:
+        options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--from"))
+    plan = _planned(arm, moves, options, json=json)
+    _files(plan, trace, None)
+    _print(plan, {**_found(plan, _rehearsed(plan)), "dry_run": True}, json=json)
+
+
 def _carried_out(
     arm: Arm,
     moves: Any,
     options: dict[str, Any],
-    port: str,
+    port: str | None,
     baud: int | None,
     out: str | None,
     plot: str | None,

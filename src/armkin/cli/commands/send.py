@@ -38,8 +38,19 @@ def send(
         typer.Option(
             "--batch",
             metavar="FILE|-",
-            help="Joint values of many waypoints, one row each; the arm stops in each.",
+            help="Joint values of many waypoints, one row each; the arm stops in each, but for --blend.",
         ),
+    ] = None,
+    blend: Annotated[
+        str | None,
+        typer.Option(
+            "--blend",
+            metavar="DEG|MM",
+            help="With --batch FILE: round the corners, so far from each waypoint, without a stop.",
+        ),
+    ] = None,
+    path: Annotated[
+        str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
     ] = None,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
     assume_home: AssumeHome = False,
@@ -70,9 +81,19 @@ def send(
         raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
+    if path is not None:
+        from armkin.cli.commands.path import sent
+
+        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend}
+        given = [name for name, what in others.items() if what]
+        if given:
+            raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
+        sent(robot, path, port, speed, dry_run, start, trace, baud, assume_home=assume_home, json=json)
+        return
+    radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch)
     board = linking.board_of(arm, rehearsal=dry_run or port == SIM)
-    planner = Planner(arm, board, fraction)
+    planner = Planner(arm, board, fraction, radius)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
@@ -104,6 +125,18 @@ def send(
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
+
+
+def _blend(text: str | None, batch: str | None) -> float:
+    """`--blend`: 0 without it."""
+    if text is None:
+        return 0.0
+    radius = number(text, "--blend")
+    if radius < 0:
+        raise UsageError(f"--blend: '{text}' must be at least 0")
+    if batch in (None, "-"):
+        raise UsageError("--blend needs all waypoints before the arm moves: with --batch FILE")
+    return radius
 
 
 def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:

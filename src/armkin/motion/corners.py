@@ -1,0 +1,96 @@
+"""Joint waypoints without a stop: straight lines in joint space, their corners rounded by parabolas."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.model import units
+from armkin.motion.branch_path import coupled
+from armkin.motion.curve import Curve
+from armkin.motion.plan import check_limits, check_rates
+from armkin.motion.time_optimal import Bounds, Knots, hold_cap, optimal
+from armkin.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_NODES = 12  # grid points of a line, and of a corner
+
+
+def rounded(
+    arm: Arm,
+    start: ArrayLike,
+    targets: ArrayLike,
+    blend: float,
+    *,
+    speed: float = 1.0,
+    accel: float = 1.0,
+    hold: float | None = None,
+) -> Trajectory:
+    """From joint values through joint targets, within `blend` of each, as fast as the joints allow.
+
+    start: (n,); targets: (w, n) [rad | mm]; blend: how far from a corner its rounding begins, as the length of the
+    change of joint values in degrees and mm, at most half of the way to the next corner. The rounding stays between
+    the corner and its chord: within all limits that the corners keep. Other arguments as in `armkin.path`.
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("three_dof")
+    >>> corners = np.deg2rad([[20, 90, -90], [20, 70, -90], [0, 70, -90]])
+    >>> round(rounded(arm, arm.home, corners, 10.0).duration, 2) < 2.0
+    True
+    """
+    check_rates(arm)
+    if not (np.isfinite(blend) and blend > 0):
+        raise UsageError(f"a blend of {blend:g} rounds nothing; it must be above 0")
+    goals = np.atleast_2d(np.asarray(targets, dtype=float))
+    check_limits(arm, goals)
+    unit = np.where(arm.prismatic, 1.0, units.DEGREE)
+    corners = np.vstack([np.asarray(start, dtype=float), goals]) / unit
+    corners = corners[np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > 1e-9])]
+    first = np.asarray(start, dtype=float)
+    if len(corners) < 2:
+        return Trajectory(arm, first, ())
+    path = _scaled(_grid(corners, blend), unit)
+    cap = np.full(len(path.s), np.inf)
+    if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
+        cap = hold_cap(arm, path, hold)
+    bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
+    return Trajectory(arm, first, (Curve(path, optimal(path, bounds, coupled(arm, accel))),))
+
+
+def _grid(corners: Array, blend: float) -> Knots:
+    """The way with a point of the grid every so often; corners (w, n) no two of which are the same."""
+    side = np.diff(corners, axis=0)
+    length = np.linalg.norm(side, axis=1)
+    way = side / length[:, None]
+    cut = np.concatenate([[0.0], np.minimum(blend, np.minimum(length[:-1], length[1:]) / 2), [0.0]])
+    q, d, s = [corners[:1]], [way[:1]], [np.zeros(1)]
+    f = np.linspace(0.0, 1.0, _NODES + 1)[1:, None]
+    at = 0.0
+    for k in range(len(side)):
+        a = corners[k] + cut[k] * way[k]
+        straight = length[k] - cut[k] - cut[k + 1]
+        if straight > 1e-9 * length[k]:
+            q.append(a + f * straight * way[k])
+            d.append(np.repeat(way[k : k + 1], _NODES, axis=0))
+            s.append(at + f[:, 0] * straight)
+            at += straight
+        if k + 1 < len(side):  # a parabola: from the one side to the other, its tangents the sides
+            r = cut[k + 1]
+            begin, corner = corners[k + 1] - r * way[k], corners[k + 1]
+            end = corner + r * way[k + 1]
+            q.append((1 - f) ** 2 * begin + 2 * f * (1 - f) * corner + f**2 * end)
+            d.append((1 - f) * way[k] + f * way[k + 1])
+            s.append(at + 2 * r * f[:, 0])
+            at += 2 * r
+    return Knots(np.concatenate(s), np.concatenate(q), np.concatenate(d))
+
+
+def _scaled(path: Knots, unit: Array) -> Knots:
+    """The same in [rad | mm]."""
+    return Knots(path.s, path.q * unit, path.d * unit)

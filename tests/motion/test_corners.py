@@ -1,0 +1,62 @@
+"""Joint waypoints without a stop: near every corner, within all limits, and faster than stopping."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model.arm import Arm
+from armkin.motion.corners import rounded
+from armkin.motion.plan import plan
+
+
+@pytest.fixture(scope="module")
+def three_dof() -> Arm:
+    return armkin.load("robots/three_dof.yaml")
+
+
+def wander(arm: Arm, count: int, step: float) -> np.ndarray:
+    """Waypoints at random, each joint up to `step` degrees from the one before, within limits."""
+    rng = np.random.default_rng(5)
+    rows = [arm.home]
+    while len(rows) < count + 1:
+        row = rows[-1] + np.deg2rad(rng.uniform(-step, step, arm.n))
+        if np.all((row >= arm.lower) & (row <= arm.upper)):
+            rows.append(row)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("hold", [None, 1.5])
+def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, hold: float | None) -> None:
+    rows = wander(three_dof, 200, 15.0)
+    one = rounded(three_dof, rows[0], rows[1:], 10.0, hold=hold)
+    t = np.arange(0, one.duration, 0.001)
+    q = one.q(t)
+    v, a = np.diff(q, axis=0) / 0.001, np.diff(q, n=2, axis=0) / 1e-6
+    assert np.abs(v / three_dof.max_speed).max() <= 1.002
+    assert np.abs(a / three_dof.max_accel).max() <= 1.002
+    assert np.all((q >= three_dof.lower - 1e-9) & (q <= three_dof.upper + 1e-9))
+    for row in rows:
+        assert np.rad2deg(np.linalg.norm(q - row, axis=1).min()) < 10.0 / np.sqrt(2) + 0.1
+    assert one.q(one.duration) == pytest.approx(rows[-1])
+    stopping = plan(three_dof, rows[0], rows[1:]).duration
+    assert stopping / one.duration > 1.4
+
+
+def test_there_and_back_again_turns_round_within_the_limits(three_dof: Arm) -> None:
+    rows = np.deg2rad([[0, 90, -90], [40, 90, -90], [0, 90, -90]])
+    one = rounded(three_dof, rows[0], rows[1:], 10.0)
+    t = np.arange(0, one.duration, 0.001)
+    a = np.diff(one.q(t), n=2, axis=0) / 1e-6
+    assert np.abs(a / three_dof.max_accel).max() <= 1.002
+    assert np.rad2deg(one.q(t)[:, 0].max()) == pytest.approx(35.0, abs=0.01)
+
+
+def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
+    with pytest.raises(UsageError, match="above 0"):
+        rounded(three_dof, three_dof.home, three_dof.home, 0.0)
+    with pytest.raises(NoSolutionError, match="q2 = 130 deg"):
+        rounded(three_dof, three_dof.home, np.deg2rad([[0, 130, 0]]), 5.0)
+    assert rounded(three_dof, three_dof.home, three_dof.home, 5.0).duration == 0
