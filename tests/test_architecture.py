@@ -35,7 +35,8 @@ MAY_IMPORT: dict[str, str] = {
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
-    "compiled": "errors formula model forward inverse inverse/tasks inverse/branches inverse/closed export/c",
+    "compiled": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
+    " export/c",
     "view": "errors formula model forward",
     "plot": "errors files formula model forward motion view reach",
     "board/ports": "errors",

@@ -52,6 +52,11 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
     nearest = oracle.distance(screw, s.q, q[:, None]).min(axis=1, initial=np.inf)
     # the square root of rounding is all that a double root can be known to
     lost = nearest > 1e-6 + np.minimum(1e-13 / np.maximum(weak, 1e-300), 1e-3)
+    for k in np.flatnonzero(lost & (nearest < 1e-2)):  # the branch of two whose middle solves the target, too
+        d = s.q[k, int(oracle.distance(screw, s.q[k], q[k]).argmin())] - q[k]
+        middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+        off, turned = oracle.missing(screw, goals.take([k]), middle[None])
+        lost[k] = np.hypot(off[0] / arm.reach, turned[0]) > 1e-9
     B = s.q.shape[1]
     rows, columns = np.nonzero(s.valid)
     mm, rad = oracle.missing(screw, goals.take(rows), s.q[rows, columns])

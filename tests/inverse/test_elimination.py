@@ -7,6 +7,7 @@ from general_arms import (
     PRISMATIC_PATTERNS,
     Arm,
     Array,
+    Bool,
     dh,
     distance,
     forward,
@@ -17,7 +18,7 @@ from general_arms import (
 )
 
 from armkin.inverse.elimination import line_features, method
-from armkin.inverse.elimination.polish import polish
+from armkin.inverse.elimination.polish import refine, shrink
 from armkin.inverse.numeric.linalg import nudged
 
 
@@ -45,6 +46,14 @@ def jacobian(arm: Arm, q: Array) -> Array:
 def smallest_singular_value(arm: Arm, q: Array) -> Array:
     """Of the Jacobian, (N, 6) -> (N,)."""
     return np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1]
+
+
+def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False) -> tuple[Array, Array]:
+    """Guesses (M, 6) moved onto their targets (M, 4, 4), and the residuals (M,), lengths over the links' sum."""
+    length = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum()) or 300.0
+    unit = np.where(prismatic, length, 1.0)
+    found = refine(shrink(link, length), prismatic, q / unit, shrink(T, length), steps, damped)
+    return found.q * unit, found.residual
 
 
 def solve(arm: Arm, T: Array) -> tuple[Array, Array]:

@@ -22,6 +22,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse import solve
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
+from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
@@ -106,7 +107,7 @@ class _CompiledTask:
             return
         self.task, self.geometry = solver(self.turned, task)
         self.goal_shape = (4, 4) if self.task.orientation == "full" else (len(self.task.labels),)
-        self.names = self._names(self.branches)
+        self.names = branch_names(self.turned, self.task, self.geometry, self.branches)
         self._batch = code.arm_batch
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 6], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
@@ -157,16 +158,17 @@ class _CompiledTask:
             return solve.ik(self.arm, targets, self.name, near=near)
         target = np.ascontiguousarray(given.reshape(-1, *self.goal_shape))
         out = _Out(len(target), self.branches, self.n)
-        each = np.ascontiguousarray(close)
+        each, rounding = np.ascontiguousarray(close), np.zeros(len(target))
         left = self._run(target, each, out, workers, read=False)
         if left and (out.state == UNREAD).any():
-            target = np.ascontiguousarray(read_targets(self.task, target)[0])  # refuses what is no target
+            read = read_targets(self.task, target)  # refuses what is no target
+            target, rounding = np.ascontiguousarray(read.values), read.rounding
             left = self._run(target, each, out, workers, read=True)
         q, complete = out.q, np.full(len(target), self.geometry.complete)
         if left:
             q = self._in_python(target, close.reshape(-1, self.n), out, complete)
         if self.arm.prismatic.any():
-            complete[distance(self.arm, self.task, target) > solve.FAR] = False
+            complete[distance(self.arm, self.task, target) > FAR] = False
         if self.geometry.pairs is None:  # as many columns as the target with most branches has
             q = out.narrow()
         if not self.geometry.ordered:
@@ -187,6 +189,7 @@ class _CompiledTask:
             method=self.geometry.name,
             why=self.geometry.why,
             complete=complete.reshape(lead),
+            rounding=rounding.reshape(lead),
         )
 
     def _quick(self, call: Any) -> Single | None:
@@ -194,13 +197,15 @@ class _CompiledTask:
         if self.turned is not self.arm:
             return None
         names = None if self.geometry.pairs is not None else self._names
-        same = {"arm": self.arm, "task": self.task, "names": self.names}
+        same = {"arm": self.arm, "task": self.task, "names": self.names, "rounding": np.zeros(())}
         same |= {"method": self.geometry.name, "why": self.geometry.why}
         complete = self.geometry.complete
         return Single(call, self.goal_shape, self.arm.home, self.branches, complete, same, names)
 
     def _names(self, count: int) -> tuple[str, ...]:
-        return branch_names(self.turned, self.task, self.geometry, count)
+        if self.geometry.pairs is None:
+            return branch_names(self.turned, self.task, self.geometry, count)
+        return self.names + tuple(f"branch {i + 1}" for i in range(self.branches, count))
 
     def _alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
         """One target the short way; None if there is more to it."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from armkin.export.c import elimination, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_code import number
-from armkin.inverse.solve import ACCEPTED, ACCEPTED_MM, FAR
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR
 from armkin.inverse.tasks.task import LARGEST
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
     if branches:
         assert task is not None
-        accepted = min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
+        accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
             accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, "1"  # its own criteria have been met
         fields |= _of_task(arm, task, branches, accepted)

@@ -19,16 +19,19 @@ class Straight:
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
         self._recording = record(formula, inputs)
-        self._run, self._buffers = numpy_code.write(self._recording)
+        self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
 
     def workspace(self, length: int) -> list[NDArray[Any]]:
         """Buffers for batches of that length, to be passed to `run`; one set for each thread."""
-        return [np.empty((*axes, length), dtype) for axes, dtype in self._buffers]
+        if self._batch is None:
+            self._batch = numpy_code.write(self._recording)
+        return [np.empty((*axes, length), dtype) for axes, dtype in self._batch[1]]
 
     def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
         """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
-        return self._run(*inputs, *workspace)
+        assert self._batch is not None  # written for the workspace
+        return self._batch[0](*inputs, *workspace)
 
     def single(self, inputs: Sequence[float]) -> list[Array]:
         """The formula's outputs for one pose, as arrays (*branch axes, 1).
@@ -45,7 +48,11 @@ class Straight:
 
 
 class OncePaid:
-    """A formula that is recorded once that pays: it takes some milliseconds."""
+    """A formula that is recorded once that pays: it takes some milliseconds.
+
+    Recorded or not, a batch is computed by the same operations of numpy; a single target is always computed in
+    plain Python. So no result depends on what was asked before.
+    """
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """The arguments of `Straight`."""
@@ -53,8 +60,12 @@ class OncePaid:
         self._straight: Straight | None = None
 
     def get(self, batch: int) -> Straight | None:
-        """The recorded code, once a batch or a fifth call makes it worth while."""
+        """The recorded code for a batch, once its size or a fifth call makes it worth while."""
         self._calls += 1
-        if self._straight is None and (batch >= 64 or self._calls > 4):
+        return self.always() if batch >= 64 or self._calls > 4 or self._straight is not None else None
+
+    def always(self) -> Straight:
+        """The recorded code."""
+        if self._straight is None:
             self._straight = Straight(self._formula, self._inputs)
         return self._straight

@@ -56,7 +56,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     (500.0, 100.0)
     """
     definition = task_for(arm, task)
-    goal, lead = read_targets(definition, target)
+    goal, lead, _ = read_targets(definition, target)
     if lead:
         raise UsageError("closest takes one target at a time")
     rng = np.random.default_rng(11)

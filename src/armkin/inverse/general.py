@@ -16,13 +16,12 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import AT_ZERO
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-
-AT_ZERO = 1e-6  # [rad] virtual joints closer to zero than this are worth correcting
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:

@@ -22,8 +22,9 @@ from armkin.forward import fk
 from armkin.inverse import general
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
-from armkin.inverse.closed.geometry import NEAR, Geometry, Rows
+from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import HOPELESS, NEAR, STEADY
 from armkin.inverse.tasks.fitting import PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
@@ -33,11 +34,8 @@ if TYPE_CHECKING:
 
 
 CHUNK = 1024  # poses corrected at once
-ACCEPTED = 1e-12  # residual of a branch, of the reach and in rad
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
-WEAK = 0.05  # singular value below which no branch counts as steady, however close the arm is to its class
-HOPELESS = 0.3  # residual of a seed that is no branch of the similar arm either
 
 
 class _Corrected(NamedTuple):
@@ -168,7 +166,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     """
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(WEAK, 1.5 * np.sqrt(off)) + 1e-6
+    weak = min(STEADY, 1.5 * np.sqrt(off)) + 1e-6
     limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
     for there in _around(arm, task, target, AROUND * off_here):
@@ -182,7 +180,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     some = np.flatnonzero(rough < HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
     q[some], size[some] = newton.newton(arm, task, flat[some], goals[some], steps=6)
-    branch, good = q.reshape(N, B, n), (size <= ACCEPTED).reshape(N, B)
+    branch, good = q.reshape(N, B, n), (size <= 1e-12).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):

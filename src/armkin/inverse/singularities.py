@@ -1,13 +1,14 @@
 """Targets on an edge: merging roots, singular postures, self-motions, boundaries.
 
-The closed forms say which targets are in doubt; these few are examined here, branch by
-branch, with the Jacobian: the general mechanism behind the words exact, boundary,
-singular and unreachable.
+The solvers say which targets are in doubt; these few are examined here, posture by posture, with the
+Jacobian: the general mechanism behind the words exact, boundary, singular and unreachable. Candidate
+postures of a target are moved onto it, and grouped: what lies on one self-motion is reported by one of
+its postures, two postures between which a third solves the target as well are one branch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, HOPELESS, SAME, SEED, SOLUTION, TURNED, WEAK
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
 
@@ -22,59 +24,196 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-SOLUTION = 1e-9  # of the reach: what counts as a solution
-WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
-DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
-CLUSTER = 0.02  # [rad] candidates this close may be one root of third or fourth order
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
+SURE = 1e-14  # residuals below this are equal
+OWN = -1  # label of a posture that comes from `near`
+
+Int = NDArray[np.int64]
+# For targets (rows of those examined): more postures to start from (rows, M, n), and their branches (M,).
+More = Callable[[Int], tuple[Array, Int]]
 
 
 class Examined(NamedTuple):
-    """q (K, B, n) corrected, valid (K, B), status (K,), free (K, n)."""
+    """What is known of K targets.
+
+    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
+    solver's own numbering.  status: (K,).  free: (K, n).  again: (K,) more postures had to be tried.
+    """
 
     q: Array
     valid: Bool
+    label: Int
     status: NDArray[np.int8]
     free: Bool
+    again: Bool
 
 
-def examine(arm: Arm, task: Task, q: Array, target: Array) -> Examined:
-    """Correct, merge and classify candidate branches q (K, B, n), nan where there is none."""
-    K, B, n = q.shape
-    flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    rough = newton.missing(arm, task, np.nan_to_num(flat), goals)
-    mean = _means(arm, q).reshape(-1, n)
-    closer = newton.missing(arm, task, np.nan_to_num(mean), goals) < rough
-    flat[closer] = mean[closer]
-    some = np.flatnonzero(~np.isnan(flat).any(axis=1) & (rough < 1e-3))
-    size = np.full(len(flat), np.inf)
-    if len(some):
-        flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=10)
-    # closer than the accuracy of the arithmetic to a double root: the residual is small, not zero
-    valid = (size <= SOLUTION).reshape(K, B)
-    q = flat.reshape(K, B, n)
-    sigma = np.ones((K, B))
-    nullity = np.zeros((K, B), dtype=np.int64)
-    V = np.zeros((K, B, n, n))
-    found = np.argwhere(valid)
-    if len(found):
-        k, b = found.T
+class _Settled(NamedTuple):
+    """The same, and whether a loose candidate came to nothing (K,)."""
+
+    q: Array
+    valid: Bool
+    label: Int
+    status: NDArray[np.int8]
+    free: Bool
+    open: Bool
+
+
+def examine(
+    arm: Arm, task: Task, q: Array, label: Int, loose: Bool, target: Array, near: Array, more: More | None
+) -> Examined:
+    """Correct, group and classify candidate branches of doubtful targets.
+
+    q: (K, B, n), nan where there is none; label: (B,); loose: (K, B) candidates that depend on a value preferred
+    for a free joint; target: (K, m) or (K, 4, 4); near: (K, n), a branch itself
+    where it solves the target; more: other candidates, for targets that seem to have no branch, and for
+    those of which the preferred value leaves the other joints no solution.
+    """
+    found = _settle(arm, task, q, np.broadcast_to(label, q.shape[:2]), loose, target, near, SEED)
+    again = found.open | ~found.valid.any(axis=1)
+    if more is None or not again.any():
+        return Examined(*found[:5], np.zeros(len(q), bool))
+    rows = np.flatnonzero(again)
+    others, labels = more(rows)
+    again[rows] = ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
+    seeds = np.concatenate([found.q[rows], others], axis=1)
+    whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
+    second = _settle(arm, task, seeds, whose, np.zeros(seeds.shape[:2], bool), target[rows], near[rows], HOPELESS)
+    K, n = found.free.shape
+    width = max(found.q.shape[1], second.q.shape[1])
+    out = Examined(
+        np.full((K, width, n), np.nan), np.zeros((K, width), bool), np.full((K, width), OWN), found.status, found.free,
+        again,
+    )  # fmt: skip
+    for some, part in ((np.arange(K), found), (rows, second)):
+        out.q[some], out.valid[some], out.label[some] = np.nan, False, OWN
+        own = part.q.shape[1]
+        out.q[some, :own], out.valid[some, :own], out.label[some, :own] = part.q, part.valid, part.label
+        out.status[some], out.free[some] = part.status, part.free
+    return out
+
+
+def _settle(
+    arm: Arm, task: Task, q: Array, label: Int, loose: Bool, target: Array, near: Array, seed: float
+) -> _Settled:
+    """Candidates (K, M, n) with their labels (K, M), moved onto their targets and grouped; seed: see `tolerances`."""
+    K, _, n = q.shape
+    q, label, size = _onto(arm, task, q, label, target, near, seed)
+    valid = size <= SOLUTION
+    M = q.shape[1]
+    sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
+    k, b = np.nonzero(valid)
+    if len(k):
         sigma[k, b], V[k, b], nullity[k, b] = newton.null_space(arm, task, q[k, b], target[k])
-    separate = valid
-    valid, merged = _merge(arm, q, valid, sigma, size.reshape(K, B))
-    status = np.where(valid.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
-    double = merged | (separate & (sigma < DOUBLE))
-    status[double.any(axis=1)] = Status.BOUNDARY
-    free = np.zeros((K, n), bool)
-    weak = np.argwhere(valid & (sigma < WEAK))
-    if len(weak):
-        k, b = weak.T
-        moving, joints = _self_motion(arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k])
-        status[k[moving]] = Status.SINGULAR
-        for row, who in zip(k[moving], joints[moving], strict=True):
-            free[row] |= who
-        valid = _one_of_a_curve(arm, task, q, valid, k[moving], b[moving], free, target)
-    return Examined(q, valid, status, free)
+    # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
+    rank = np.maximum(size, SURE)
+    rank[:, 0] = 0.0
+    group = np.where(valid, -1, M)  # which candidate stands for each one
+    free, singular, double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
+    chosen, curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
+    while (group < 0).any():
+        k = np.flatnonzero((group < 0).any(axis=1))
+        b = np.where(group[k] < 0, rank[k], np.inf).argmin(axis=1)
+        moving, joints = np.zeros(len(k), bool), np.zeros((len(k), n), bool)
+        weak = np.flatnonzero(sigma[k, b] < WEAK)
+        if len(weak):
+            kw, bw = k[weak], b[weak]
+            moving[weak], joints[weak] = _self_motion(
+                arm, task, q[kw, bw], V[kw, bw], np.maximum(nullity[kw, bw], 1), target[kw]
+            )
+        away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (k, M, n)
+        rest = group[k] < 0
+        # of a self-motion: whatever differs in its free joints alone
+        held = np.where(joints[:, None], 0.0, away).max(axis=2)
+        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < WEAK)
+        one = rest & ~moving[:, None] & _joined(arm, task, q, k, b, away.max(axis=2), sigma, target)
+        mine |= one
+        mine[np.arange(len(k)), b] = True
+        group[k] = np.where(mine, b[:, None], group[k])
+        double[k] |= (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
+        singular[k] |= moving
+        free[k] |= joints & moving[:, None]
+        # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
+        motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
+        pick = np.where(mine, np.where(moving[:, None], motion, size[k]), np.inf).argmin(axis=1)
+        own = np.flatnonzero(label[k, b] == OWN)
+        pick[own] = b[own]
+        chosen[k, pick] = True
+        curve[k, pick] = joints & moving[:, None]
+        if len(own):  # named like the candidate of its group that is closest to it
+            alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
+            twin = alike.argmin(axis=1)
+            label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
+    _drop_contained(arm, q, chosen, curve)
+    order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
+    there = np.take_along_axis(chosen, order, axis=1)
+    out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
+    status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
+    status[double] = Status.BOUNDARY
+    status[singular] = Status.SINGULAR
+    return _Settled(
+        out,
+        there,
+        np.where(there, np.take_along_axis(label, order, axis=1), OWN),
+        status,
+        free,
+        np.asarray((loose & ~valid[:, 1:]).any(axis=1)),
+    )
+
+
+def _drop_contained(arm: Arm, q: Array, chosen: Bool, curve: Bool) -> None:
+    """Of self-motions through each other keep the one of more joints: change chosen (K, M).
+
+    curve: (K, M, n) the joints that a chosen posture's self-motion moves. `near`, the first candidate, stays.
+    """
+    for k in np.flatnonzero((chosen & curve.any(axis=2)).sum(axis=1) > 1):
+        mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
+        for i in mine[mine > 0]:
+            wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
+            away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
+            if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
+                chosen[k, i] = False
+
+
+def _onto(
+    arm: Arm, task: Task, q: Array, label: Int, target: Array, near: Array, seed: float
+) -> tuple[Array, Int, Array]:
+    """`near` and candidates (K, M, n) moved onto their targets: postures, labels and residuals, (K, M + 1)."""
+    K, _, n = q.shape
+    both, whose = np.concatenate([near[:, None], q], axis=1), np.insert(label, 0, OWN, axis=1)
+    flat, goals = both.reshape(-1, n).copy(), np.repeat(target, both.shape[1], axis=0)
+    known = np.flatnonzero(~np.isnan(flat).any(axis=1))
+    size = np.full(len(flat), np.inf)
+    size[known] = newton.missing(arm, task, flat[known], goals[known])
+    mean = np.concatenate([near[:, None], _means(arm, q)], axis=1).reshape(-1, n)
+    better = newton.missing(arm, task, mean[known], goals[known]) < size[known]
+    flat[known[better]] = mean[known[better]]
+    own = np.zeros(both.shape[:2], bool)
+    own[:, 0] = True
+    # `near` is taken as it is, or not at all
+    some = np.flatnonzero((size < seed) & ~own.ravel())
+    if len(some):
+        steps = 10 if seed <= SEED else 25
+        flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=steps)
+    flat[own.ravel() & (size > SOLUTION)] = np.nan
+    return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)
+
+
+def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: Array, target: Array) -> Bool:
+    """Which candidates are one with the b-th of their target: (k, M).
+
+    Those that rounding explains, and those between which and it the posture in the middle solves the target.
+    """
+    radius = SAME + np.minimum(1e-13 / np.maximum(np.minimum(sigma[k], sigma[k, b][:, None]), 1e-300), 3e-4)
+    with np.errstate(invalid="ignore"):
+        same = away < radius
+        row, column = np.nonzero(~same & (away < HAIR))
+    if len(row):
+        unit = np.where(arm.prismatic, arm.reach, 1.0)
+        start = q[k[row], b[row]]
+        middle = start + 0.5 * newton.difference(arm, q[k[row], column], start) * unit
+        same[row, column] = newton.missing(arm, task, middle, target[k[row]]) <= SOLUTION
+    return np.asarray(same)
 
 
 def _means(arm: Arm, q: Array) -> Array:
@@ -83,6 +222,8 @@ def _means(arm: Arm, q: Array) -> Array:
     Of a root of third or fourth order rounding leaves three or four, off by its third or fourth root; their
     mean is right to rounding.
     """
+    if q.shape[1] > 32:
+        return q
     away = newton.difference(arm, q[:, None], q[:, :, None])  # of the third axis' candidates from the second's
     with np.errstate(invalid="ignore"):
         around = np.abs(away).max(axis=3) < CLUSTER
@@ -92,57 +233,36 @@ def _means(arm: Arm, q: Array) -> Array:
     return np.asarray(q + np.where((count > 2)[..., None], shift, 0.0) * unit)
 
 
-def _merge(arm: Arm, q: Array, valid: Bool, sigma: Array, size: Array) -> tuple[Bool, Bool]:
-    """Keep one of each cluster, and say which were merged away.
-
-    The radius grows where the Jacobian is weak: rounding / sigma.
-    """
-    before, valid = valid, valid.copy()
-    radius = 1e-7 + np.minimum(1e-13 / np.maximum(sigma, 1e-300), 3e-4)
-    B = q.shape[1]
-    for i in range(B):
-        for j in range(i + 1, B):
-            both = valid[:, i] & valid[:, j]
-            if not both.any():
-                continue
-            near = newton.wrapped_distance(arm, q[:, i], q[:, j]) < np.maximum(radius[:, i], radius[:, j])
-            same = both & near
-            worse_i = size[:, i] > size[:, j]
-            valid[same & worse_i, i] = False
-            valid[same & ~worse_i, j] = False
-    return valid, before & ~valid
-
-
-def _self_motion(
-    arm: Arm, task: Task, q: Array, V: Array, nullity: NDArray[np.int64], target: Array
-) -> tuple[Bool, Bool]:
+def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether the joints can move while the target is kept, and which do.
 
     Steps along each null direction, both ways, pulled back onto the target: on a self-motion
     they stay about as far from q as they went, and apart; from a double root they fall back, and
-    from a branch of weak Jacobian they may arrive at its neighbour.
+    from a branch of weak Jacobian they may arrive at its neighbour. The residual may grow by so much that
+    it stays below `SOLUTION` over a whole radian: a target that close to a singular one is singular.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
-    moving = np.zeros(len(q), bool)
-    joints = np.zeros(q.shape, bool)
+    moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
+    here = newton.missing(arm, task, q, target)
     for who, direction in _null_directions(arm.n, V, nullity):
         # where several directions are lost at once, a short step would be drawn back into the corner
         for step in (STEP, 10 * STEP) if (nullity[who] > 1).any() else (STEP,):
             along, which = np.ones(len(who), bool), np.zeros((len(who), arm.n), bool)
             for way in (step, -step):
-                far, size = newton.correct(arm, task, q[who] + way * direction * unit, target[who], steps=6)
-                mid, size2 = newton.correct(arm, task, q[who] + 0.6 * way * direction * unit, target[who], steps=6)
+                away, half = (q[who] + part * way * direction * unit for part in (1.0, 0.6))
+                far, size = newton.correct(arm, task, away, target[who], steps=6, least=WEAK)
+                mid, size2 = newton.correct(arm, task, half, target[who], steps=6, least=WEAK)
                 moved = np.abs(far - q[who]) / unit
                 least = 0.3 * step * np.abs(direction).max(axis=1)
                 apart = (np.abs(far - mid) / unit).max(axis=1) > 0.3 * least
-                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) < 1e-11)
+                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) <= here[who] + SOLUTION * STEP)
                 which |= moved > 1e-3 * STEP
             moving[who] |= along
             joints[who] |= along[:, None] & which
     return moving, joints
 
 
-def _null_directions(n: int, V: Array, nullity: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.intp], Array]]:
+def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
     """Which branches to push, and where: (m,) indices and (m, n) directions.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors:
@@ -159,30 +279,3 @@ def _null_directions(n: int, V: Array, nullity: NDArray[np.int64]) -> Iterator[t
         some = size > 0.1
         if some.any():
             yield many[some], push[some] / size[some, None]
-
-
-def _one_of_a_curve(
-    arm: Arm,
-    task: Task,
-    q: Array,
-    valid: Bool,
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
-    free: Bool,
-    target: Array,
-) -> Bool:
-    """A self-motion is reported by one of its points: drop singular branches that differ in free joints alone."""
-    valid = valid.copy()
-    for k in np.unique(rows):
-        mine = columns[rows == k]
-        kept: list[int] = []
-        held = ~free[k]
-        for b in mine:
-            if not valid[k, b]:
-                continue
-            d = newton.difference(arm, q[k, kept], q[k, b])
-            if len(kept) and (np.abs(d[:, held]).max(axis=1, initial=0.0) < 1e-5).any():
-                valid[k, b] = False
-            else:
-                kept.append(int(b))
-    return valid

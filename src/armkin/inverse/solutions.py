@@ -36,7 +36,9 @@ class Solutions:
     1e-9 of the arm's reach. within_limits: (..., B). branch: (..., B) index into `names`, -1
     past the last. status: (...) of `Status`. free: (..., n) joints that a singular target
     leaves free. complete: (...) every isolated real branch of this target is guaranteed to be
-    there (never of a sliding arm's targets more than 20 reaches away).
+    there (never of a sliding arm's targets more than 20 reaches away). rounding: (...) how
+    far the columns of a pose's rotation were from orthonormal; `target` holds the rotation next to it, which
+    the branches answer.
     """
 
     arm: Arm
@@ -53,6 +55,7 @@ class Solutions:
     method: str
     why: str
     complete: NDArray[np.bool_]
+    rounding: Array
 
     def __repr__(self) -> str:
         batch, sure = self.status.shape, "complete" if self.complete.all() else "not all proved complete"

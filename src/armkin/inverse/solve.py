@@ -7,8 +7,9 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `e
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +21,9 @@ from armkin.inverse import singularities
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_copy, nearest_row
-from armkin.inverse.closed.candidates import entries, recorded
+from armkin.inverse.closed.candidates import as_rows, entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Pair
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, SAME
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.fitting import task_for
@@ -33,11 +34,8 @@ from armkin.model.limits import SLACK
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-ACCEPTED = 1e-12  # residual of a branch that needs no correction, of the reach and in rad,
-ACCEPTED_MM = 5e-10  # and as a length
-FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete: rounding grows
 BLOCK = 512  # poses whose rows are written joint by joint while they are in the cache
-NEARBY = 1e-6  # residual up to which a candidate is worth correcting
+DOUBTFUL = 256  # targets examined at once
 
 
 class _Out(NamedTuple):
@@ -79,7 +77,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     if (turned := actual(arm)) is not arm:
         return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near)))
     definition, geometry = solver(arm, task)
-    target, lead = read_targets(definition, targets)
+    target, lead, rounding = read_targets(definition, targets)
     close = arm.home if near is None else arrays.real(near, "near")
     if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
@@ -89,14 +87,15 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     each = np.broadcast_to(close, (len(target), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out = _closed(arm, definition, geometry, target, each, one)
+        out, count = _closed(arm, definition, geometry, target, each, one)
     else:
-        out = _rows(arm, definition, geometry, target, each)
+        out, count = _rows(arm, definition, geometry, target, each)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
         out.branch[...] = follow(arm, definition, out.q, target)
-    names = branch_names(arm, definition, geometry, out.q.shape[1])
+    names = branch_names(arm, definition, geometry, count)
+    names += tuple(f"branch {i + 1}" for i in range(count, out.q.shape[1]))
     each_branch = (*lead, out.q.shape[1])
     return Solutions(
         arm=arm,
@@ -113,6 +112,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
         method=geometry.name,
         why=geometry.why,
         complete=out.complete.reshape(lead),
+        rounding=rounding.reshape(lead),
     )
 
 
@@ -140,18 +140,21 @@ def _empty(N: int, B: int, n: int) -> _Out:
     )
 
 
-def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None) -> _Out:
-    """Closed forms: chunks of poses that stay in the cache, entry by entry."""
+def _closed(
+    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None
+) -> tuple[_Out, int]:
+    """Closed forms: chunks of poses that stay in the cache, entry by entry. Also the number of branch columns."""
     out: _Out | None = None
     runner = recorded(arm, task, geometry)
-    straight = runner.code.get(len(target))
+    straight = runner.code.always() if len(target) == 1 else runner.code.get(len(target))
     workspace: list[NDArray[np.generic]] = []
+    doubts = []
     for start in range(0, max(len(target), 1), arrays.CHUNK):
         rows = slice(start, start + arrays.CHUNK)
         goal, close = target[rows], near[rows] if one is None else one
         N = len(goal)
         if straight is None:
-            *values, miss, doubt = runner.candidates(entries(task, goal), _prefer(arm, close))
+            *values, miss, doubt = runner.candidates(entries(task, goal), preferred(arm, close))
         elif N == 1:
             one_goal = pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()
             *values, miss, doubt = straight.single(one_goal)
@@ -168,25 +171,34 @@ def _closed(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array
             break
         part = out.part(rows)
         miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
-        valid = miss <= min(ACCEPTED, ACCEPTED_MM / arm.reach) ** 2
+        valid = miss <= ACCEPTED**2
         _fill(arm, part, values, valid.reshape(shape), close)
         full = bool(valid.all())
         doubtful = _doubtful(miss, valid, doubt, full)
-        if full and not len(doubtful):
-            continue
-        count = valid.sum(axis=0)
-        part.status[count == 0] = Status.UNREACHABLE
-        if len(doubtful) and straight is not None:
-            # again, with the preferred values for joints that are free
-            again = runner.candidates(
-                entries(task, goal[doubtful]), _prefer(arm, close[doubtful] if one is None else one)
-            )
-            for i in range(arm.n):
-                few = np.broadcast_to(again[i], (*shape[:-1], len(doubtful)))
-                part.q[doubtful, :, i] = few.reshape(B, -1).T
-        _tidy(arm, task, part, goal, near[rows], doubtful, count < B)
+        if len(doubtful):
+            doubts.append(start + doubtful)
+        if not full:
+            count = valid.sum(axis=0)
+            part.status[count == 0] = Status.UNREACHABLE
+            _pack(part, count < B)
     assert out is not None
-    return out
+    if doubts:
+
+        def candidates(rows: NDArray[np.intp]) -> tuple[Array, Bool]:
+            """Again, with the preferred values for joints that are free; those that other values would change."""
+            goal = entries(task, target[rows])
+            q, other = (
+                as_rows(runner.candidates(goal, preferred(arm, near[rows] + shift))[: arm.n], len(rows))
+                for shift in (0.0, 1.0)
+            )
+            loose = ~(np.abs(q - other).max(axis=2) < SAME)
+            if not loose.any():
+                return q, loose
+            other[~loose] = np.nan
+            return np.concatenate([q, other], axis=1), np.concatenate([loose, np.zeros_like(loose)], axis=1)
+
+        out = _examined(arm, task, out, target, near, np.concatenate(doubts), candidates, runner.others)
+    return out, B
 
 
 def _fill(arm: Arm, part: _Out, values: list[Array], valid: Bool, close: Array) -> None:
@@ -222,12 +234,6 @@ def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.
     return np.flatnonzero(edge)
 
 
-def _prefer(arm: Arm, close: Array) -> list[Pair]:
-    """What a free joint is given: close (N, n), or (n,) for all."""
-    values = list(np.ascontiguousarray(close.T))
-    return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
-
-
 def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
     """A joint's values at their nearest legal copies, and whether they are within limits."""
     lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
@@ -239,8 +245,8 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
     return value, (value >= lower - SLACK) & (value <= upper + SLACK)
 
 
-def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> _Out:
-    """Solvers that return joint values row by row."""
+def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> tuple[_Out, int]:
+    """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
     q, doubt, complete = geometry.rows(target)
     B = q.shape[1]
@@ -252,32 +258,96 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) 
     out.complete[...] = complete
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
-    _tidy(arm, task, out, target, near, np.flatnonzero(doubt), count < B)
+    _pack(out, count < B)
+    if doubt.any():
+        out = _examined(
+            arm,
+            task,
+            out,
+            target,
+            near,
+            np.flatnonzero(doubt),
+            lambda rows: (q[rows], np.zeros(q[rows].shape[:2], bool)),
+            None,
+        )
+    return out, B
+
+
+def _examined(
+    arm: Arm,
+    task: Task,
+    out: _Out,
+    target: Array,
+    near: Array,
+    doubtful: NDArray[np.intp],
+    candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
+    others: Callable[[Array, Array], tuple[Array, NDArray[np.int64]]] | None,
+) -> _Out:
+    """Examine the doubtful targets and write what is found: branches first, nan behind.
+
+    candidates: joint values (K, M, n) for some targets, and which depend on `near` (K, M); others: more of them,
+    for targets and preferred values.
+    """
+    for start in range(0, len(doubtful), DOUBTFUL):
+        rows = doubtful[start : start + DOUBTFUL]
+        goal, close, columns = target[rows], near[rows], out.q.shape[1]
+        q, loose = candidates(rows)
+
+        def more(some: NDArray[np.int64], goal: Array = goal, close: Array = close) -> Any:
+            assert others is not None
+            return others(goal[some], close[some])
+
+        seen = singularities.examine(
+            arm, task, q, np.arange(q.shape[1]) % columns, loose, goal, close, None if others is None else more
+        )
+        width = seen.q.shape[1]
+        if width > out.q.shape[1]:
+            out = _wider(out, width)
+        q, inside = nearest_row(arm, np.nan_to_num(seen.q), close[:, None, :])
+        out.q[rows], out.valid[rows], out.within[rows], out.branch[rows] = np.nan, False, False, -1
+        out.q[rows, :width] = np.where(seen.valid[:, :, None], q, np.nan)
+        out.valid[rows, :width] = seen.valid
+        out.within[rows, :width] = inside & seen.valid
+        out.branch[rows, :width] = _named(seen.label, seen.valid)
+        out.status[rows], out.free[rows] = seen.status, seen.free
+        out.complete[rows] &= ~seen.again
     return out
 
 
-def _tidy(
-    arm: Arm, task: Task, part: _Out, goal: Array, near: Array, doubtful: NDArray[np.intp], partial: Bool
-) -> None:
-    """Examine the doubtful targets; then move every target's branches to the front, nan behind."""
-    if len(doubtful):
-        seen = singularities.examine(arm, task, part.q[doubtful], goal[doubtful])
-        q, inside = nearest_row(arm, np.nan_to_num(seen.q), near[doubtful][:, None, :])
-        part.q[doubtful] = q
-        part.valid[doubtful] = seen.valid
-        part.within[doubtful] = inside & seen.valid
-        part.status[doubtful] = seen.status
-        part.free[doubtful] = seen.free
-        partial[doubtful] |= ~seen.valid.all(axis=1)
+def _named(label: NDArray[np.int64], valid: Bool) -> NDArray[np.int64]:
+    """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
+    out = np.where(valid, label, -1)
+    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
+        taken: set[int] = set()
+        for b in np.flatnonzero(valid[row]):
+            if out[row, b] < 0 or out[row, b] in taken:
+                out[row, b] = next(i for i in range(out.shape[1] + len(taken) + 1) if i not in {*taken, *out[row]})
+            taken.add(int(out[row, b]))
+    return out
+
+
+def _wider(out: _Out, width: int) -> _Out:
+    """The same with more columns, empty."""
+    N, B, n = out.q.shape
+    wide = _empty(N, width, n)
+    wide.q[:, :B], wide.valid[:, :B], wide.within[:, :B], wide.branch[:, :B] = out.q, out.valid, out.within, out.branch
+    wide.status[...], wide.free[...], wide.complete[...] = out.status, out.free, out.complete
+    wide.q[:, B:], wide.valid[:, B:], wide.within[:, B:], wide.branch[:, B:] = np.nan, False, False, -1
+    return wide
+
+
+def _pack(part: _Out, partial: Bool) -> None:
+    """Move the branches of some targets to the front, nan behind."""
     some = np.flatnonzero(partial)
-    if len(some):
-        valid = part.valid[some]
-        count = valid.sum(axis=1)
-        row, column = np.nonzero(valid)
-        place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
-        for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
-            old = array[some]
-            new = np.full_like(old, missing)
-            new[row, place] = old[row, column]
-            array[some] = new
-        part.valid[some] = np.arange(valid.shape[1]) < count[:, None]
+    if not len(some):
+        return
+    valid = part.valid[some]
+    count = valid.sum(axis=1)
+    row, column = np.nonzero(valid)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
+    for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+        old = array[some]
+        new = np.full_like(old, missing)
+        new[row, place] = old[row, column]
+        array[some] = new
+    part.valid[some] = np.arange(valid.shape[1]) < count[:, None]

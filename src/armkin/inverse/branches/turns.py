@@ -22,31 +22,33 @@ TURN = 2 * np.pi
 def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
     """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
 
-    value: any shape, in (-pi, pi]; near: broadcastable [rad]. Returns the values and
+    value: any shape, in [-pi, pi]; near: broadcastable [rad]. Returns the values and
     whether they are within [lower, upper]; where no copy is, the principal value.
     """
+    at_zero = isinstance(near, float) and near == 0.0
     if lower >= -np.pi and upper <= np.pi:
-        # the principal value is the only one that can be legal, but for half a turn where both its copies are
-        wide = upper - lower > TURN - SLACK and not (isinstance(near, float) and near == 0.0)
-        if wide and (half := np.abs(value) > np.pi - SLACK).any():
+        # the principal value is the only one that can be legal, but for half a turn, which has two
+        if (lower - SLACK <= -np.pi or upper + SLACK >= np.pi) and (half := np.abs(value) > np.pi - SLACK).any():
             other = value - np.copysign(TURN, value)
-            value = np.where(half & (np.abs(other - near) < np.abs(value - near)), other, value)
+            legal = (value >= lower - SLACK) & (value <= upper + SLACK)
+            better = (other >= lower - SLACK) & (other <= upper + SLACK)
+            better &= ~legal | (np.abs(other - near) < np.abs(value - near))
+            value = np.where(half & better, other, value)
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     principal = value
-    if not (isinstance(near, float) and near == 0.0):
+    if not at_zero:
         value = value + TURN * np.rint((near - value) / TURN)
-        low, high = float(np.min(near)) - np.pi, float(np.max(near)) + np.pi
-    else:
-        low, high = -np.pi, np.pi
-    if lower <= low and upper >= high:
+    first, last = (-np.pi, -np.pi) if at_zero else (float(np.min(near)) - np.pi, float(np.max(near)) - np.pi)
+    if lower <= first and upper >= last + TURN:
         return value, True
     below, above = value < lower - SLACK, value > upper + SLACK
-    # another copy can only help if the limits reach beyond the turn around `near`
-    if upper > high - SLACK and below.any():
+    # of a value below the limits the first copy above their lower end is the nearest legal one, if any is; it
+    # lies in the turn after the one around `near`, so it can help no `near` if the limits end before the first of these
+    if upper > first + TURN - SLACK and below.any():
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
         fits = below & (moved <= upper + SLACK)
         value, below = np.where(fits, moved, value), below & ~fits
-    if lower < low + SLACK and above.any():
+    if lower < last + SLACK and above.any():
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)
         value, above = np.where(fits, moved, value), above & ~fits

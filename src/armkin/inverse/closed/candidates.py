@@ -7,16 +7,22 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import OncePaid
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
-from armkin.inverse.tasks.task import Task
+from armkin.inverse.numeric.tolerances import HOPELESS
+from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+
+FREED = 24  # values tried for joints that a target leaves free
+SHAKEN, SHAKE = 8, 1e-4  # moves of a target to where nothing is free, and their size [reaches, rad]
 
 
 class Recorded:
@@ -47,9 +53,43 @@ class Recorded:
             found = self.candidates(entries(self.task, target), [None] * self.arm.n)
         else:
             found = list(straight.run(entries(self.task, target), straight.workspace(N)))
-        shape = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in found))
-        *values, miss, doubt = (np.broadcast_to(v, shape).reshape(math.prod(shape[:-1]), N).T for v in found)
-        return np.stack(values, axis=2), miss, np.asarray(doubt.any(axis=1))
+        *_, miss, doubt = rows = np.moveaxis(as_rows(found, N), 2, 0)
+        return np.moveaxis(rows[:-2], 0, 2), miss, np.asarray((doubt > 0).any(axis=1))
+
+    def others(self, target: Array, near: Array) -> tuple[Array, NDArray[np.int64]]:
+        """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
+
+        With other values for the joints that are free, and for targets moved a little, which do not; nan where the
+        candidate is far from its target. near: (N, n).
+        """
+        rng = np.random.default_rng(4)
+        N, n = len(target), self.arm.n
+        unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
+        offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)), np.zeros((SHAKEN, n))]) * unit
+        goals = np.repeat(target[:, None], len(offsets), axis=1)
+        for k in range(SHAKEN):
+            goals[:, FREED + k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
+        values = (near[:, None] + offsets).reshape(-1, n)
+        prefer = preferred(self.arm, values)
+        found = self.candidates(entries(self.task, goals.reshape(-1, *target.shape[1:])), prefer)
+        rows = as_rows(found[:-1], len(values))
+        B = rows.shape[1]
+        rows = rows.reshape(N, -1, n + 1)
+        q, miss = rows[:, :, :n], rows[:, :, n]
+        return np.where((miss < HOPELESS**2)[:, :, None], q, np.nan), np.tile(np.arange(B), len(offsets))
+
+
+def preferred(arm: Arm, near: Array) -> list[Pair]:
+    """What a free joint is given: near (N, n), or (n,) for all."""
+    values = list(np.ascontiguousarray(near.T))
+    return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
+
+
+def as_rows(values: list[Entry], count: int) -> Array:
+    """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
+    shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
+    rows = [np.broadcast_to(v, shape).reshape(math.prod(shape[:-1]), count).T for v in values]
+    return np.stack(rows, axis=2).astype(float)
 
 
 @lru_cache(maxsize=64)

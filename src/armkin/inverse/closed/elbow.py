@@ -13,8 +13,9 @@ import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel
 from armkin.model.rotation import FLIP, inverse

@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.subproblems import Candidates, Prefer
 
-EXACT = 1e-12  # axes parallel [rad] or meeting [of the reach] to this count as exactly so
-NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.nearly_special`
-
 
 class Rows(NamedTuple):
     """What a solver that works row by row returns for targets.

@@ -16,9 +16,10 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.elbow import TwoLink
-from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.closed.three_joints import Position
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, axes, reverse
 from armkin.model.rotation import FLIP, inverse

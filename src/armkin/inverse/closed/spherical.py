@@ -17,9 +17,8 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import Elbow
-from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
-    TANGENT,
     Candidates,
     Pair,
     Prefer,
@@ -30,6 +29,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
 )
 from armkin.inverse.closed.three_joints import Position
+from armkin.inverse.numeric.tolerances import EXACT, TANGENT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse

@@ -18,10 +18,7 @@ import numpy as np
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
-
-TANGENT = 1e-13  # relative discriminant below which two roots may be one: 6e-7 rad apart
-TOUCHING = 1e-4  # [rad] complex roots this close to the real line may be a double root seen through rounding
-FREE = 1e-18  # relative squared amplitude below which an equation says nothing about its angle
+from armkin.inverse.numeric.tolerances import FREE, TANGENT, TOUCHING
 
 
 class Pair(NamedTuple):

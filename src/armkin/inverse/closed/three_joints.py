@@ -22,7 +22,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse.closed.geometry import EXACT, NEAR, Geometry
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
     Candidates,
     Pair,
@@ -35,6 +35,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
+from armkin.inverse.numeric.tolerances import EXACT, NEAR
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain

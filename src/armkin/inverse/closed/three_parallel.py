@@ -17,8 +17,9 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import TwoLink
-from armkin.inverse.closed.geometry import EXACT, Geometry
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse

@@ -7,13 +7,10 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination.polish import pose_error, tip
+from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
 
 Int = NDArray[np.int64]
 
-SAME = 1e-6  # answers closer than this [rad, scaled length] are one
-NEAR = 1e-2  # answers closer than this are examined
-EXACT = 1e-13  # residual of a point halfway between two answers that makes them one
-WEAK = 1e4  # |J^-1| from which on an answer is near a singularity
 MOST = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
 
 # A projection of the joint circles that tells different answers apart: it orders a pose's answers, the
@@ -75,7 +72,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
     key, answers = key[order], answers.take(order)
     pose, q, residual = answers.pose, answers.q, answers.residual
     keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
-    widest = float(np.abs(_WEIGHTS).sum()) * NEAR
+    widest = float(np.abs(_WEIGHTS).sum()) * EXAMINED
     for gap in range(1, pose.size):
         first = np.flatnonzero((pose[gap:] == pose[:-gap]) & (key[gap:] - key[:-gap] < widest))
         if first.size == 0:
@@ -84,20 +81,20 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         step = q[second] - q[first]
         step = np.where(prismatic, step, step - 2 * np.pi * np.round(step / (2 * np.pi)))
         distance = np.abs(step).max(axis=1)
-        near = np.flatnonzero((distance < NEAR) & keep[first] & keep[second])
+        near = np.flatnonzero((distance < EXAMINED) & keep[first] & keep[second])
         if near.size == 0:
             continue
         first, second, step, distance = first[near], second[near], step[near], distance[near]
         target = np.ascontiguousarray(np.moveaxis(goal[pose[first], :3], 0, -1))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
-        blur = np.maximum(EXACT, 4 * np.maximum(residual[first], residual[second]))
+        blur = np.maximum(HALFWAY, 4 * np.maximum(residual[first], residual[second]))
         # How far off an answer may be itself: its next Newton step, along a valley that may well be curved.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
-        same = (distance < np.maximum(SAME, reach)) | (halfway < blur)
+        same = (distance < np.maximum(ALIKE, reach)) | (halfway < blur)
         worse = residual[second] > residual[first]
         keep[np.where(worse, second, first)[same]] = False
-        merged[pose[first[same & (distance > 1e-2 * SAME)]]] = True
+        merged[pose[first[same & (distance > 1e-2 * ALIKE)]]] = True
     return answers.take(keep), merged
 
 
@@ -109,7 +106,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     """
     number = np.bincount(answers.pose, minlength=count)
     doubtful = number > MOST
-    doubtful[answers.pose[answers.weakness > WEAK]] = True
+    doubtful[answers.pose[answers.weakness > ILL]] = True
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = _column(number)

@@ -43,14 +43,13 @@ from armkin.inverse.elimination.merge import Answers, concatenate, merge, pack, 
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.inverse.elimination.walks import Role, roles
+from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
 
 CHUNK = 256  # poses worked on at once: more of them leave the cache
 BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
-ACCEPTED = 1e-10  # residual of an answer, lengths scaled
-TOUCHING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 SHAKES = (0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
@@ -212,10 +211,7 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
         settled = np.ones(count, dtype=np.bool_)
     else:
         answers, touching, settled = _passes(elimination, goal)
-    # A closest point stands in for answers only where there are none.
-    exact = answers.residual < ACCEPTED
-    answered = np.bincount(answers.pose[exact], minlength=count) > 0
-    answers = answers.take((exact | ~answered[answers.pose]) & finite[answers.pose])
+    answers = answers.take(finite[answers.pose])
     answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack(answers, count)
     q *= np.where(closed.prismatic, closed.length, 1.0)
@@ -252,17 +248,19 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
     else:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
-    good = done.residual < (TOUCHING if careful else ACCEPTED)
+    # In later passes also what is nearly an answer, at a double root: such poses are said to be doubtful.
+    good = done.residual < (10 * GRAZING if careful else ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.
-    missed = ~good & ((seed.tilt < 1e-4) | (done.residual < (1e-5 if careful else 1e-3)))
+    near = (done.residual < 1e-5) & (seed.tilt < 1e-3) if careful else done.residual < 1e-3
+    missed = ~good & ((seed.tilt < 1e-4) | near)
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
     # A move of the pose may turn two close real roots into such a pair.
     unsure = good & (seed.tilt > 0) & (seed.tilt < 1e-4 + 10 * np.sqrt(shake))
     # A real root that was far from the answer it led to may have stood for another one.
     strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
     unsettled[seed.pose[missed | unsure | strayed]] = True
-    touching[seed.pose[touch | (done.residual > ACCEPTED) & (done.residual < 1e3 * TOUCHING)]] = True
+    touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
     answers = _answers(closed, seed.pose, done, good)
@@ -271,10 +269,13 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     close = (np.diff(answers.pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
     close &= blurred[order][1:] | blurred[order][:-1]
     unsettled[answers.pose[order][1:][close]] = True
-    key = projection(closed.prismatic, answers.q)
-    order = np.lexsort((key, answers.pose))
-    twice = (np.diff(answers.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
-    unsettled[answers.pose[order][1:][twice]] = True
+    # Two real roots that led to one answer: one of them stands for another. Of complex roots damped steps bring
+    # many to an answer that has its own.
+    real = answers.take(seed.tilt[good] == 0)
+    key = projection(closed.prismatic, real.q)
+    order = np.lexsort((key, real.pose))
+    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
+    unsettled[real.pose[order][1:][twice]] = True
     return answers, unsettled, touching
 
 
@@ -300,8 +301,8 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
         q = slides.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
-        good = done.residual < TOUCHING
-        touching[begin + pose[good & (done.residual > ACCEPTED)]] = True
+        good = done.residual < GRAZING
+        touching[begin + pose[good & (done.residual > ELIMINATED)]] = True
         found.append(_answers(closed, begin + pose, done, good))
     return concatenate(found), touching
 

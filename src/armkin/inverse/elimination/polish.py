@@ -139,33 +139,6 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     return Polished(best.T, residual, guess, weakness)
 
 
-def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False) -> tuple[Array, Array]:
-    """Move approximate solutions of a 6-joint chain onto their targets.
-
-    Args:
-        link: (7, 4, 4) the chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]`` [mm].
-        prismatic: (6,).
-        q: (M, 6) first guesses [rad | mm].
-        T: (M, 4, 4) targets [mm].
-        steps: at most so many Newton steps.
-        damped: Levenberg-Marquardt instead, for guesses that are far away or near a singularity.
-
-    Returns:
-        The best point met by each guess, (M, 6) [rad | mm, not wrapped], and its residual (M,): the
-        Frobenius norm of the pose difference, lengths divided by the sum of the links' lengths.
-    """
-    length = reach(link)
-    unit = np.where(prismatic, length, 1.0)
-    found = refine(shrink(link, length), prismatic, q / unit, shrink(T, length), steps, damped)
-    return found.q * unit, found.residual
-
-
-def reach(link: Array) -> float:
-    """Sum of the lengths of the links between and after the joints [mm], 300 if all are zero."""
-    total = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum())
-    return total if total > 0 else 300.0
-
-
 def shrink(motion: Array, length: float) -> Array:
     """Motions (..., 4, 4) with their translations divided by ``length``."""
     out = motion.copy()

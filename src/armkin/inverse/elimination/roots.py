@@ -14,11 +14,10 @@ from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
 from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.tolerances import INFINITE
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
-
-FAR = 1e4  # a prismatic value [scaled] that is a root at infinity, seen through rounding
 
 
 class Seeds(NamedTuple):
@@ -53,7 +52,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
     middle = _middle_joints(pencil, x, vectors.real[pose, :, which])
-    near = np.flatnonzero((np.abs(middle) < FAR).all(axis=0))
+    near = np.flatnonzero((np.abs(middle) < INFINITE).all(axis=0))
     if near.size < pose.size:
         pose, which, middle = pose[near], which[near], middle[:, near]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)

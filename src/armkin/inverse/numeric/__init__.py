@@ -1,1 +1,6 @@
-"""Newton corrections for any arm and task; linear algebra that outlives one singular member."""
+"""What serves every solver.
+
+tolerances.py  every tolerance
+newton.py      corrections of joint values for any arm and task
+linalg.py      linear algebra that outlives one singular member of a stack
+"""

@@ -39,10 +39,10 @@ def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     return np.where(np.isnan(size), np.inf, size)
 
 
-def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
+def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6, least: float = 1e-10) -> tuple[Array, Array]:
     """Gauss-Newton with steps of least norm: q (M, n) moved onto its targets.
 
-    Returns the best q met and its `missing`. Small singular values are left out of a step,
+    Returns the best q met and its `missing`. Singular values below `least` are left out of a step,
     so that a singular posture is approached without running away.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
@@ -56,7 +56,7 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tu
         size = np.linalg.norm(r, axis=1)
         # a singular value below the residual's own size would throw the step out of the linear range
         U, S, Vt = np.linalg.svd(J, full_matrices=False)
-        gain = np.where(np.maximum(1e-10, 0.1 * size)[:, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
+        gain = np.where(np.maximum(least, 0.1 * size)[:, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
         step = np.einsum("mij,mi->mj", Vt, gain * np.einsum("mji,mj->mi", U, r))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         q[active] += step * unit

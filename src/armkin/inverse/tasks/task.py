@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,8 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
+ROTATION = 1e-6  # largest distance from orthonormal columns that is taken for the rounding of a rotation
+ROUNDED = 1e-14  # and that needs no correction
 LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
 
 
@@ -60,11 +62,24 @@ class Task:
         return self.position + len(self.sums) + {"none": 0, "axis": 2, "full": 3}[self.orientation]
 
 
-def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Targets as a flat batch and its leading shape.
+class Targets(NamedTuple):
+    """Targets as a flat batch.
 
-    (..., m) -> (N, m), or (N, 4, 4) for poses. Raises UsageError for a wrong shape,
-    numbers that are not finite or too large, an axis of no length or a matrix that is no pose.
+    values: (N, m), or (N, 4, 4) for poses, their rotations orthonormal.  lead: the batch's shape.
+    rounding: (N,) how far the columns of a rotation given were from orthonormal.
+    """
+
+    values: Array
+    lead: tuple[int, ...]
+    rounding: Array
+
+
+def read_targets(task: Task, targets: ArrayLike) -> Targets:
+    """Targets as `ik` takes them: (..., m), or (..., 4, 4) for poses.
+
+    A pose whose rotation was rounded, to six decimals or to float32, is answered as the rotation next to
+    it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
+    length or a matrix that is no rotation to 1e-6.
     """
     values = arrays.real(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
@@ -82,11 +97,18 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
         if (length < 1e-12).any():
             raise UsageError("a target's axis ax ay az has no length; give the direction of the tool's z axis")
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
+    rounding = np.zeros(len(flat))
     if task.orientation == "full":
         for start in range(0, len(flat), arrays.CHUNK):
-            if not _are_rotations(flat[start : start + arrays.CHUNK]):
-                raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
-    return flat, lead
+            rows = slice(start, start + arrays.CHUNK)
+            rounding[rows] = _off(flat[rows])
+        if not (rounding <= ROTATION).all():
+            raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
+        some = np.flatnonzero(rounding > ROUNDED)
+        if len(some):
+            flat = flat.copy()
+            flat[some, :3, :3] = nearest_rotation(flat[some, :3, :3])
+    return Targets(flat, lead, rounding)
 
 
 @cache
@@ -105,12 +127,29 @@ def _rotation_check() -> Straight:
     return Straight(formula, 12)
 
 
-def _are_rotations(T: Array) -> bool:
-    """Whether (N, 4, 4) hold rotations to 1e-6."""
+def _off(T: Array) -> Array:
+    """How far the columns of (N, 4, 4) are from those of rotations: (N,)."""
     check = _rotation_check()
     if len(T) == 1:
-        return bool(check.single(pose.read_one(T[0]))[0] <= 1e-6)
-    return bool(check.run(pose.read(T), check.workspace(len(T)))[0].max(initial=0.0) <= 1e-6)
+        return check.single(pose.read_one(T[0]))[0]
+    return np.asarray(check.run(pose.read(T), check.workspace(len(T)))[0])
+
+
+def nearest_rotation(R: Array) -> Array:
+    """The rotations next to matrices (N, 3, 3) that are rotations to 1e-6: their orthogonal polar factors.
+
+    Two steps of Newton and Schulz, R (3 - R^T R) / 2, each of which squares the distance
+    (Higham, Functions of Matrices, 2008, eq. 8.20).
+    """
+    x, y, z = ([R[:, row, column] for row in range(3)] for column in range(3))
+    for _ in range(2):
+        xx, yy, zz = (1.5 - 0.5 * arrays.dot(v, v) for v in (x, y, z))
+        xy, yz, zx = (-0.5 * arrays.dot(u, v) for u, v in ((x, y), (y, z), (z, x)))
+        x, y, z = (
+            arrays.combine(1.0, arrays.combine(a, x, b, y), c, z)
+            for a, b, c in ((xx, xy, zx), (xy, yy, yz), (zx, yz, zz))
+        )
+    return np.moveaxis(np.array([x, y, z]), 2, 0).swapaxes(1, 2)
 
 
 def targets_of(task: Task, T: Array, q: Array) -> Array:
@@ -121,6 +160,23 @@ def targets_of(task: Task, T: Array, q: Array) -> Array:
     if task.orientation == "axis":
         parts.append(T[:, :3, 2])
     return np.concatenate(parts, axis=1)
+
+
+def moved(arm: Arm, task: Task, target: Array, by: Array) -> Array:
+    """Targets (M, m) or (M, 4, 4) moved a little; by: (6,) three [reaches], three [rad]."""
+    out = target.copy()
+    if task.orientation == "full":
+        out[:, :3, 3] += by[:3] * arm.reach
+        x, y, z = by[3:]
+        spin = np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]])
+        out[:, :3, :3] = np.linalg.qr(spin)[0] * np.sign(np.diag(np.linalg.qr(spin)[1])) @ target[:, :3, :3]
+        return out
+    out[:, : task.position] += by[: task.position] * arm.reach
+    rest = out.shape[1] - task.position
+    out[:, task.position :] += by[3 : 3 + rest]
+    if task.orientation == "axis":
+        out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
+    return out
 
 
 def distance(arm: Arm, task: Task, target: Array) -> Array:

@@ -4,11 +4,12 @@ ARM_INLINE arm_real arm_copy(arm_real value, arm_real near, arm_real lower, arm_
 {
     const arm_real low = lower - ARM_SLACK, high = upper + ARM_SLACK;
     if (lower >= -ARM_PI && upper <= ARM_PI) {
-        if (upper - lower > ARM_TURN - ARM_SLACK) { /* a whole turn: at half a turn both ends are legal */
+        if (low <= -ARM_PI || high >= ARM_PI) { /* half a turn has two copies, one or both of them legal */
             const arm_real other = value - ARM_COPYSIGN(ARM_TURN, value);
             const int half = ARM_ABS(value) > ARM_PI - ARM_SLACK;
-            const int closer = ARM_ABS(other - near) < ARM_ABS(value - near);
-            value = (half & closer) ? other : value;
+            const int legal = (value >= low) & (value <= high);
+            const int better = (other >= low) & (other <= high) & (!legal | (ARM_ABS(other - near) < ARM_ABS(value - near)));
+            value = (half & better) ? other : value;
         }
     } else {
         const arm_real moved = value + ARM_TURN * ARM_RINT((near - value) / ARM_TURN);

@@ -1,0 +1,42 @@
+"""Every tolerance of the solvers, in one place.
+
+Lengths are in units of the arm's reach, angles in rad, unless a line says otherwise.
+"""
+
+# ---- what a solution is
+SOLUTION = 1e-9  # residual up to which joint values solve a target
+ACCEPTED = 2.5e-13  # residual of a closed form's candidate that needs no correction
+NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
+SEED = 1e-3  # residual up to which a candidate of a doubtful target is
+HOPELESS = 0.3  # residual of a seed from which nothing is corrected any more
+
+# ---- when two are one
+SAME = 1e-7  # distance of joint values that rounding explains
+HAIR = 0.05  # branches this close are one if the posture between them solves the target, too
+TURNED = 1e-5  # joints that a self-motion holds differ by less along it
+
+# ---- how singular
+WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
+DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
+CLUSTER = 0.02  # candidates this close may be one root of third or fourth order
+
+# ---- closed forms, relative to the equation's own size
+TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
+FREE = 1e-18  # squared amplitude below which an equation says nothing about its angle
+TOUCHING = 1e-4  # complex roots this close to the real line may be a double root seen through rounding
+
+# ---- classes of arms
+EXACT = 1e-12  # axes parallel or meeting to this count as exactly so
+NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.nearly_special`
+STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
+FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
+
+# ---- numeric elimination, lengths in the closed loop's own unit
+ELIMINATED = 1e-10  # residual of an answer
+GRAZING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
+ALIKE = 1e-6  # answers closer than this are one
+EXAMINED = 1e-2  # answers closer than this are examined
+HALFWAY = 1e-13  # residual of a point halfway between two answers that makes them one
+ILL = 1e4  # norm of the inverse Jacobian from which on an answer is near a singularity
+INFINITE = 1e4  # a prismatic value that is a root at infinity, seen through rounding
+AT_ZERO = 1e-6  # virtual joints closer to zero than this are worth correcting

@@ -1,0 +1,219 @@
+"""What people ask: round postures, singular surfaces, rounded targets, `near` at the answer.
+
+These are samples; `python tests/bench/check_ik.py --postures --surfaces --rounded` asks thousands.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import truth
+from oracle import goal, screws
+from test_every_branch import NAMES, shipped
+
+import armkin
+from armkin import Status
+from armkin.errors import UsageError
+from armkin.inverse import singularities
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm, from_links
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+SLOW = {"jaco_j2n6s300", "moveo", "panda"}  # the elimination takes some milliseconds for each singular pose
+
+
+def load(name: str) -> Arm:
+    return armkin.load(ROBOTS / f"{name}.yaml")
+
+
+def few(name: str, many: int) -> int:
+    return many // 4 if name in SLOW else many
+
+
+# ---- samples of the tables -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_round_postures(name: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    for step in (90, 45):
+        q = truth.round_postures(arm, step, few(name, 24), seed=1)
+        target = goal(task, screw, q).array()
+        verdict = truth.judge(arm, screw, None, q, target)
+        assert verdict, f"multiples of {step}: {verdict}"
+        verdict = truth.judge(arm, screw, None, q, target, near=q)
+        assert verdict, f"multiples of {step}, near: {verdict}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_singular_surfaces(name: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    for label, q in truth.singular_postures(arm, screw, None, few(name, 12), seed=1).items():
+        target = goal(task, screw, q).array()
+        for near in (None, q):
+            verdict = truth.judge(arm, screw, None, q, target, near)
+            assert verdict, f"{label}: {verdict}"
+        verdict = truth.judge(arm, screw, None, q, truth.typed(task, target, 9))
+        verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
+        assert verdict, f"{label}, 9 digits: {verdict}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rounded_targets(name: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(2)
+    q = rng.uniform(-np.pi, np.pi, (few(name, 24), arm.n))
+    q = np.where(arm.prismatic, q * arm.reach / 10, q)
+    target = goal(task, screw, q).array()
+    for digits in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16):
+        verdict = truth.judge(arm, screw, None, q, truth.typed(task, target, digits))
+        assert verdict, f"{digits} digits: {verdict}"
+        if task.orientation == "full" and digits >= 7:
+            verdict = truth.judge(arm, screw, None, q, truth.printed(target, digits))
+            assert verdict, f"matrices of {digits} digits: {verdict}"
+
+
+# ---- what was reported -----------------------------------------------------------------------------------------
+
+
+def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
+    arm = load("puma560")
+    q = np.random.default_rng(0).uniform(-2, 2, (300, 6))
+    T = armkin.fk(arm, q)
+    for given in (np.asarray(T, np.float32), np.round(T, 7)):
+        s = armkin.ik(arm, given)
+        assert (s.valid.sum(axis=1) == 8).all()
+        assert (s.rounding > 1e-9).all()
+        assert (s.rounding < 1e-6).all()
+        R = s.target[:, :3, :3]
+        np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.tile(np.eye(3), (300, 1, 1)), atol=1e-15)
+        np.testing.assert_allclose(R, given[:, :3, :3], atol=1e-6)
+        assert np.nanmax(s.residual()[0]) < 1e-9
+        assert np.nanmax(s.residual()[1]) < 1e-12
+    assert (armkin.ik(arm, T).rounding < 1e-14).all()
+    off = T[0].copy()
+    off[0, 0] += 2e-6
+    with pytest.raises(UsageError, match="a rotation to 1e-6"):
+        armkin.ik(arm, off)
+
+
+def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor does one of an arm a thousand times as long: the closed form's own answers are accepted."""
+    asked: list[int] = []
+    examine = singularities.examine
+
+    def counted(arm: Arm, task: object, q: np.ndarray, *rest: object) -> object:
+        asked.append(len(q))
+        return examine(arm, task, q, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(singularities, "examine", counted)
+    arm = load("puma560")
+    q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
+    link = arm.link.copy()
+    link[:, :3, 3] *= 1000
+    for one in (arm, from_links(link, arm.prismatic)):
+        s = armkin.ik(one, np.asarray(armkin.fk(one, q)), "pose")
+        assert (s.valid.sum(axis=1) == 8).all()
+        s = armkin.ik(one, np.round(armkin.fk(one, q), 7), "pose")
+        assert (s.valid.sum(axis=1) == 8).all()
+    assert sum(asked) <= 8
+
+
+@pytest.mark.parametrize("q", [[0, -90, 0, -90, 0, 90], [180, 180, 0, 180, 180, 180], [-90, -90, 0, 0, 180, -90]])
+def test_compound_singularities_of_a_ur5e(q: list[float]) -> None:
+    arm = load("ur5e")
+    joints = np.radians(q)
+    s = armkin.ik(arm, armkin.fk(arm, joints))
+    assert s.status in (Status.SINGULAR, Status.BOUNDARY)  # stretched straight up it cannot move
+    assert s.valid.any()
+    assert {"J2", "J3", "J4", "J6"} >= {name for name, free in zip(arm.joint_names, s.free, strict=True) if free}
+    s = armkin.ik(arm, armkin.fk(arm, joints), near=joints)
+    np.testing.assert_allclose(s.q[s.best], joints, atol=1e-12)
+
+
+def test_near_as_a_batch_is_near_one_by_one() -> None:
+    arm = load("ur5e")
+    rng = np.random.default_rng(4)
+    T = armkin.fk(arm, rng.uniform(-np.pi, np.pi, (300, 6)))
+    near = rng.uniform(arm.lower, arm.upper, (300, 6))
+    many = armkin.ik(arm, T, near=near)
+    for k in range(300):
+        one = armkin.ik(arm, T[k], near=near[k])
+        assert many.valid[k].sum() == one.valid.sum()
+        np.testing.assert_allclose(many.q[k][many.valid[k]], one.q[one.valid], atol=1e-9)
+        assert (many.within_limits[k][many.valid[k]] == one.within_limits[one.valid]).all()
+        assert many.best[k] == one.best
+
+
+def test_copies_are_the_legal_ones_nearest_to_near() -> None:
+    """Against all copies, for limits of every kind."""
+    from armkin.inverse.branches.turns import nearest_copy
+
+    rng = np.random.default_rng(5)
+    value = np.concatenate([rng.uniform(-np.pi, np.pi, 300), [np.pi, -np.pi, 0.0]])
+    near = rng.uniform(-10, 10, len(value))
+    turns = value[:, None] + 2 * np.pi * np.arange(-6, 7)
+    for low, high in ((-np.pi, 2.0), (-2.0, np.pi), (-np.pi, np.pi), (-7, 1), (-1, 7), (-20, 20), (2, 5), (-9, -4)):
+        copy, ok = nearest_copy(value, near, float(low), float(high))
+        legal = (turns >= low - 1e-9) & (turns <= high + 1e-9)
+        assert (np.broadcast_to(ok, value.shape) == legal.any(axis=1)).all(), (low, high)
+        apart = np.where(legal, np.abs(turns - near[:, None]), np.inf).min(axis=1)
+        some = legal.any(axis=1)
+        np.testing.assert_allclose(np.abs(copy - near)[some], apart[some], atol=1e-9)
+        np.testing.assert_allclose(copy[~some], value[~some], atol=1e-12)
+
+
+def test_two_roots_a_hair_apart_are_one_branch() -> None:
+    arm = load("three_dof")
+    s = armkin.ik(arm, [342.9180457599, 209.5308314133, 383.6095610676])
+    assert s.status == Status.BOUNDARY
+    assert s.valid.sum() == 2  # left and right, each with its elbow straight
+    rng = np.random.default_rng(6)
+    q = rng.uniform(-3, 3, (400, 3))
+    q[:, 2] = 0.0
+    T = armkin.fk(arm, q)[:, :3, 3]
+    for digits in (9, 10, 12):
+        s = armkin.ik(arm, np.round(T, digits))
+        inside = s.status != Status.UNREACHABLE
+        assert (s.valid.sum(axis=1)[inside] == 2).all()
+        assert (s.status[inside] == Status.BOUNDARY).all()
+
+
+def test_a_lost_branch_is_no_complete_answer() -> None:
+    """A JACO posture with an isolated branch of singular value 9e-4, beside a singular one."""
+    arm = load("jaco_j2n6s300")
+    screw = screws(arm.file)
+    task, _ = solver(arm, None)
+    q = np.radians([[0, -90, 90, 90, 0, -90]])
+    target = goal(task, screw, q).array()
+    verdict = truth.judge(arm, screw, None, q, target)
+    truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 250, 1)
+    assert verdict
+
+
+@pytest.mark.parametrize("name", ["three_dof", "puma560", "stanford", "jaco_j2n6s300"])
+def test_the_fifth_call_is_the_first_bit_for_bit(name: str) -> None:
+    arm = load(name)
+    q = np.random.default_rng(8).uniform(-1, 1, (40, arm.n))
+    q = np.where(arm.prismatic, 300 * q, q)
+    task, _ = solver(arm, None)
+    T = goal(task, screws(arm.file), q).array()
+    first, few = armkin.ik(arm, T[0]).q.tobytes(), armkin.ik(arm, T).q.tobytes()
+    armkin.ik(arm, np.repeat(T, 4, axis=0))  # enough to be recorded
+    for _ in range(5):
+        assert armkin.ik(arm, T[0]).q.tobytes() == first
+        assert armkin.ik(arm, T).q.tobytes() == few
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5e", "jaco_j2n6s300", "moveo"])
+def test_random_poses_are_complete(name: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    q = np.random.default_rng(9).uniform(-np.pi, np.pi, (500, arm.n))
+    s = armkin.ik(arm, goal(task, screw, q).array())
+    assert s.complete.mean() >= 0.99

@@ -1,0 +1,249 @@
+"""What people ask: round postures, singular surfaces, rounded targets; and whether the answers are true.
+
+A posture asked for must come back as a branch, or lie on a self-motion that the answer reports. All judgements
+are made with the oracle's screws, never with armkin's own chain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import oracle
+from numpy.typing import NDArray
+from oracle import Goal, Screws
+
+import armkin
+from armkin import Status
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm
+from armkin.model.rotation import rpy
+
+Array = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+SOLVES = 1e-9  # residual in lengths of the arm's reach and in rad that makes a posture a solution
+CLOSE = 0.2  # [rad, sizes] branches this close may be one
+
+
+# ---- postures ----------------------------------------------------------------------------------------------
+
+
+def round_postures(arm: Arm, step: float, most: int, seed: int = 0) -> Array:
+    """Joint values that are multiples of step [deg]; slides anywhere within their limits, or up to half a reach."""
+    rng = np.random.default_rng([seed, int(step)])
+    turns = round(360 / step)
+    total = turns**arm.n
+    pick = rng.choice(total, most, replace=False) if total > most else np.arange(total)
+    index = np.stack(np.unravel_index(pick, [turns] * arm.n), axis=1) - turns // 2 + 1
+    low, high = np.maximum(arm.lower, -arm.reach / 2), np.minimum(arm.upper, arm.reach / 2)
+    return np.where(arm.prismatic, rng.uniform(low, high, index.shape), np.radians(index * step))
+
+
+def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, seed: int = 0) -> dict[str, Array]:
+    """Postures on the arm's singular surfaces, by the joint that leads there from a random posture.
+
+    A joint at a multiple of 90 degrees where the Jacobian has no full rank whatever the others are; and the
+    zeros and minima of its smallest singular value along each joint.
+    """
+    rng = np.random.default_rng(seed)
+    definition, _ = solver(arm, task)
+
+    def weak(q: Array) -> Array:
+        return oracle.weakness(screw, oracle.goal(definition, screw, q), q)
+
+    def anywhere(k: int) -> Array:
+        q = rng.uniform(-np.pi, np.pi, (k, arm.n))
+        return np.where(arm.prismatic, q / np.pi * arm.reach / 2, q)
+
+    found = {}
+    for joint in range(arm.n):
+        if arm.prismatic[joint]:
+            continue
+        for value in (0.0, 90.0, 180.0, -90.0):
+            q = anywhere(count)
+            q[:, joint] = np.radians(value)
+            if weak(q[:20]).max() < 1e-12:
+                found[f"{arm.joint_names[joint]} = {value:g}"] = q
+        # from random postures on to the nearest minimum of the smallest singular value along this joint
+        q = anywhere(3 * count)
+        line = np.linspace(-0.3, 0.3, 13)
+        grid = np.repeat(q[:, None], len(line), axis=1)
+        grid[:, :, joint] += line
+        size = weak(grid.reshape(-1, arm.n)).reshape(len(q), -1)
+        k = size.argmin(axis=1)
+        inside = (k > 0) & (k < len(line) - 1) & (size.min(axis=1) < 0.5 * size.max(axis=1))
+        q, centre = q[inside], line[k[inside]]
+        low, high = centre - 0.05, centre + 0.05
+        for _ in range(60):  # golden section; the minimum of |x| is found to rounding
+            a, b = high - 0.618034 * (high - low), low + 0.618034 * (high - low)
+            qa, qb = q.copy(), q.copy()
+            qa[:, joint] += a
+            qb[:, joint] += b
+            left = weak(qa) < weak(qb)
+            low, high = np.where(left, low, a), np.where(left, b, high)
+        q[:, joint] += 0.5 * (low + high)
+        on = weak(q) < 1e-7
+        if on.sum() >= 5:
+            found[f"{arm.joint_names[joint]} moved"] = q[on][:count]
+    return found
+
+
+# ---- targets -----------------------------------------------------------------------------------------------
+
+
+def rounded(values: Array, digits: int) -> Array:
+    """Numbers as printed with that many significant digits; 7.5 of them stand for float32."""
+    if digits == 7.5:
+        return np.asarray(values, dtype=np.float32).astype(float)
+    text = [f"{v:.{int(digits)}g}" for v in np.ravel(values)]
+    return np.array([float(t) for t in text]).reshape(np.shape(values))
+
+
+def typed(task: Any, target: Array, digits: float) -> Array:
+    """Targets as typed with that many digits: angles in degrees, orientations as roll, pitch, yaw."""
+    if task.orientation == "full":
+        angles = rounded(np.degrees(rpy(target[:, :3, :3])), digits)
+        out = np.zeros_like(target)
+        out[:, 3, 3] = 1.0
+        out[:, :3, 3] = rounded(target[:, :3, 3], digits)
+        for k, (roll, pitch, yaw) in enumerate(angles):
+            R = oracle.rotation("z", yaw) @ oracle.rotation("y", pitch) @ oracle.rotation("x", roll)
+            out[k, :3, :3] = R[:3, :3]
+        return out
+    unit = np.ones(target.shape[1])
+    last = task.position + len(task.sums)
+    unit[task.position : last] = 180 / np.pi
+    return rounded(target * unit, digits) / unit
+
+
+def printed(target: Array, digits: float) -> Array:
+    """Matrices (N, 4, 4) whose entries were printed with that many decimals, or went through float32 (7.5)."""
+    return np.asarray(target, dtype=np.float32).astype(float) if digits == 7.5 else np.round(target, int(digits))
+
+
+def goal_of(task: Any, target: Array) -> Goal:
+    """Targets as the oracle's constraints."""
+    T = np.tile(np.eye(4), (len(target), 1, 1))
+    sums = np.zeros((len(target), len(task.sums)))
+    if task.orientation == "full":
+        U, _, Vt = np.linalg.svd(target[:, :3, :3])
+        T = target.copy()
+        T[:, :3, :3] = U @ Vt
+    else:
+        T[:, : task.position, 3] = target[:, : task.position]
+        sums = target[:, task.position : task.position + len(task.sums)]
+    if task.orientation == "axis":
+        z = target[:, 3:] / np.linalg.norm(target[:, 3:], axis=1, keepdims=True)
+        x = np.cross(z, np.eye(3)[np.abs(z).argmin(axis=1)])
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        T[:, :3, :3] = np.stack([x, np.cross(z, x), z], axis=2)
+    return Goal(task.position, task.sums, task.offsets, task.orientation, T, sums)
+
+
+# ---- judgement ---------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Verdict:
+    """Rows of targets whose answers are wrong, by what is wrong with them."""
+
+    count: int
+    solutions: Any
+    unreachable: list[int] = field(default_factory=list)  # called so though a posture solves it
+    lost: list[int] = field(default_factory=list)  # the posture asked for is no branch and on no reported self-motion
+    false: list[int] = field(default_factory=list)  # a branch that misses the target
+    twice: list[int] = field(default_factory=list)  # two branches, and the posture between them solves the target
+    moves: list[int] = field(default_factory=list)  # `near` solves the target, and the best branch is another one
+    missed: list[tuple[int, Array]] = field(default_factory=list)  # the oracle's isolated branch, complete claimed
+
+    def __bool__(self) -> bool:
+        return not (self.unreachable or self.lost or self.false or self.twice or self.moves or self.missed)
+
+    def __str__(self) -> str:
+        kinds = ("unreachable", "lost", "false", "twice", "moves", "missed")
+        parts = [f"{len(getattr(self, k))} {k} (first: {getattr(self, k)[0]})" for k in kinds if getattr(self, k)]
+        s = self.solutions
+        share = f"complete {s.complete.mean():.3f}, singular {(s.status == Status.SINGULAR).mean():.3f}"
+        return f"{self.count} targets: {'; '.join(parts) or 'all true'}; {share}"
+
+
+def miss_of(arm: Arm, screw: Screws, goals: Goal, q: Array) -> Array:
+    """What joint values (M, n) miss, lengths in the arm's reach: (M,)."""
+    mm, rad = oracle.missing(screw, goals, q)
+    # of a whole orientation that is the norm of nine entries, the angle times the root of two
+    return np.hypot(mm / arm.reach, rad / (np.sqrt(2) if goals.orientation == "full" else 1.0))
+
+
+def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, near: Array | None = None) -> Verdict:
+    """Solve targets (N, ..) near the postures q (N, n) that they were made from, perhaps rounded."""
+    definition, _ = solver(arm, task)
+    s = armkin.ik(arm, target, task) if near is None else armkin.ik(arm, target, task, near=near)
+    goals = goal_of(definition, target)
+    # what the posture asked for becomes at the rounded target: itself if it solves it, else where Newton leads it
+    asked, left = oracle.newton(screw, goals, q, 60)
+    itself = miss_of(arm, screw, goals, q) < 0.5 * SOLVES
+    asked[itself] = q[itself]
+    reached = itself | (left < 1e-12)
+    verdict = Verdict(len(q), s)
+    none = ~s.valid.any(axis=1)
+    verdict.unreachable = np.flatnonzero(reached & (none | (s.status == Status.UNREACHABLE))).tolist()
+    rows, columns = np.nonzero(s.valid)
+    miss = np.zeros(s.valid.shape)
+    miss[rows, columns] = miss_of(arm, screw, goals.take(rows), s.q[rows, columns])
+    verdict.false = np.flatnonzero((miss > 1.1 * SOLVES).any(axis=1)).tolist()
+    unit = np.where(screw.prismatic, 1 / screw.size, 1.0)
+
+    def apart(a: Array, b: Array) -> Array:
+        d = a - b
+        return np.abs(np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))) * unit
+
+    d = apart(s.q, asked[:, None])
+    here = np.nan_to_num(d.max(axis=2), nan=np.inf).min(axis=1, initial=np.inf)
+    weak = oracle.weakness(screw, goals, asked)
+    # as far as a posture is determined: its residual over the smallest singular value, or the root of it at a fold
+    known = here < 1e-6 + np.minimum(1e-9 / np.maximum(weak, 1e-300), 1e-3)
+    held = np.nan_to_num(np.where(s.free[:, None], 0.0, d).max(axis=2), nan=np.inf)
+    on_curve = (s.status == Status.SINGULAR) & (np.where(s.valid, held, np.inf).min(axis=1, initial=np.inf) < 1e-4)
+    for k in np.flatnonzero(reached & ~none & ~known & ~on_curve):
+        # one with a branch further away, if the postures between them solve the target, too
+        b = int(np.nan_to_num(d[k].max(axis=1), nan=np.inf).argmin())
+        if not _joined(arm, screw, goals.take([k]), asked[k], s.q[k, b], (0.25, 0.5, 0.75)):
+            verdict.lost.append(int(k))
+    B = s.q.shape[1]
+    for i in range(B):
+        for j in range(i):
+            with np.errstate(invalid="ignore"):
+                pair = np.flatnonzero(apart(s.q[:, i], s.q[:, j]).max(axis=1) < CLOSE)
+            for k in pair:
+                if _joined(arm, screw, goals.take([k]), s.q[k, i], s.q[k, j]):
+                    verdict.twice.append(int(k))
+    if near is not None:
+        there = np.broadcast_to(near, q.shape)
+        solves = miss_of(arm, screw, goals, there) < 0.5 * SOLVES
+        legal = ((there >= arm.lower - 1e-9) & (there <= arm.upper + 1e-9)).all(axis=1)
+        best = np.take_along_axis(s.q, np.maximum(s.best, 0)[:, None, None], axis=1)[:, 0]
+        stays = (s.best >= 0) & (np.abs((best - there) * unit).max(axis=1) < 1e-6)
+        verdict.moves = np.flatnonzero(solves & legal & ~stays).tolist()
+    return verdict
+
+
+def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array, parts: tuple[float, ...] = (0.5,)) -> bool:
+    """Whether the postures between two solve the target."""
+    d = b - a
+    d = np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+    return all(miss_of(arm, screw, goals, (a + part * d)[None])[0] < 0.9 * SOLVES for part in parts)
+
+
+def ask_oracle(arm: Arm, screw: Screws, verdict: Verdict, target: Array, rows: Array, starts: int, seed: int) -> None:
+    """Add to the verdict the isolated branches (sigma > 1e-6) that the oracle knows and a `complete` answer lacks."""
+    s = verdict.solutions
+    goals = goal_of(s.task, target).take(rows)
+    for row, known in zip(rows, oracle.branches(screw, goals, starts, seed), strict=True):
+        if not len(known) or not s.complete[row]:
+            continue
+        one = goal_of(s.task, target[row : row + 1]).take(np.zeros(len(known), int))
+        strong = oracle.weakness(screw, one, known) > 1e-6
+        d = oracle.distance(screw, known[:, None], s.q[row][None]).min(axis=1, initial=np.inf)
+        verdict.missed += [(int(row), q) for q in known[strong & (d > 1e-4)]]
