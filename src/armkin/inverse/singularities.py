@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
@@ -238,8 +239,8 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
 
     Steps along each null direction, both ways, pulled back onto the target: on a self-motion
     they stay about as far from q as they went, and apart; from a double root they fall back, and
-    from a branch of weak Jacobian they may arrive at its neighbour. The residual may grow by so much that
-    it stays below `SOLUTION` over a whole radian: a target that close to a singular one is singular.
+    from a branch of weak Jacobian they may arrive at its neighbour. The residual may grow by `GROWTH`: a
+    target that close to a singular one is singular.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
@@ -255,7 +256,7 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
                 moved = np.abs(far - q[who]) / unit
                 least = 0.3 * step * np.abs(direction).max(axis=1)
                 apart = (np.abs(far - mid) / unit).max(axis=1) > 0.3 * least
-                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) <= here[who] + SOLUTION * STEP)
+                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) <= here[who] + GROWTH * STEP)
                 which |= moved > 1e-3 * STEP
             moving[who] |= along
             joints[who] |= along[:, None] & which
@@ -265,12 +266,20 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
     """Which branches to push, and where: (m,) indices and (m, n) directions.
 
-    In a null space of several dimensions a self-motion may hide between the basis vectors:
-    there every joint is pushed as far as the null space lets it.
+    In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
+    is pushed as far as the null space lets it, and in a plane of them every joint is held.
     """
     for index in range(int(nullity.max())):
         who = np.flatnonzero(nullity > index)
         yield who, V[who, n - 1 - index]
+    plane = np.flatnonzero(nullity == 2)
+    for joint in range(n if len(plane) else 0):
+        u, v = V[plane, n - 1], V[plane, n - 2]
+        hold = v[:, joint, None] * u - u[:, joint, None] * v
+        size = np.linalg.norm(hold, axis=1)
+        some = size > 0.1
+        if some.any():
+            yield plane[some], hold[some] / size[some, None]
     many = np.flatnonzero(nullity > 1)
     for joint in range(n if len(many) else 0):
         in_null = np.arange(n) >= n - nullity[many][:, None]
