@@ -9,8 +9,6 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from armkin.teach.server import Server
-
 _OPTIONS = (
     "--no-sandbox",
     "--disable-dev-shm-usage",
@@ -35,7 +33,7 @@ def chromium() -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(browser: Browser, server: Server, **settings: object) -> Iterator[Page]:
+def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]:
     """A page, open and drawn; script: runs before the page's own; quiet: it complains of nothing. It must
     not ask another machine for anything."""
     viewport = settings.pop("viewport", {"width": 1000, "height": 760})
@@ -49,8 +47,8 @@ def opened(browser: Browser, server: Server, **settings: object) -> Iterator[Pag
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
-    base = server.address.split("#")[0]
-    page.goto(server.address)
+    base = address.split("#")[0]
+    page.goto(address)
     page.wait_for_selector("html[data-ready]")
     yield page
     context.close()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import json
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -38,6 +40,20 @@ def served(robot: str | Path = "three_dof", board: str | None = None) -> Iterato
     path = robot if isinstance(robot, Path) else ROOT / f"robots/{robot}.yaml"
     with serving(Desk(armkin.load(str(path)), board)) as server:
         yield server
+
+
+@contextmanager
+def teaching(*words: str) -> Iterator[str]:
+    """`armkin teach` as a process of its own, as people start it; its address."""
+    command = [sys.executable, "-m", "armkin", "teach", *words, "--no-open"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.terminate()
+        assert process.communicate(timeout=20)[1] == ""
+        assert process.returncode == 143
 
 
 def port(server: Server) -> int:

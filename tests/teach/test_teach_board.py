@@ -19,7 +19,9 @@ import pytest
 from emulator import EmulatedBoard
 from served import Page, served
 
+import armkin
 from armkin.board.firmware.session import Session
+from armkin.model import units
 from command_line import ROOT, run
 
 POSE = [-30, 5, -5]
@@ -217,6 +219,31 @@ def test_a_port_that_is_none(tmp_path: Path) -> None:
         assert not state["connected"]
         assert "no port" in state["error"]
         assert page.act("look", q=HOME)[0] == 200
+        page.close()
+
+
+@pytest.mark.parametrize(("robot", "differs"), [("three_dof_grbl", "GRBL has no checksum"), ("bus_arm", "degree")])
+def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
+    arm = armkin.load(str(ROOT / f"tests/robots/{robot}.yaml"))
+    goal = units.home_out(arm)
+    goal[0] += 10
+    with served(ROOT / f"tests/robots/{robot}.yaml", "sim") as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        state = page.idle()
+        assert (state["position"], state["error"]) == ("known", "")
+        assert any(differs in text for text in state["differences"])
+        assert page.act("send", q=goal, speed=100)[0] == 200
+        assert page.idle()["error"] == ""
+        assert page.idle()["joints"] == pytest.approx(goal, abs=1)
+        assert page.act("jog", joint=0, percent=-20)[0] == 200
+        state = page.idle()
+        assert state["error"] == ""
+        assert state["joints"][0] < goal[0] - 1
+        assert page.act("stop")[0] == 200
+        assert page.idle()["position"] == "known"
+        assert page.act("home")[0] in (200, 422)
+        page.idle()
         page.close()
 
 

@@ -15,7 +15,7 @@ from browsing import aim, chromium, idle, opened, settled, until, value, values
 from emulator import EmulatedBoard
 from matplotlib import image
 from playwright.sync_api import Browser, Page
-from served import served
+from served import served, teaching
 
 import armkin
 from armkin.teach.server import Server
@@ -38,7 +38,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def page(browser: Browser, server: Server) -> Iterator[Page]:
-    with opened(browser, server) as one:
+    with opened(browser, server.address) as one:
         yield one
 
 
@@ -47,7 +47,7 @@ def net(board: EmulatedBoard) -> list[int]:
 
 
 def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
-    with EmulatedBoard() as board, served(board=board.port) as server, opened(browser, server) as page:
+    with EmulatedBoard() as board, teaching("three_dof", "--port", board.port) as url, opened(browser, url) as page:
         until(page, "document.querySelector('#standing').textContent.includes('position lost')")
         # Choose a branch of a target; the pulses are the command line's.
         aim(page, 390, 80, 300)
@@ -72,8 +72,11 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
         # STOP on the way home: the position stays known.
         page.get_by_role("button", name="home", exact=True).click()
+        page.fill("#speed", "20")
         page.click("#send")
         until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        while net(board)[1] < COUNTS[1] + 200:
+            page.wait_for_timeout(20)
         page.click("#stop")
         idle(page, "stopped")
         at = net(board)
@@ -99,13 +102,14 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         aim(page, 390, 80, 300)
         page.click("#record")
         page.wait_for_selector("#name-1")
+        page.fill("#speed", "100")
         page.click("#run")
         idle(page, "run: done")
         assert net(board) == COUNTS
 
 
 def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
-    with served(board="sim") as server, opened(browser, server) as page:
+    with served(board="sim") as server, opened(browser, server.address) as page:
 
         def tab_to(selector: str) -> None:
             for _ in range(120):
@@ -154,6 +158,9 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.keyboard.press("p")
         until(page, "document.querySelector('#play').textContent === 'Play'")
         # The board: send by Enter, STOP by Esc, jog while the space bar is down.
+        tab_to("#speed")
+        page.keyboard.type("10")
+        page.evaluate("document.activeElement.blur()")
         tab_to("#send")
         page.keyboard.press("Enter")
         until(page, "document.querySelector('#standing').textContent.startsWith('send')")
@@ -209,7 +216,7 @@ def test_what_cannot_be_reached_is_said(page: Page) -> None:
 
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, colours: str) -> None:
-    with served(board="sim") as server, opened(browser, server, color_scheme=colours) as page:
+    with served(board="sim") as server, opened(browser, server.address, color_scheme=colours) as page:
         aim(page, 390, 80, 300)
         page.click("#record")
         page.wait_for_selector("#name-0")
@@ -227,7 +234,7 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, co
 def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> None:
     """ARMKIN_UPDATE_SNAPSHOTS=1 takes it anew."""
     picture, now = ROOT / "docs/teach.png", tmp_path / "teach.png"
-    with served("ur5e") as server, opened(browser, server, viewport={"width": 1280, "height": 800}) as page:
+    with served("ur5e") as server, opened(browser, server.address, viewport={"width": 1280, "height": 800}) as page:
         for k, angle in enumerate((20, -70, 80, -60, 70, 10)):
             page.fill(f"#box-{k}", str(angle))
         page.keyboard.press("Tab")
@@ -246,7 +253,7 @@ def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
 
 
 def test_a_telephone_s_window(browser: Browser, server: Server) -> None:
-    with opened(browser, server, viewport={"width": 390, "height": 800}, has_touch=True) as page:
+    with opened(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         page.locator("#motors").scroll_into_view_if_needed()
         box = page.locator("#stop").bounding_box()
@@ -258,7 +265,7 @@ def test_a_telephone_s_window(browser: Browser, server: Server) -> None:
 
 def test_without_webgl_everything_else_works(browser: Browser) -> None:
     blind = "HTMLCanvasElement.prototype.getContext = () => null"
-    with served(board="sim") as server, opened(browser, server, script=blind, quiet=False) as page:
+    with served(board="sim") as server, opened(browser, server.address, script=blind, quiet=False) as page:
         assert page.is_visible("#flat")
         aim(page, 390, 80, 300)
         page.get_by_role("radio", name="left, elbow up").click()
@@ -269,7 +276,7 @@ def test_without_webgl_everything_else_works(browser: Browser) -> None:
 
 
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
-    with served(board="sim") as server, opened(browser, server) as page:
+    with served(board="sim") as server, opened(browser, server.address) as page:
         base = server.address.split("/#")[0]
         asked: list[str] = []
         before = server.desk.act
@@ -306,10 +313,15 @@ def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: P
 
 
 def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
-    with served(board="sim") as server, opened(browser, server) as first, opened(browser, server) as second:
+    with (
+        served(board="sim") as server,
+        opened(browser, server.address) as first,
+        opened(browser, server.address) as second,
+    ):
         until(second, "document.querySelector('#control').textContent.includes('another page')")
         assert second.evaluate("document.querySelector('#panels').inert")
         aim(first, 390, 80, 300)
+        first.fill("#speed", "20")
         until(second, "document.querySelector('#box-0').value === '10.1529'")
         first.click("#send")
         until(second, "document.querySelector('#standing').textContent.startsWith('send')")
@@ -345,7 +357,7 @@ def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("robot", ["ur5e", "cobra600", "moveo", "panda", "pan_tilt"])
 def test_other_arms_have_their_page(browser: Browser, robot: str) -> None:
-    with served(robot) as server, opened(browser, server) as page:
+    with served(robot) as server, opened(browser, server.address) as page:
         settled_text = page.inner_text("#answer")
         count = len(page.locator("#branches button").all())
         if robot == "pan_tilt":

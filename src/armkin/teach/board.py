@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.board import following
+from armkin.board.feetech.machine import ServoMachine
 from armkin.board.firmware import gripping, homing, jogging
+from armkin.board.firmware.machine import Machine
+from armkin.board.foreign import Foreign
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits
 from armkin.teach import guard
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.machine import Machine
+    from armkin.board.backend import Backend
     from armkin.formula.arrays import Array
     from armkin.motion.path_plan import PathPlan
     from armkin.teach.pilot import Pilot
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
 FOLLOW_SPEED = 0.15  # of every joint's max_speed
 FOLLOW_HOP = 5.0  # [deg | 2 mm] of the joint that moves farthest: where the arm stops and looks for its goal again
+FOREIGN_JOG = 0.3  # [s] of one piece of a jog on a board that cannot be told to go on
 _LONGEST_JOG = 60.0  # [s]
 
 
@@ -93,7 +97,7 @@ class Board:
             raise UsageError("say first that the arm stands in its home pose")
         self.check_file()
 
-        def job(machine: Machine) -> None:
+        def job(machine: Backend) -> None:
             machine.prepare(assume_home=True)
 
         self.pilot.submit("assume home", job)
@@ -101,9 +105,11 @@ class Board:
 
     def home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Find the limit switches."""
-        homing.searches(self.arm, self.pilot.configuration)
+        board = self.pilot.board
+        if not isinstance(board, Foreign):
+            homing.searches(self.arm, board)
         self.check_file()
-        self.pilot.submit("home", homing.home)
+        self.pilot.submit("home", self._home)
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -133,7 +139,9 @@ class Board:
         if isinstance(value, str) and value not in ("open", "closed"):
             raise UsageError("value: expected open, closed or a number")
         wanted = value if isinstance(value, str) else guard.number(fields, "value", -1e6, 1e6)
-        gripping.count_of(gripping.gripper_of(self.arm.name, self.pilot.configuration), wanted)
+        board = self.pilot.board
+        if not isinstance(board, Foreign):
+            gripping.count_of(gripping.gripper_of(self.arm.name, board), wanted)
         assume = guard.flag(fields, "assume")
         self.check_file()
         self.pilot.submit("grip", lambda machine: self._grip(machine, wanted, assume))
@@ -163,51 +171,76 @@ class Board:
         if self.arm.path and load(self.arm.path).sha256 != self.arm.sha256:
             raise FileError(f"{self.arm.path} has changed: start armkin teach again, the arm was not moved")
 
-    def run(self, machine: Machine, goals: Array, speed: float) -> None:
+    def run(self, machine: Backend, goals: Array, speed: float) -> None:
         """Move through joint values (w, n), stopping at each."""
         self.prepare(machine)
         machine.run([machine.plan(machine.counts(), goals, speed=speed)], self._progress)
 
-    def prepare(self, machine: Machine) -> None:
+    def prepare(self, machine: Backend) -> None:
         """Switch the motors on; LinkError if the position is lost."""
-        if machine.position() == "lost" and not machine.session.port.simulated:
+        if machine.position() == "lost" and not machine.port.simulated:
             raise LinkError(
                 "the arm's position is lost: home it, or put it in its home pose and say so; it was not moved"
             )
         machine.prepare()
 
-    def _run_program(self, machine: Machine, speed: float) -> None:
+    def _run_program(self, machine: Backend, speed: float) -> None:
         """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
-        following.check_gripper(plan, machine.configuration)
+        following.check_gripper(plan, self.pilot.board)
         laid = following.parts(plan, machine.counts(), machine.lay)
         following.follow(machine, plan, laid, self._progress)
 
-    def _grip(self, machine: Machine, value: str | float, assume: bool) -> None:
-        gripper = gripping.gripper_of(self.arm.name, self.pilot.configuration)
-        known = gripping.known(machine, gripper)
-        if not known and not assume and not machine.session.port.simulated:
+    def _home(self, machine: Backend) -> None:
+        if isinstance(self.pilot.board, Foreign):
+            self.pilot.board.home(machine)
+        else:
+            assert isinstance(machine, Machine)
+            homing.home(machine)
+
+    def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
+        if isinstance(machine, ServoMachine):
+            gripper = self.arm.gripper
+            if gripper is None:
+                raise UsageError(f"{self.arm.name} has no gripper; add gripper: to its robot file")
+            machine.grip(
+                gripper, {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
+            )
+            return
+        if not isinstance(machine, Machine):
+            raise UsageError(f"a gripper needs a board with armkin's firmware, not {self.pilot.board.board.kind}")
+        grip = gripping.gripper_of(self.arm.name, machine.configuration)
+        known = gripping.known(machine, grip)
+        if not known and not assume and not machine.port.simulated:
             raise LinkError(
                 "the gripper's position is lost: say first that it stands open\n"
                 "a servo jumps there at once, at its full speed: keep your fingers out"
             )
-        gripping.prepare(machine, gripper, gripper.open if assume and not known else None)
-        gripping.grip(machine, gripper, gripping.count_of(gripper, value))
+        gripping.prepare(machine, grip, grip.open if assume and not known else None)
+        gripping.grip(machine, grip, gripping.count_of(grip, value))
 
-    def _move(self, machine: Machine, q: Array, speed: float) -> None:
+    def _move(self, machine: Backend, q: Array, speed: float) -> None:
         self.run(machine, q[None], speed)
 
-    def _jog(self, machine: Machine, joint: int, percent: float) -> None:
-        jogging.prepare(machine)
+    def _jog(self, machine: Backend, joint: int, percent: float) -> None:
         share = percent / 100
+        top = float(self.arm.max_speed[joint])
+        if isinstance(self.pilot.board, Foreign):
+            while time.monotonic() < self._alive:
+                end = time.monotonic() + FOREIGN_JOG
+                self.pilot.board.jog(machine, joint, share * top, FOREIGN_JOG)
+                while time.monotonic() < min(end, self._alive) and not self.pilot.stopping:
+                    time.sleep(0.01)  # a simulated one is there at once
+            return
+        assert isinstance(machine, Machine)
+        jogging.prepare(machine)
         if machine.position() == "lost":
             share = float(np.clip(share, -1 / jogging.SLOW, 1 / jogging.SLOW))
-        top = float(units.joints_out(self.arm, self.arm.max_speed)[joint])
-        rates = jogging.rates(machine, joint, share * top)
-        machine.jog(rates, _LONGEST_JOG, more=lambda: time.monotonic() < self._alive)
+        speed = share * float(units.joints_out(self.arm, self.arm.max_speed)[joint])
+        machine.jog(jogging.rates(machine, joint, speed), _LONGEST_JOG, more=lambda: time.monotonic() < self._alive)
 
-    def _follow(self, machine: Machine) -> None:
+    def _follow(self, machine: Backend) -> None:
         """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""
         scale = np.where(self.arm.prismatic, 0.5, 180 / np.pi) / FOLLOW_HOP
         while self.follows and self._goal is not None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Desk:
     """What the pages of one run share: the arm, the pose they show, who holds control."""
 
-    def __init__(self, arm: Arm, port: str | None = None, baud: int = 250_000) -> None:
+    def __init__(self, arm: Arm, port: str | None = None, baud: int | None = None) -> None:
         """port: of a board, as `armkin send` takes it. Raises UsageError if the robot file says too little for it."""
         self.arm = arm
         self.board: Board | None = None

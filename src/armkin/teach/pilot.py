@@ -12,21 +12,23 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from armkin.board.backend import StoppedError
+from armkin.board.backend import Backend, StoppedError
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
+from armkin.board.foreign import Foreign, foreign
 from armkin.board.opening import open_port
-from armkin.board.ports import SIM
+from armkin.board.ports import BAUD, SIM, SerialPort
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach.guard import RefusedError
 
 if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
 
-Job = Callable[[Machine], None]
+Job = Callable[[Backend], None]
 
 _POLL = 0.25  # [s] between two looks at a board that stands
 _TELL = 0.08  # [s] between two positions of an arm that moves: what a page can draw
@@ -35,12 +37,12 @@ _TELL = 0.08  # [s] between two positions of an arm that moves: what a page can 
 class Pilot:
     """An arm's board; `tell` hears its state whenever that changes."""
 
-    def __init__(self, arm: Arm, port: str, baud: int, tell: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
         self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
-        self.configuration = configure(arm, rehearsal=port == SIM)
+        self.board: Configuration | Foreign = foreign(arm) or configure(arm, rehearsal=port == SIM)
         self.link: Port | None = None
-        self.machine: Machine | None = None
+        self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
         self._lock = threading.Lock()
         self._wake = threading.Event()
@@ -49,6 +51,7 @@ class Pilot:
         self._job: tuple[str, Job] | None = ("connect", lambda machine: None)
         self._doing = "connect"  # name of the job, "" if there is none
         self._error = ""
+        self._ended_jobs = (0, "")  # how many, and the last one's name: a page may miss how a short one began
         self._told: dict[str, Any] = {}
         self._told_at = 0.0
         self._thread = threading.Thread(target=self._run, name="pilot")
@@ -135,25 +138,33 @@ class Pilot:
             self._error = f"internal error: {error!r}: this is a bug in armkin"
             self._stop.set()
             self._wake.set()
-        self._doing = ""
+        self._doing, self._ended_jobs = "", (self._ended_jobs[0] + 1, name)
         self._publish()
 
-    def _open(self) -> Machine:
-        """The machine, in a new session: what ended the last one is over."""
-        if self.link is None:
-            self.link = open_port(self.port, board=self.configuration.board, baud=self.baud, paced=True)
+    def _open(self) -> Backend:
+        """The machine; our firmware's in a new session: what ended the last one is over."""
         first = self.machine is None
-        self.machine = Machine(self.link, self.arm, self.configuration, self._watch)
+        if isinstance(self.board, Foreign):
+            if self.link is None:
+                baud = self.baud or self.board.board.baud
+                self.link = self.board.simulated() if self.port == SIM else SerialPort(self.port, baud)
+            if self.machine is None:
+                self.machine = self.board.machine(self.link, self._watch)
+            else:
+                self.machine.refresh()
+        else:
+            if self.link is None:
+                self.link = open_port(self.port, board=self.board.board, baud=self.baud or BAUD, paced=True)
+            self.machine = Machine(self.link, self.arm, self.board, self._watch)
         if first and self.link.simulated:
             self.machine.prepare()  # a board in this process starts with the arm at home
         return self.machine
 
     def _watch(self) -> bool:
         """Asked at every turn of a session: tell where the pins are now, and whether to stop."""
-        machine = self.machine
-        latest = None if machine is None else machine.session.latest
-        if machine is not None and latest is not None and time.monotonic() - self._told_at >= _TELL:
-            machine.status = latest
+        if self.machine is not None and time.monotonic() - self._told_at >= _TELL:
+            if isinstance(self.machine, Machine):
+                self.machine.heard()
             self._publish()
         return self._stop.is_set()
 
@@ -163,7 +174,7 @@ class Pilot:
             self._job, self._doing = None, ""
         if self.machine is not None:
             try:
-                self.machine.status = self.machine.session.hold()
+                self.machine.hold()
             except LinkError as error:
                 self._error = error.message
                 self._disconnect()
@@ -171,22 +182,22 @@ class Pilot:
         self._publish()
 
     def _stopped(self, error: StoppedError) -> None:
-        if self.machine is not None and error.status is not None:
+        if isinstance(self.machine, Machine) and error.status is not None:
             self.machine.status = error.status
         self._error = "stopped"
         self._stop.clear()
 
-    def _poll(self, machine: Machine) -> None:
+    def _poll(self, machine: Backend) -> None:
         try:
-            machine.status = machine.session.status()
+            machine.refresh()
         except LinkError as error:
             self._error = error.message
             self._disconnect()
         self._publish()
 
-    def _answers(self, machine: Machine) -> bool:
+    def _answers(self, machine: Backend) -> bool:
         try:
-            machine.status = machine.session.status()
+            machine.refresh()
         except LinkError:
             return False
         return True
@@ -200,16 +211,18 @@ class Pilot:
         machine = self.machine
         found: dict[str, Any] = {
             "port": self.port,
-            "board": self.configuration.board.kind,
+            "board": self.board.board.kind,
             "simulated": self.port == SIM,
             "connected": machine is not None,
             "doing": self._doing,
+            "ended": {"count": self._ended_jobs[0], "name": self._ended_jobs[1]},
             "done_s": self.done[0],
             "total_s": self.done[1],
             "position": "unknown" if machine is None else machine.position(),
             "pulses": None,
             "joints": None,
             "error": self._error,
+            "differences": [] if machine is None else list(machine.differences),
         }
         if machine is not None and found["position"] in ("known", "retained"):
             counts = machine.counts()

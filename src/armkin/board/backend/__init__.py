@@ -77,6 +77,12 @@ class Backend(Protocol):
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
 
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+
+    def hold(self) -> None:
+        """Stop along the path, and stay."""
+
     def prepare(self, *, assume_home: bool = False) -> bool:
         """Get ready to move; True if the arm is taken to stand at home from now on."""
 

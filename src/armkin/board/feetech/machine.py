@@ -123,6 +123,10 @@ class ServoMachine:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
         return joints_of(self.arm, self._counts)
 
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self._read()
+
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         return f"the arm stands at {list(self.counts())} counts: the next command starts there"

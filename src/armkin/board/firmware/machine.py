@@ -119,6 +119,19 @@ class Machine:
             "reset_cause": info.cause,
         }
 
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self.status = self.session.status()
+
+    def heard(self) -> None:
+        """Take the newest status that has come while the arm moves."""
+        if self.session.latest is not None:
+            self.status = self.session.latest
+
+    def hold(self) -> None:
+        """Stop along the path, and stay: also what another session has begun."""
+        self.status = self.session.hold()
+
     # Getting ready
 
     def prepare(self, *, assume_home: bool = False) -> bool:

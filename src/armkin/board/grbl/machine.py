@@ -66,6 +66,10 @@ class GrblMachine:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
         return joints_of(self.arm, self.counts())
 
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self._read()
+
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         if self._offset is None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import inputs, linking, output
+from armkin.cli import inputs, output
 from armkin.cli.linking import Baud
 from armkin.cli.options import Robot
 
@@ -30,7 +30,7 @@ def teach(
     from armkin.teach.desk import Desk
     from armkin.teach.server import Server
 
-    desk = Desk(inputs.load(robot), port, baud or linking.BAUD)
+    desk = Desk(inputs.load(robot), port, baud)
     try:
         with Server(desk) as server:
             with output.destination(None) as write:

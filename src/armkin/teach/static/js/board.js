@@ -88,7 +88,10 @@ export class Board {
   /** @param {string} name @param {object} [fields] */
   async ask(name, fields = {}) {
     // Before it is asked for: what the board says of it may come sooner than the answer.
-    if (name !== "jog" || !this.beating) this.page.trouble("");
+    if (name !== "jog" || !this.beating) {
+      this.page.trouble("");
+      get("arrived").textContent = "";
+    }
     try {
       await act(name, fields);
     } catch (error) {
@@ -130,16 +133,17 @@ export class Board {
     const bar = /** @type {HTMLProgressElement} */ (get("progress"));
     bar.hidden = !doing || !state.total_s;
     bar.value = state.total_s ? state.done_s / state.total_s : 0;
-    if (before?.doing && !doing) {
-      get("arrived").textContent = state.error ? "" : `${before.doing}: done`;
+    if (before && state.ended.count !== before.ended.count) {
+      get("arrived").textContent = state.error ? "" : `${state.ended.name}: done`;
       if (state.error && state.error !== "stopped") this.page.trouble(state.error);
     }
     if (state.error === "stopped") get("arrived").textContent = "stopped: the arm stands on its path, its position is known";
     if (!state.connected && state.error) this.page.trouble(state.error);
-    get("how-safe").textContent = state.simulated
-      ? "A simulated board: nothing real moves."
-      : "If this page is closed, its browser ends or armkin teach is paused while the arm moves, the board holds it "
-        + "along its path within a second, and its position stays known. STOP is no emergency stop: for that, cut the motors' power.";
+    const stop = "STOP is no emergency stop: for that, cut the motors' power.";
+    if (state.simulated) get("how-safe").textContent = "A simulated board: nothing real moves.";
+    else if (state.differences.length) get("how-safe").textContent = `${state.differences.join(". ")}. ${stop}`;
+    else get("how-safe").textContent = "If this page is closed, its browser ends or armkin teach is paused while the arm moves, the board holds it "
+        + "along its path within a second, and its position stays known. " + stop;
     this.buttons();
     this.page.moved(state);
   }

@@ -26,6 +26,7 @@ class Page {
     /** @type {import("./view.js").View | null} */
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
+    this.jobs = 0; // that the board has ended
     const pose = async () => {
       await this.asking.idle();
       return this.q;
@@ -92,7 +93,8 @@ class Page {
 
   /** The board says where the arm stands. @param {import("./types.js").BoardState} state */
   moved(state) {
-    const ended = this.moving && state.doing === "";
+    const ended = state.ended.count !== this.jobs && state.doing === "";
+    this.jobs = state.ended.count;
     this.moving = !["", "connect", "follow"].includes(state.doing);
     if (!this.view) return;
     if (this.moving && state.joints) {
