@@ -1,0 +1,40 @@
+"""The examples run, anywhere, and print what they promise."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "examples"
+# Number -> words of its output.
+PROMISED = {
+    1: ["[ 398.3923 -218.4649  187.1697]"],
+    2: ["left, elbow up", "outside limits", "complete: True  best: left, elbow up"],
+    3: ["[ -1067 -10144   5667]", "rounded 0.074974 mm off"],
+    4: ["(100, 200, 8, 6) 160,000 branches"],
+    5: ["reach [", "volume 0.24"],
+    6: ["8 branches of 7 joints; J3 is 20 degrees in each"],
+    7: ["[1067, -5370, 3000] after"],
+    8: [" 0.000 s", "branch: left, elbow up"],
+}
+
+
+@pytest.mark.parametrize("number", PROMISED)
+def test_an_example_runs_from_any_folder(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    [path] = FOLDER.glob(f"{number:02}_*.py")
+    runpy.run_path(str(path), run_name="__main__")
+    shown = capsys.readouterr().out
+    assert not [words for words in PROMISED[number] if words not in shown], shown
+
+
+def test_every_example_is_numbered_short_and_listed() -> None:
+    files = sorted(FOLDER.glob("*.py"))
+    assert [int(path.name[:2]) for path in files] == list(PROMISED)
+    assert max(len(path.read_text().splitlines()) for path in files) <= 25
+    page = (FOLDER / "README.md").read_text()
+    assert not [path.name for path in files if path.name not in page]
