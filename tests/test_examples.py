@@ -13,7 +13,7 @@ PROMISED = {
     1: ["[ 398.3923 -218.4649  187.1697]"],
     2: ["left, elbow up", "outside limits", "complete: True  best: left, elbow up"],
     3: ["[ -1067 -10144   5667]", "rounded 0.074974 mm off"],
-    4: ["(100, 200, 8, 6) 160,000 branches"],
+    4: ["(100, 200, 4, 4) (100, 200, 8, 6)", "of their targets"],
     5: ["reach [", "volume 0.24"],
     6: ["8 branches of 7 joints; J3 is 20 degrees in each"],
     7: ["[1067, -5370, 3000] after"],
