@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from armkin import robot_file
-from armkin.forward import fk
+from armkin.forward import fk, frames
 from armkin.model.build import load
+from urdf_chains import CHAINS, moving, pose
 
 ROBOTS = Path(__file__).parents[1] / "robots"
 UP = [0, 0, 0, 0, 0, 0]
@@ -37,6 +38,48 @@ POSES = [
         0.002,
         "Polymistis/ar4-hmi defaults.json",
     ),
+    ("kuka_kr6_r700", UP, (785, 0, 435), 0.001, "25 + 315 + 365 + 80 and 400 + 35 mm, level: the drawing's lengths"),
+    ("xarm6", UP, (207, 0, 112), 0.001, "the controller's zero position, 207 0 112 180 0 0"),
+    ("wx250s", UP, (458.325 - 50.575, 0, 360.65), 0.001, "Interbotix, M of wx250s, less 23 + 27.575 mm of fingers"),
+    ("mycobot_280", UP, (45.6, -64.62, 131.56 + 110.4 + 96 + 73.18), 0.001, "the URDF's lengths, upright"),
+    ("fanuc_crx10ia", UP, (540 + 160, -150, 245 + 540), 0.001, "fanuc_description: mx_2, my_1, mz_3"),
+    ("kinova_gen3", [0] * 7, (0, -24.8501, 1187.385), 0.001, "the URDF's lengths, upright"),
+    (
+        "kinova_gen3",
+        [0, 15, 180, -130, 0, 55, 90],
+        (456.6, 1.3, 433.7),
+        0.1,
+        "the maker's Home: 0.4566 0.0013 0.4337 m",
+    ),
+    ("iiwa7", [0] * 7, (0, 0, 1266), 0.001, "ssik iiwa7_ik T_HOME"),
+    (
+        "niryo_ned2",
+        UP,
+        (170 + 19.7 + 65 + 12 + 21.5, 0.038, 101.3 + 65 + 221 + 32.5 + 9.25),
+        0.001,
+        "the URDF's lengths",
+    ),
+    (
+        "so101",
+        [0] * 5,
+        (391.36147, -0.00921, 226.46971),
+        0.005,
+        "so101_new_calib.urdf at zero, by pinocchio or yourdfpy",
+    ),
+    (
+        "roarm_m2",
+        [0, 0, 90],
+        (310.15, 0, 235.09 + 126.06),
+        0.001,
+        "RoArm-M2_config.h: goalX = L3A + L2B, z = L2A - L3B",
+    ),
+    (
+        "ur10e",
+        UP,
+        (-1184.25, -290.7, 60.85),
+        0.001,
+        "a screw model's M, turned by 180 about z into the controller's base",
+    ),
     ("cobra600", [0] * 4, (600, 0, 387), 0.001, "325 + 275 mm stretched"),
     ("thor", UP, (0, 0, 569.5), 0.001, "99 + 103 + 160 + 89.5 + 104.5 + 13.5 mm upright, from the URDF"),
 ]
@@ -46,6 +89,31 @@ POSES = [
 def test_printed_pose(name: str, joints: list[float], tip: tuple[float, ...], tolerance: float, source: str) -> None:
     arm = load(ROBOTS / f"{name}.yaml")
     assert fk(arm, np.radians(joints))[:3, 3] == pytest.approx(tip, abs=tolerance), source
+
+
+def test_makers_reaches() -> None:
+    """Data sheets' figures, which no URDF states: KR 6 R700 706.7 mm, CRX-10iA 1249 mm, iiwa 7 800 mm."""
+    kuka = load("kuka_kr6_r700")
+    level = [0, 0, math.atan2(35, 365), 0, 0, 0]  # the wrist's centre at the height of the elbow
+    wrist = frames(kuka, level)[5, :3, 3]
+    assert math.hypot(wrist[0], wrist[1]) == pytest.approx(706.7, abs=0.05)
+    crx = fk(load("fanuc_crx10ia"), np.radians([0, 90, 90, 0, 0, 0]))[:3, 3]
+    assert math.hypot(crx[0], crx[1]) == pytest.approx(1249, abs=0.5)
+    iiwa = frames(load("iiwa7"), np.zeros(7))
+    assert np.linalg.norm(iiwa[6, :3, 3] - iiwa[2, :3, 3]) == pytest.approx(800)
+
+
+@pytest.mark.parametrize(
+    "name", sorted(set(CHAINS) & {path.stem for path in ROBOTS.glob("*.yaml")} - {"panda", "irb120", "roarm_m2"})
+)
+def test_a_shipped_arm_is_its_source_s_urdf(name: str) -> None:
+    """The robot file against the URDF's chain as numbers, walked by tests/urdf_chains.py: to 0.01 mm."""
+    chain, arm = CHAINS[name], load(name)
+    joints = [joint["name"] for joint in moving(chain) if joint["type"] != "fixed"]
+    for q in np.random.default_rng(3).uniform(-3, 3, (20, arm.n)):
+        assert fk(arm, q)[:3, 3] == pytest.approx(
+            1000 * pose(chain, dict(zip(joints, q, strict=True)))[:3, 3], abs=0.02
+        )
 
 
 def test_stanford_reaches_along_its_boom() -> None:

@@ -213,7 +213,7 @@ def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any
     joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in data["joints"]]
     for joint, ratio in zip(joints, arm.ratio.tolist(), strict=True):
         joint |= {"ratio": ratio} if ratio != 1.0 else {}
-    head = {k: v for k, v in data.items() if k in ("name", "description", "source", "task", "pitch_offset")}
+    head = {k: v for k, v in data.items() if k in ("name", "description", "source", "compared", "task", "pitch_offset")}
     rest = {k: v for k, v in data.items() if k not in head and k not in _GEOMETRY}
     return head, joints, rest
 

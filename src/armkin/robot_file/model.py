@@ -265,6 +265,7 @@ class RobotKeys(_Model):
     name: Annotated[str, Field(min_length=1, max_length=80)] = Field(description="The arm's name, one line.")
     description: str = Field("", description="Free text.")
     source: str = Field("", description="Where the numbers come from.")
+    compared: str = Field("", description="What the geometry was compared with: a maker's figure, or only a URDF.")
     convention: Convention = Field(
         description="standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz) DH, or screws; never guessed."
     )
