@@ -10,7 +10,7 @@ from armkin.model.arm import actual, from_links
 from armkin.motors import outside_travel, pulse_units
 from command_line import ROOT, run
 
-BUS = ROOT / "tests/robots/bus_arm.yaml"
+BUS = ROOT / "tests/robots/ratio_arm.yaml"
 
 
 def test_commanded_values_times_the_ratio_are_actual_ones() -> None:

@@ -40,7 +40,7 @@ def test_the_jacobian_is_exact(name: str) -> None:
         assert J[:, 3:, k] == pytest.approx(turned, abs=2e-4), parameter.name
 
 
-@pytest.mark.parametrize("name", ["ur5e", "ar4", "three_dof", "stanford", "bus_arm"])
+@pytest.mark.parametrize("name", ["ur5e", "ar4", "three_dof", "stanford", "ratio_arm"])
 def test_the_corrected_arm_is_the_model(name: str) -> None:
     path = Path(__file__).parents[1] / "robots" / f"{name}.yaml"
     arm = armkin.load(path if path.exists() else name)
