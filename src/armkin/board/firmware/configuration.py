@@ -16,7 +16,7 @@ import numpy as np
 
 from armkin.board.firmware.protocol import AxisImage, Image, RowImage
 from armkin.errors import UsageError
-from armkin.hardware import BOARDS, DRIVERS, Board, Driver
+from armkin.hardware import BOARDS, DRIVERS, FOREIGN, Board, Driver
 from armkin.motion.plan import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses, undriven
 
@@ -163,8 +163,14 @@ def _without_board(arm: Arm) -> list[Lack]:
         drivers = ", ".join(DRIVERS)
         add = f"board: {{kind: ..., driver: ...}}   # kinds: {', '.join(BOARDS)}; drivers: {drivers}"
         return [("it has no board", [add])]
-    board, lacks = BOARDS[arm.board.kind], []
-    steppers = False
+    lacks: list[Lack] = []
+    if (foreign := FOREIGN.get(arm.board.kind)) is not None:  # it has its own drivers and settings
+        bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
+        if bare:
+            add = f"axis: ...   # to the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
+            lacks.append((f"motors {', '.join(bare)} have no axis", [add]))
+        return lacks
+    board, steppers = BOARDS[arm.board.kind], False
     for motor in [*arm.motors, *([] if arm.gripper is None else [arm.gripper])]:
         steppers = steppers or motor.kind == "stepper"
         if motor.axis is None:

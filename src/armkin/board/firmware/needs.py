@@ -41,6 +41,8 @@ def _without_drives(arm: Arm) -> list[str]:
 
 
 def _without_homing(arm: Arm) -> list[str]:
+    if arm.motors and all(motor.kind == "bus" for motor in arm.motors):
+        return []  # bus servos know where they are
     bare = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
     return [_have(bare, "homing")] if bare else []
 
