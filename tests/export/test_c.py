@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from exported import agreement
 
 import armkin
 from armkin.export.c.program import identifier, program
@@ -92,3 +95,19 @@ def test_the_files_say_what_they_were_made_from() -> None:
     for text in program(arm, "puma.c"):
         for said in (arm.name, arm.sha256, f"armkin {armkin.__version__}", "Task pose; spherical wrist"):
             assert said in text
+
+
+@pytest.mark.parametrize(
+    ("robot", "count"), [("three_dof", 4000), ("puma560", 2000), ("stanford", 1000), ("jaco_j2n6s300", 400)]
+)
+def test_it_says_what_python_says(robot: str, count: int, tmp_path: Path) -> None:
+    told = agreement(armkin.load(ROBOTS / f"{robot}.yaml"), tmp_path, count)
+    assert told.different == []
+    assert told.edges <= 0.01 * count
+    assert told.largest_fk < 1e-14
+    assert told.largest < 1e-8
+
+
+def test_a_calibrated_arm_takes_and_gives_commanded_values(tmp_path: Path) -> None:
+    arm = replace(armkin.load(ROBOTS / "three_dof.yaml"), ratio=np.array([1.01, 0.99, 1.002]))
+    assert agreement(arm, tmp_path, 500).different == []

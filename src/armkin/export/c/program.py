@@ -16,6 +16,7 @@ from armkin.formula.c_code import number
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.recognise import solver
 from armkin.inverse.tasks.task import LARGEST
+from armkin.model.arm import actual
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -41,9 +42,10 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
-    task, geometry = solver(arm, task_name)
-    solve, branches = candidates(arm, task, geometry, single)
-    names = branch_names(arm, task, geometry, branches)
+    turned = actual(arm)  # branches are found, and limits hold, in actual joint values
+    task, geometry = solver(turned, task_name)
+    solve, branches = candidates(turned, task, geometry, single)
+    names = branch_names(turned, task, geometry, branches)
     stem = Path(file).stem
     prefix = identifier(arm.name)
     fields = {
@@ -60,8 +62,9 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
             f"{name} [{'mm' if slides else 'rad'}]" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)
         ),
         "names": ",\n    ".join(f'"{name}"' for name in names),
-        "lower": _numbers(arm.lower, single),
-        "upper": _numbers(arm.upper, single),
+        "lower": _numbers(turned.lower, single),
+        "upper": _numbers(turned.upper, single),
+        **_ratios(arm, single),
         "slides": ", ".join(str(int(p)) for p in arm.prismatic),
     }
     parts = [
@@ -131,6 +134,28 @@ def _named(text: str, prefix: str) -> str:
     """Public names begin with the robot's, so that two arms fit into one program."""
     text = re.sub(r"\barm_(fk|jacobian|ik|best|names|real|solution)\b", rf"{prefix}_\1", text)
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
+
+
+def _ratios(arm: Arm, single: bool) -> dict[str, str]:
+    """Lines that turn `near` into actual joint values and a branch into commanded ones, for calibrated arms."""
+    if (arm.ratio == 1.0).all():
+        return {"actual_near": "", "commanded": "", "close": ""}
+    table = f"static const arm_real ratio[ARM_JOINTS] = {{{_numbers(arm.ratio, single)}}};"
+    return {
+        "close": ", close[ARM_JOINTS]",
+        "actual_near": f"""    {{ /* actual turn per commanded turn, from calibration */
+        {table}
+        for (j = 0; j < ARM_JOINTS; j++)
+            close[j] = near[j] * ratio[j];
+        near = close;
+    }}
+""",
+        "commanded": f"""        for (j = 0; j < ARM_JOINTS; j++) {{
+            {table}
+            one->q[j] /= ratio[j];
+        }}
+""",
+    }
 
 
 def _numbers(values: Array, single: bool) -> str:

@@ -18,12 +18,12 @@ static int arm_same(const arm_real *a, const arm_real *b)
 
 int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int *edge)
 {
-    arm_real goal[ARM_GOAL], q[ARM_BRANCHES * ARM_JOINTS], miss[ARM_BRANCHES];
+    arm_real goal[ARM_GOAL], q[ARM_BRANCHES * ARM_JOINTS], miss[ARM_BRANCHES]@close@;
     int b, j, k, count = 0;
     *edge = 0;
     if (!arm_read(target, goal))
         return -1;
-    arm_candidates(goal, near, q, miss, edge, 1);
+@actual_near@    arm_candidates(goal, near, q, miss, edge, 1);
     for (b = 0; b < ARM_BRANCHES; b++)
         *edge |= !(miss[b] <= ARM_ACCEPTED) & !(miss[b] > ARM_NEARBY);
     for (b = 0; b < ARM_BRANCHES; b++) {
@@ -37,7 +37,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int 
                 inside &= (value >= arm_lower[j] - ARM_SLACK) & (value <= arm_upper[j] + ARM_SLACK);
             one->q[j] = arm_slides[j] ? value : arm_copy(value, near[j], arm_lower[j], arm_upper[j], &inside);
         }
-        for (k = 0; *edge && k < count; k++) /* two that have merged are one */
+@commanded@        for (k = 0; *edge && k < count; k++) /* two that have merged are one */
             again |= arm_same(one->q, out[k].q);
         if (again)
             continue;

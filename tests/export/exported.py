@@ -1,0 +1,94 @@
+"""What `armkin export --c` writes, built as a library and asked many poses: does it say what Python says?"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import armkin
+from armkin.export.c.program import identifier, program
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.task import targets_of
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Of so many poses, how many the C calls an edge, and how many others differ, by what: a list of words."""
+
+    poses: int
+    edges: int
+    different: list[str]
+    largest: float  # difference of a joint value, and of an fk entry in reaches
+    largest_fk: float
+
+
+def library(arm: armkin.Arm, folder: Path, *options: str) -> ctypes.CDLL:
+    """The generated source as a shared library, its public names without the robot's prefix in front."""
+    (folder / "arm.c").write_text(program(arm, "arm.c").source)
+    (folder / "arm.h").write_text(program(arm, "arm.c").header)
+    words = ["gcc", "-std=c99", "-O2", *options, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
+    subprocess.run(words, cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "arm.so"))
+
+
+def postures(arm: armkin.Arm, count: int, seed: int = 3) -> np.ndarray:
+    """Random joint values: anywhere, a quarter of them within limits."""
+    rng = np.random.default_rng(seed)
+    turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
+    low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
+    high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
+    return np.concatenate(
+        [rng.uniform(-turn, turn, (count - count // 4, arm.n)), rng.uniform(low, high, (count // 4, arm.n))]
+    )
+
+
+def agreement(
+    arm: armkin.Arm, folder: Path, count: int, solve: Callable[..., armkin.Solutions] | None = None
+) -> Agreement:
+    """Compare on random poses. solve: called like `armkin.ik` without its arm, by default that."""
+    code, n, prefix = library(arm, folder), arm.n, identifier(arm.name)
+    task, _ = solver(arm, None)
+    q = postures(arm, count)
+    T = armkin.fk(arm, q)
+    target = targets_of(task, T, q)
+    found = armkin.ik(arm, target) if solve is None else solve(target)
+    doubles = ctypes.c_double * n
+
+    class Solution(ctypes.Structure):
+        _fields_ = (("q", doubles), ("branch", ctypes.c_int), ("within", ctypes.c_int), ("residual", ctypes.c_double))
+
+    answers, edge, near = (Solution * 64)(), ctypes.c_int(), doubles(*arm.home)
+    ik, fk = code[f"{prefix}_ik"], code[f"{prefix}_fk"]
+    pose, edges, different, largest, largest_fk = np.empty(16), 0, [], 0.0, 0.0
+    rows = np.ascontiguousarray(target.reshape(count, -1))
+    fk.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    ik.argtypes = [ctypes.c_void_p, doubles, Solution * 64, ctypes.POINTER(ctypes.c_int)]
+    valid, mine, legal, status = found.valid, found.q, found.within_limits, found.status
+    q = np.ascontiguousarray(q)
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    for k in range(count):
+        fk(q[k].ctypes.data, pose.ctypes.data)
+        largest_fk = max(largest_fk, float(np.abs(pose.reshape(4, 4) - T[k]).max()) / arm.reach)
+        total = ik(rows[k].ctypes.data, near, answers, edge)
+        if edge.value or status[k]:
+            edges += 1
+            continue
+        theirs = np.array([answers[b].q[:] for b in range(total)]).reshape(total, n)
+        inside = np.array([bool(answers[b].within) for b in range(total)])
+        own, inside_own = mine[k][valid[k]], legal[k][valid[k]]
+        if len(own) != total:
+            different.append(f"pose {k}: {total} branches, Python {len(own)}")
+            continue
+        order = [np.abs((theirs - row) / unit).max(axis=1).argmin() for row in own]
+        apart = float(np.abs((theirs[order] - own) / unit).max(initial=0.0))
+        if sorted(order) != list(range(total)) or apart > 1e-6:
+            different.append(f"pose {k}: joint values {apart:.1e} apart")
+        elif (inside[order] != inside_own).any():
+            different.append(f"pose {k}: limits")
+        largest = max(largest, apart)
+    return Agreement(count, edges, different, largest, largest_fk)
