@@ -57,7 +57,7 @@ def best_time(
 
 def speed(poses: int, only: str | None) -> None:
     print(
-        "| arm | compiled us/pose | with one, two workers, clock | numpy us/pose | peer | its us/pose | times faster | one pose us |"
+        "| arm | compiled us/pose | wall, 1 and 2 workers | numpy us/pose | peer | its us/pose | faster | one pose us |"
     )
     print("|---|---|---|---|---|---|---|---|")
     for name, tool, share in ROWS:
