@@ -263,6 +263,79 @@ class Send(Head):
     top_rate: Annotated[list[float], "greatest rate of every motor [pulses/s]"]
 
 
+class BranchAt(TypedDict):
+    """Where on a path a branch's name begins."""
+
+    s_mm: float
+    name: str
+
+
+class PathRun(TypedDict):
+    """A part of a path on one branch."""
+
+    s_mm: Annotated[list[float], "where it begins and ends"]
+    branches: list[BranchAt]
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    end_joints: Annotated[list[float], "[deg or mm]"]
+
+
+class Reconfiguration(TypedDict):
+    """Where a run ends before the path does."""
+
+    s_mm: float
+    why: Annotated[str, "limit, reach, boundary, singularity or end"]
+    joint: Annotated[str | None, "whose limit it is"]
+    value: Annotated[float | None, "the limit [deg or mm]"]
+    status_beyond: Annotated[str, "exact, boundary, singular or unreachable"]
+
+
+class PathBranch(TypedDict):
+    """A branch at a path's start."""
+
+    name: str
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    carries_mm: Annotated[float, "how far along the path it goes"]
+    ends_because: Annotated[str, "why no farther, in words"]
+
+
+class NearestSingularity(TypedDict):
+    """Where the arm comes nearest to a singularity."""
+
+    s_mm: float
+    condition: Annotated[float | None, "of the Jacobian; null: infinite"]
+
+
+class Path(Head):
+    """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
+
+    task: str
+    length_mm: float
+    duration_s: Annotated[float | None, "null: not planned to its end"]
+    samples: Annotated[int, "targets that were solved"]
+    complete: Annotated[bool, "every isolated branch of every sample is guaranteed to be known"]
+    tolerance_mm: float
+    deviation_mm: Annotated[float | None, "a bound of the distance between plan and path"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    start_joints: Annotated[list[float] | None, "[deg or mm]"]
+    joints: Annotated[list[float] | None, "at the end [deg or mm]"]
+    runs: list[PathRun]
+    reconfigurations: list[Reconfiguration]
+    branches: list[PathBranch]
+    limits: Annotated[dict[str, dict[str, float]] | None, "speed, accel, jerk: greatest share of each joint's limit"]
+    nearest_singularity: NearestSingularity | None
+    segments: Annotated[int | None, "that a board is sent; null without drives"]
+    dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]
+
+
+class PathMoved(Path):
+    """`path --port`: the plan, and where the arm stands after it."""
+
+    port: str
+    position: Annotated[str, "known, retained or lost"]
+    pulses: Annotated[list[int] | None, "as the board counts"]
+    position_mm: list[float] | None
+
+
 class Stands(Head, Where):
     """`home` and `jog`: where the arm stands after it."""
 
@@ -379,6 +452,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "robots": (Robots,),
     "export": (Export,),
     "send": (DryRun, Send),
+    "path": (Path, PathMoved),
     "status": (StatusOfBoard, StatusOfGrbl, StatusOfServos),
     "home": (Stands,),
     "jog": (Stands,),

@@ -91,8 +91,8 @@ def _joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
         if np.isfinite(low) and np.isfinite(high):
             y, label = (2 * q[:, j] - low - high) / (high - low), name
         else:
-            y = units.joints_out(arm, q)[:, j] / 180
-            label = f"{name} (of 180)"
+            size = 100.0 if arm.prismatic[j] else 360.0
+            y, label = units.joints_out(arm, q)[:, j] / size, f"{name} / {'dm' if arm.prismatic[j] else 'turn'}"
         axes.plot(t, y, color=_COLOURS[j % len(_COLOURS)], linewidth=1.2, label=label)
     axes.axhspan(1.0, 1.15, color="#eeeeee")
     axes.axhspan(-1.15, -1.0, color="#eeeeee")
