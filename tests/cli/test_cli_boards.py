@@ -51,7 +51,7 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
     with PtyPort(board) as pty:
         refused = run("send", grbl, -30, 5, -5, "--port", pty.name, "--assume-home")
         assert (refused.code, refused.out) == (5, "")
-        assert "settings do not fit three_dof: $100" in refused.err
+        assert "settings do not fit three_dof_grbl: $100" in refused.err
         told = run("setup", grbl, "--port", pty.name, "--json")
         assert {100, 101, 102} <= {row["setting"] for row in told.json["differences"] if row["serious"]}
         assert board.settings[100] == 250

@@ -10,7 +10,8 @@ LARGEST = 1e9
 NOT_FINITE = ("nan", "inf", "infinity")
 
 _PI = re.compile(r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
+_LONGEST = 10_000  # characters of a number
 
 
 def number(text: str, name: str, largest: float = LARGEST) -> float:
@@ -21,6 +22,8 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     """
     plain = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
     shown = text if len(text) <= 40 else text[:37] + "..."
+    if len(plain) > _LONGEST:
+        raise UsageError(f"{name}: '{shown}' is too long for a number", argument=name, value=shown)
     if not _NUMBER.fullmatch(plain):
         raise UsageError(f"{name}: {_why_not(plain, shown)}", argument=name, value=shown)
     value = float(plain)

@@ -27,7 +27,7 @@ Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
 Length = Annotated[float, Field(ge=-1e7, le=1e7)]
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres
-Rate = Annotated[float, Field(gt=0, le=1e6)]
+Rate = Annotated[float, Field(ge=1e-6, le=1e6)]  # less would take ages, and overflow what divides by it
 Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
 # A name may stand in `J3=20` on the command line and in tables: no spaces, commas, colons or equal signs.
 Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
@@ -59,12 +59,12 @@ def _ratio(value: Any) -> Any:
 _TEETH = {"type": "integer", "minimum": 1, "maximum": 10_000}
 Ratio = Annotated[
     float,
-    Field(gt=0, le=1e6),
+    Field(ge=1e-6, le=1e6),
     BeforeValidator(_ratio),
     WithJsonSchema(
         {
             "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                {"type": "number", "minimum": 1e-6, "maximum": 1e6},
                 {
                     "type": "object",
                     "properties": {"motor": _TEETH, "joint": _TEETH},
@@ -136,7 +136,7 @@ class Drive(_Model):
         1.0, description="Stepper: motor turns per joint turn, a number or teeth {motor: 16, joint: 80}."
     )
     pulley: Ratio = Field(1.0, description="Stepper: a second reduction, like gear; the two multiply.")
-    lead: Annotated[float, Field(gt=0, le=1e4)] | None = Field(
+    lead: Annotated[float, Field(ge=1e-6, le=1e4)] | None = Field(
         None, description="Stepper on a prismatic joint: mm per turn after gear and pulley."
     )
     travel: tuple[Angle, Angle] | None = Field(
@@ -194,7 +194,7 @@ class Homing(_Model):
     direction: Sign = Field(description="1: the switch is at the joint's upper end; -1: at the lower.")
     at: Value = Field(description="Joint value where the switch closes, in degrees or mm.")
     speed: Rate = Field(description="Approach speed in deg/s or mm/s; the second approach is slower.")
-    backoff: Annotated[float, Field(gt=0, le=1e6)] = Field(
+    backoff: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(
         description="How far to back off the switch, in degrees or mm."
     )
     order: Annotated[int, Field(ge=1, le=99)] | None = Field(

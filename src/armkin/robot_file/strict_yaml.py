@@ -39,9 +39,9 @@ _INT = r"[-+]?(?:0|[1-9][0-9]*)"
 _FLOAT = r"[-+]?(?:0|[1-9][0-9]*)\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?"
 _LIKE_FLOAT = r"([-+]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([-+]?)([0-9]+))?"
 _SEXAGESIMAL = r"[-+]?[0-9][0-9_]*(?::[0-9]+)+(?:\.[0-9_]*)?"
-_LEADING_ZERO = r"([-+]?)0+([0-9_]+(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?)"
+_LEADING_ZERO = r"([-+]?)0([0-9_]++(?:\.[0-9_]*+)?(?:[eE][-+]?[0-9]++)?)"
 _OTHER_BASE = r"[-+]?0[xXbBoO][0-9a-fA-F_]+"
-_UNDERSCORE = r"[-+]?[0-9][0-9_]*_[0-9_]*(?:\.[0-9_]*)?(?:[eE][-+]?[0-9]+)?"
+_UNDERSCORE = r"[-+]?[0-9][0-9]*+_[0-9_]*+(?:\.[0-9_]*+)?(?:[eE][-+]?[0-9]++)?"
 _NOT_FINITE = r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
 _TIMESTAMP = r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?"
 _WORDS_FOR_TRUE = ("yes", "on")
@@ -282,7 +282,8 @@ def _number(text: str, line: int) -> str | int | float:
     if re.fullmatch(_SEXAGESIMAL, text):
         raise StrictYamlError(line, _sexagesimal(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
-        plain = zeros[1] + (zeros[2].lstrip("0") or "0") if "." not in zeros[2] else zeros[1] + zeros[2]
+        rest = zeros[2].lstrip("0")
+        plain = zeros[1] + (rest if rest[:1].isdigit() else f"0{rest}")
         what = f"{shown(text)} begins with 0, which YAML may read as octal"
         raise StrictYamlError(line, f"{what}; write {shown(plain)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):

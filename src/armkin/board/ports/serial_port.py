@@ -95,6 +95,8 @@ def _open_serial(name: str, baud: int) -> Any:
         port = serial.serial_for_url(name, **settings)
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_cannot_open(name, error)) from None
+    except Exception as error:  # what pyserial makes of a malformed URL: KeyError, re.error, AttributeError, ...
+        raise LinkError(f"port {name} cannot be opened: it is no URL that pyserial understands ({error})") from None
     _keep_dtr(port)
     return port
 

@@ -1,0 +1,75 @@
+"""What every command line must keep to, whatever it is given."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import re
+from typing import Any
+
+from command_line import Result, run
+
+CODES = {0, 1, 2, 3, 4, 5}
+NUMBERS = (
+    "0 -0.0 1 -1 90 -90 180 360 1.0e-310 5.0e-324 -5.0e-324 1.0e-12 1.0e-7 0.5 1000000 1.0e+6 1.0e+7 -1.0e+7 1.0e+9 "
+    "1.0e+308 -1.0e+308 1e3 017 80:16 .nan .inf -.5 1_0 0x10 true null ~ '' abc [1,2] {} 3.141592653589793 1.5708 "
+    f"{'9' * 400}"
+).split()
+
+
+def attack(*words: object, stdin: bytes = b"") -> Result:
+    """Run a command line and hold it to the contract: known exit code, no traceback, honest JSON, quiet stdout."""
+    done = run(*words, stdin=stdin)
+    shown = f"{words!r}\n{done}"[:3000]
+    assert done.code in CODES, shown
+    assert "internal error" not in done.err, shown
+    assert "Traceback" not in done.err, shown
+    assert "Warning" not in done.err, shown
+    if done.code not in (0, 3) and "--batch" not in words:
+        assert done.out == "", shown
+        assert done.err.strip(), shown
+    if "--json" in words and done.out:
+        for line in done.out.splitlines():
+            _finite(json.loads(line, parse_constant=_refused), shown)
+    return done
+
+
+def _refused(word: str) -> float:
+    raise AssertionError(f"{word} in JSON")
+
+
+def _finite(value: Any, shown: str) -> None:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for part in value:
+            _finite(part, shown)
+    elif isinstance(value, float):
+        assert math.isfinite(value), shown
+
+
+def spoilt(rng: random.Random, text: str) -> str:
+    """A robot file with one to three things wrong, or odd."""
+    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        lines = text.splitlines(keepends=True)
+        k = rng.randrange(len(lines))
+        kind = rng.randrange(10)
+        if kind < 6:
+            found = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])", text))
+            if found:
+                one = rng.choice(found)
+                text = text[: one.start()] + rng.choice(NUMBERS) + text[one.end() :]
+            continue
+        if kind == 6:
+            del lines[k]
+        elif kind == 7:
+            lines.insert(rng.randrange(len(lines)), lines[k])
+        elif kind == 8:
+            j = rng.randrange(len(lines))
+            lines[k], lines[j] = lines[j], lines[k]
+        else:
+            at = rng.randrange(len(lines[k]))
+            lines[k] = lines[k][:at] + rng.choice("{}[]:,#&*!|>'\"%@`\t \\x\u00e9\x07") + lines[k][at + 1 :]
+        text = "".join(lines)
+    return text
