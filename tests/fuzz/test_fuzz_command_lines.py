@@ -129,3 +129,21 @@ def test_any_piped_answer(seed: int, rounds: int) -> None:
         done = attack("send", "--dry-run", "--json", stdin=text.encode())
         if done.code == 0:  # what is sent is what was asked for
             assert json.loads(done.out)["pulses"] == whole["pulses"], text
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("joints", [10, 80, -60]), ("pulses", [356, -1194, 0]), ("pulses", [10**400, 0, 0]), ("pulses", [0])],
+)
+def test_an_answer_that_contradicts_itself_moves_nothing(key: str, value: list[int]) -> None:
+    answer = json.loads(attack("pulses", "three_dof", 10, 80, -70, "--json").out)
+    done = attack("send", "--port", "sim", "--json", stdin=json.dumps({**answer, key: value}).encode())
+    assert done.code == 2
+    if len(value) == 3 and value[0] < 10**9:
+        assert "q3 = -" in json.loads(done.err)["error"]
+        assert json.loads(done.err)["joint"] == "q3"
+    best = json.loads(attack("pulses", "three_dof", 10.01, 80.01, -70.01, "--best", "--json").out)
+    assert (
+        json.loads(attack("send", "--dry-run", "--json", stdin=json.dumps(best).encode()).out)["pulses"]
+        == best["pulses"]
+    )

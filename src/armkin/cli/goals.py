@@ -62,6 +62,10 @@ def goals(
     return arm, _checked(arm, [], [inputs.joints(arm, q)])
 
 
+_NEIGHBOURS = 2.5  # pulses beside the exact value that `pulses --best` may choose
+_MOST_PULSES = 2**53
+
+
 @dataclass
 class Goals:
     """Where to go: joint values (w, n) [rad | mm], with their row numbers, or one target for ik."""
@@ -118,6 +122,35 @@ def _from_pipe(robot: str | None) -> tuple[Arm, Goals]:
             raise UsageError(f"the answer has {len(pose.joints)} joint values, {arm.name} has {arm.n} joints")
         [exact] = _checked(arm, [], [pose.joints]).joints  # type: ignore[misc]
         if pose.pulses is not None and armkin.pulses(arm, exact).tolist() != pose.pulses:
-            exact = armkin.joints(arm, pose.pulses)  # of `pulses --best`: not those of plain rounding
+            exact = _of_pulses(arm, exact, pose.pulses)
         poses.append(exact)
     return arm, Goals(np.array(poses), list(range(1, len(poses) + 1)))
+
+
+def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
+    """Joint values of pulses that are not those of plain rounding, as `pulses --best` chooses them among neighbours.
+
+    Raises UsageError, naming the joint, for pulses that mean another pose than the joint values beside them.
+    """
+    import numpy as np
+
+    import armkin
+    from armkin.motors import resolution
+
+    if len(counts) != len(arm.motor_gain):
+        raise UsageError(f"the answer has {len(counts)} pulses, {arm.name} has {len(arm.motor_gain)} motors")
+    if max(map(abs, counts)) > _MOST_PULSES:
+        raise UsageError(f"the answer on standard input is damaged: {max(counts, key=abs)} pulses")
+    meant = armkin.joints(arm, counts)
+    off = np.abs(meant - q) / resolution(arm)
+    if (worst := int(off.argmax())) >= 0 and off[worst] > _NEIGHBOURS:
+        said, other = (float(units.joints_out(arm, values)[worst]) for values in (q, meant))
+        name = arm.joint_names[worst]
+        raise UsageError(
+            f"the answer contradicts itself: {name} = {said:.10g}, and its pulses mean {name} = {other:.10g}: "
+            "compute it again",
+            joint=name,
+            value=said,
+            by_pulses=other,
+        )
+    return meant
