@@ -9,8 +9,10 @@ import types
 from pathlib import Path
 from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
 
+import numpy as np
 import pytest
 
+import armkin
 from armkin.cli import answers
 from armkin.cli.app import load
 from armkin.cli.commands import COMMANDS
@@ -79,6 +81,8 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Path, ("path", DOF, "--via", "390,80,300", "--via", "390,20,300")),
     (answers.Path, ("path", DOF, "--via", "390,80,300", "--via", "390,-400,300")),
     (answers.PathMoved, ("path", DOF, "--via", "390,80,300", "--via", "390,20,300", "--port", "sim")),
+    (answers.Suggested, ("calibrate", DOF, "--suggest", 3)),
+    (answers.Calibrate, ("calibrate", DOF, "CSV")),
     (answers.StatusOfBoard, ("status", DOF, "--port", "sim")),
     (answers.Stands, ("jog", DOF, "q1", 5, "--seconds", 0.2, "--port", "sim")),
     (answers.Grip, ("grip", DOF, "closed", "--port", "sim")),
@@ -96,13 +100,23 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
 @pytest.mark.parametrize(
     ("kind", "words"), CASES, ids=lambda part: " ".join(map(str, part)) if type(part) is tuple else ""
 )
-def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...]) -> None:
-    result = run(*words, "--json")
+def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...], tmp_path: Path) -> None:
+    result = run(*(measured(tmp_path) if word == "CSV" else word for word in words), "--json")
     assert result.code in (0, 3), result.err
     check(result.json, kind, kind.__name__)
     if result.code:
         error = json.loads(result.err)
         check({key: error[key] for key in get_type_hints(answers.Error) if key in error}, answers.Error, "Error")
+
+
+def measured(folder: Path) -> Path:
+    """Thirty poses of an arm that stands 5 mm beside its table, one of them a slip."""
+    arm = armkin.load(DOF)
+    q = np.random.default_rng(3).uniform(arm.lower, arm.upper, (30, arm.n))
+    tips = armkin.fk(arm, q)[:, :3, 3] + [5.0, 0.0, 0.0]
+    tips[7] += 40.0
+    np.savetxt(folder / "tips.csv", np.hstack([np.rad2deg(q), tips]), delimiter=",")
+    return folder / "tips.csv"
 
 
 def test_a_batch_has_one_a_row() -> None:

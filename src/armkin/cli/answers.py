@@ -431,6 +431,53 @@ class Grip(Head):
     counts: int
 
 
+class Errors(TypedDict):
+    """Distances between computed and measured tips, on rows that the fit has not seen."""
+
+    median_mm: float
+    rms_mm: float
+    max_mm: float
+
+
+class Flagged(TypedDict):
+    """A row that does not fit the others."""
+
+    row: int
+    off_mm: float
+
+
+class Correction(TypedDict):
+    """A corrected number of the robot file."""
+
+    name: str
+    value: float
+    deviation: Annotated[float, "standard deviation"]
+    unit: str
+
+
+class Calibrate(Head):
+    """A corrected robot file from measured tips."""
+
+    rows: int
+    level: Annotated[str, "how much is corrected, in words"]
+    corrected: list[str]
+    before: Errors
+    after: Errors
+    noise_mm: float
+    flagged: list[Flagged]
+    corrections: list[Correction]
+    unseen: Annotated[list[str], "what these rows do not show"]
+    held: Annotated[list[str], "why something was not corrected"]
+    out: str | None
+
+
+class Suggested(Head):
+    """`calibrate --suggest`: the next poses to measure."""
+
+    joint_units: Annotated[list[str], "deg or mm"]
+    poses: Annotated[list[list[float]], "joint values [deg or mm]"]
+
+
 class Error(TypedDict):
     """An error under --json, on stderr; besides these keys it has the fields of its kind."""
 
@@ -457,6 +504,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "home": (Stands,),
     "jog": (Stands,),
     "grip": (Grip, GripOfServo),
+    "calibrate": (Calibrate, Suggested),
     "setup": (Setup,),
     "zero": (Zero,),
     "ports": (Ports,),
