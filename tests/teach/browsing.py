@@ -36,7 +36,7 @@ def chromium() -> Iterator[Browser]:
 def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]:
     """A page, open and drawn; script: runs before the page's own; quiet: it complains of nothing. It must
     not ask another machine for anything."""
-    viewport = settings.pop("viewport", {"width": 1000, "height": 760})
+    viewport = settings.pop("viewport", {"width": 860, "height": 640})
     script, quiet = settings.pop("script", ""), settings.pop("quiet", True)
     context = browser.new_context(viewport=viewport, **settings)  # type: ignore[arg-type]
     page = context.new_page()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import time
@@ -12,12 +13,13 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from browsing import aim, chromium, idle, opened, settled, until, value, values
-from emulator import EmulatedBoard
 from matplotlib import image
 from playwright.sync_api import Browser, Page
-from served import served, teaching
+from served import served
 
 import armkin
+from armkin.model import units
+from armkin.teach.scene import scene
 from armkin.teach.server import Server
 from command_line import ROOT, run
 
@@ -40,72 +42,6 @@ def server() -> Iterator[Server]:
 def page(browser: Browser, server: Server) -> Iterator[Page]:
     with opened(browser, server.address) as one:
         yield one
-
-
-def net(board: EmulatedBoard) -> list[int]:
-    return [board.net()[axis] for axis in "XYZ"]
-
-
-def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
-    with EmulatedBoard() as board, teaching("three_dof", "--port", board.port) as url, opened(browser, url) as page:
-        until(page, "document.querySelector('#standing').textContent.includes('position lost')")
-        # Choose a branch of a target; the pulses are the command line's.
-        aim(page, 390, 80, 300)
-        page.get_by_role("radio", name="left, elbow down").click()
-        settled(page)
-        said = run("ik", "robots/three_dof.yaml", 390, 80, 300, "--branch", "left, elbow down", "--json").json
-        assert values(page, "#sliders input[type=number]") == [round(q, 4) for q in said["branches"][0]["joints"]]
-        page.get_by_role("radio", name="left, elbow up").click()
-        settled(page)
-        assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
-        # A lost position is not sent from; home is assumed only after it was said to be home.
-        page.click("#send")
-        until(page, "document.querySelector('#trouble').textContent.includes('position is lost')")
-        assert page.is_disabled("#assume")
-        page.check("#consent")
-        page.click("#assume")
-        idle(page, "assume home: done")
-        assert net(board) == [0, 0, 0]
-        page.click("#send")
-        idle(page, "send: done")
-        assert net(board) == COUNTS
-        assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
-        # STOP on the way home: the position stays known.
-        page.get_by_role("button", name="home", exact=True).click()
-        page.fill("#speed", "20")
-        page.click("#send")
-        until(page, "document.querySelector('#standing').textContent.startsWith('send')")
-        while net(board)[1] < COUNTS[1] + 200:
-            page.wait_for_timeout(20)
-        page.click("#stop")
-        idle(page, "stopped")
-        at = net(board)
-        assert "position known" in page.inner_text("#standing")
-        assert at != COUNTS
-        # Jog as long as the button is held.
-        before = net(board)
-        page.select_option("#jog-joint", label="q1")
-        page.hover("#jog-up")
-        page.mouse.down()
-        time.sleep(0.6)
-        page.mouse.up()
-        idle(page, "jog: done")
-        after = net(board)
-        assert after[0] > before[0] + 50
-        assert after[1:] == before[1:]
-        board.wait(0.3)
-        assert net(board) == after
-        # A program of two moves, carried out.
-        page.get_by_role("button", name="home", exact=True).click()
-        page.click("#record")
-        page.wait_for_selector("#name-0")
-        aim(page, 390, 80, 300)
-        page.click("#record")
-        page.wait_for_selector("#name-1")
-        page.fill("#speed", "100")
-        page.click("#run")
-        idle(page, "run: done")
-        assert net(board) == COUNTS
 
 
 def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
@@ -353,6 +289,24 @@ def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     until(page, "document.querySelector('#name-1')?.value === 'the other end'")
     page.click("#undo")
     until(page, "!document.querySelector('#moves li')")
+
+
+def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) -> None:
+    """Its ten lines of forward kinematics against ours, for every robot, calibrated ones, too."""
+    context = browser.new_context(bypass_csp=True)
+    page = context.new_page()
+    page.goto(server.address)
+    rng = np.random.default_rng(5)
+    for path in sorted((ROOT / "robots").glob("*.yaml")):
+        arm = armkin.load(str(path))
+        arm = dataclasses.replace(arm, ratio=rng.uniform(0.9, 1.1, arm.n))
+        q = rng.uniform(-2, 2, arm.n) * np.where(arm.prismatic, 100.0, 1.0)
+        tool = page.evaluate(
+            "async ([arm, q]) => (await import('/js/chain.js')).frames(arm, q).tool",
+            [scene(arm), units.joints_out(arm, q).tolist()],
+        )
+        assert np.reshape(tool, (4, 4)) == pytest.approx(armkin.fk(arm, q), abs=1e-8), arm.name
+    context.close()
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "cobra600", "moveo", "panda", "pan_tilt"])

@@ -1,0 +1,125 @@
+"""Measure the page: `python tests/bench/bench_teach.py`, from the project's folder.
+
+CPU of the server for one drag event, time to its answer; in a browser that draws in software, time from the pointer to
+the numbers on the page, and from the command to the first picture. The bars: 3 ms, 50 ms in the median, 1.5 s.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import math
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
+
+from browsing import chromium  # noqa: E402
+
+EVENTS = 400
+POSES = {"three_dof": [10, 60, -60], "ur5e": [20, -70, 80, -60, 70, 10]}
+WATCH = """() => {
+  window.seen = []; window.moved = 0;
+  addEventListener('pointermove', () => { window.moved = performance.now(); }, true);
+  new MutationObserver(() => {
+    if (window.moved) window.seen.push(performance.now() - window.moved);
+    window.moved = 0;
+  }).observe(document.querySelector('#panels'), { subtree: true, attributeFilter: ['aria-valuetext'] });
+}"""
+
+
+@contextmanager
+def teaching(robot: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
+    """The process, its address, and when it was started."""
+    began = time.perf_counter()
+    command = [sys.executable, "-m", "armkin", "teach", robot, "--no-open"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        yield process, process.stdout.readline().strip(), began
+    finally:
+        process.terminate()
+        process.communicate()
+
+
+def cpu(process: subprocess.Popen[str]) -> float:
+    """Seconds of CPU that a process has used (Linux)."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def events(robot: str) -> None:
+    """Drag events without a browser."""
+    with teaching(robot) as (process, address, _):
+        base, key = address.split("/#")
+        host = base.removeprefix("http://")
+        line = http.client.HTTPConnection(host)
+        line.connect()
+        line.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+        def act(name: str, tab: str = "", **fields: Any) -> Any:
+            headers = {"Origin": base, "Content-Type": "application/json", "X-Armkin-Key": key, "X-Armkin-Tab": tab}
+            line.request("POST", f"/api/{name}", json.dumps(fields), headers)
+            return json.loads(line.getresponse().read())
+
+        tab = act("open")["tab"]
+        news = http.client.HTTPConnection(host)
+        news.request("GET", f"/events?tab={tab}")
+        stream = news.getresponse()
+        q = POSES[robot]
+        target = act("look", tab, q=q)["target"]
+        times, begun = [], cpu(process)
+        for k in range(EVENTS):
+            moved = [target[0] + 10 * math.sin(k / 20), target[1] + 5 * math.cos(k / 15), *target[2:]]
+            since = time.perf_counter()
+            found = len(act("look", tab, q=q, target=moved)["branches"])
+            times.append(time.perf_counter() - since)
+        used = (cpu(process) - begun) / EVENTS
+        stream.close()
+        median = statistics.median(times)
+        print(f"{robot:10} {found} branches: {1e3 * used:.2f} ms CPU an event, {1e3 * median:.2f} ms to the answer")
+
+
+def page(robot: str) -> None:
+    """Drag the handle in a browser."""
+    with chromium() as browser, teaching(robot) as (_, address, began):
+        view = browser.new_page(viewport={"width": 1440, "height": 900})
+        view.goto(address)
+        view.wait_for_selector("html[data-ready]")
+        first = time.perf_counter() - began
+        view.evaluate(WATCH)
+        view.click("[data-view=front]")
+        view.wait_for_timeout(300)
+        x, y = map(float, (view.get_attribute("#canvas", "data-handle") or "").split())
+        box = view.locator("#canvas").bounding_box()
+        assert box is not None
+        x, y = x + box["x"], y + box["y"] - 45
+        view.mouse.move(x, y)
+        view.wait_for_timeout(200)
+        view.mouse.down()
+        for k in range(60):
+            view.mouse.move(x, y - 25 * math.sin(k / 8))
+            view.wait_for_timeout(60)
+        view.mouse.up()
+        seen = sorted(view.evaluate("window.seen"))
+        late = seen[int(0.95 * len(seen))]
+        print(
+            f"{robot:10} command to first picture {first:.2f} s; pointer to numbers, {len(seen)} moves: "
+            f"median {statistics.median(seen):.0f} ms, p95 {late:.0f} ms"
+        )
+
+
+if __name__ == "__main__":
+    for name in POSES:
+        events(name)
+    for name in POSES:
+        page(name)

@@ -1,0 +1,88 @@
+"""The whole way through the page by mouse: from a lost position to a program on the pins of the emulated board."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from browsing import aim, chromium, idle, opened, settled, until, values
+from emulator import EmulatedBoard
+from playwright.sync_api import Browser
+from served import teaching
+
+from command_line import run
+
+COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as one:
+        yield one
+
+
+def net(board: EmulatedBoard) -> list[int]:
+    return [board.net()[axis] for axis in "XYZ"]
+
+
+def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
+    with EmulatedBoard() as board, teaching("three_dof", "--port", board.port) as url, opened(browser, url) as page:
+        until(page, "document.querySelector('#standing').textContent.includes('position lost')")
+        # Choose a branch of a target; the pulses are the command line's.
+        aim(page, 390, 80, 300)
+        page.get_by_role("radio", name="left, elbow down").click()
+        settled(page)
+        said = run("ik", "robots/three_dof.yaml", 390, 80, 300, "--branch", "left, elbow down", "--json").json
+        assert values(page, "#sliders input[type=number]") == [round(q, 4) for q in said["branches"][0]["joints"]]
+        page.get_by_role("radio", name="left, elbow up").click()
+        settled(page)
+        assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
+        # A lost position is not sent from; home is assumed only after it was said to be home.
+        page.click("#send")
+        until(page, "document.querySelector('#trouble').textContent.includes('position is lost')")
+        assert page.is_disabled("#assume")
+        page.check("#consent")
+        page.click("#assume")
+        idle(page, "assume home: done")
+        assert net(board) == [0, 0, 0]
+        page.click("#send")
+        idle(page, "send: done")
+        assert net(board) == COUNTS
+        assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
+        # STOP on the way home: the position stays known.
+        page.get_by_role("button", name="home", exact=True).click()
+        page.fill("#speed", "20")
+        page.click("#send")
+        until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        while net(board)[1] < COUNTS[1] + 200:
+            page.wait_for_timeout(20)
+        page.click("#stop")
+        idle(page, "stopped")
+        at = net(board)
+        assert "position known" in page.inner_text("#standing")
+        assert at != COUNTS
+        # Jog as long as the button is held.
+        before = net(board)
+        page.select_option("#jog-joint", label="q1")
+        page.hover("#jog-up")
+        page.mouse.down()
+        time.sleep(0.6)
+        page.mouse.up()
+        idle(page, "jog: done")
+        after = net(board)
+        assert after[0] > before[0] + 50
+        assert after[1:] == before[1:]
+        board.wait(0.3)
+        assert net(board) == after
+        # A program of two moves, carried out.
+        page.get_by_role("button", name="home", exact=True).click()
+        page.click("#record")
+        page.wait_for_selector("#name-0")
+        aim(page, 390, 80, 300)
+        page.click("#record")
+        page.wait_for_selector("#name-1")
+        page.fill("#speed", "100")
+        page.click("#run")
+        idle(page, "run: done")
+        assert net(board) == COUNTS

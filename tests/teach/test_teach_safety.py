@@ -1,0 +1,207 @@
+"""What stops an arm that a page has set in motion: the firmware in the emulator."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from emulator import EmulatedBoard
+from served import Page, served
+
+from armkin.board.firmware.session import Session
+from command_line import ROOT, run
+
+POSE = [-30, 5, -5]
+COUNTS = [-1067, -10144, 5667]
+HOME = [0, 90, -90]
+
+
+@pytest.fixture
+def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
+    with EmulatedBoard() as board, served(board=board.port) as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        page.idle()
+        yield page, board
+        page.close()
+
+
+def net(board: EmulatedBoard) -> list[int]:
+    return [board.net()[axis] for axis in "XYZ"]
+
+
+def rests_within(board: EmulatedBoard, seconds: float) -> None:
+    """Simulated time until the pins are still."""
+    clock = 16_000_000
+    begin = board.control("cycles")["cycle"]
+    before, since = net(board), begin
+    while True:
+        now, at = board.control("cycles")["cycle"], net(board)
+        if at != before:
+            before, since = at, now
+        if now - since > 0.2 * clock:
+            break
+    assert (since - begin) / clock < seconds
+
+
+def begin_move(page: Page, board: EmulatedBoard) -> None:
+    """A move to the pose that has come a good way."""
+    assert page.act("assume_home", consent=True)[0] == 200
+    assert page.idle()["position"] == "known"
+    assert page.act("send", q=POSE, speed=50)[0] == 200
+    end = time.monotonic() + 20
+    while net(board)[1] > -2000:
+        assert time.monotonic() < end, page.idle()
+        time.sleep(0.01)
+
+
+def test_a_lost_position_is_not_sent_from_and_home_is_assumed_with_consent(
+    emulated: tuple[Page, EmulatedBoard],
+) -> None:
+    page, board = emulated
+    assert page.idle()["position"] == "lost"
+    page.act("send", q=POSE, speed=100)
+    assert "position is lost" in page.idle()["error"]
+    assert page.act("assume_home")[0] == 422  # without the consent
+    assert net(board) == [0, 0, 0]
+    page.act("assume_home", consent=True)
+    state = page.idle()
+    assert (state["position"], state["pulses"]) == ("known", [0, 0, 0])
+    page.act("send", q=POSE, speed=100)
+    assert page.idle()["pulses"] == COUNTS
+    assert net(board) == COUNTS
+
+
+def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under_way(
+    emulated: tuple[Page, EmulatedBoard], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, board = emulated
+    held: list[float] = []
+    before = Session.hold
+
+    def hold(session: Session) -> Any:
+        held.append(time.monotonic())
+        return before(session)
+
+    monkeypatch.setattr(Session, "hold", hold)
+    begin_move(page, board)
+    # The page asks for poses that take long (the nearest of an unreachable target), one after another.
+    end = threading.Event()
+
+    def ask() -> None:
+        while not end.is_set():
+            page.act("look", q=HOME, target=[2000, 500, 300], nearest=True)
+
+    busy = threading.Thread(target=ask)
+    busy.start()
+    try:
+        time.sleep(0.1)
+        began = time.monotonic()
+        assert page.act("stop")[0] == 200
+        state = page.idle()
+    finally:
+        end.set()
+        busy.join()
+    assert held[0] - began < 0.1
+    assert state["error"] == "stopped"
+    assert state["position"] == "known"
+    assert state["pulses"] == net(board)
+
+
+def test_a_closed_page_holds_the_arm(emulated: tuple[Page, EmulatedBoard]) -> None:
+    page, board = emulated
+    begin_move(page, board)
+    page.close()
+    rests_within(board, 1.0)
+    state = page.idle()
+    assert state["position"] == "known"
+    assert state["pulses"] == net(board) != COUNTS
+
+
+def test_a_watching_page_that_is_closed_holds_nothing(emulated: tuple[Page, EmulatedBoard]) -> None:
+    page, board = emulated
+    watcher = Page(page.server)
+    begin_move(page, board)
+    watcher.close()
+    assert page.idle()["pulses"] == COUNTS
+
+
+def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
+    with EmulatedBoard() as board:
+        command = [sys.executable, "-m", "armkin", "teach", "robots/three_dof.yaml", "--no-open", "--port", board.port]
+        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            assert process.stdout is not None
+            page = _Elsewhere(process.stdout.readline().strip())
+            page.act("assume_home", consent=True)
+            page.act("send", q=POSE, speed=50)
+            end = time.monotonic() + 20
+            while net(board)[1] > -2000:
+                assert time.monotonic() < end
+                time.sleep(0.01)
+            process.send_signal(signal.SIGSTOP)
+            rests_within(board, 1.0)
+            process.send_signal(signal.SIGCONT)
+            time.sleep(0.5)
+            status = page.act("open")["board"]
+            assert "half a second" in status["error"]
+            assert status["position"] == "known"
+            assert status["pulses"] == net(board)
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(10) == 143
+            assert process.stderr is not None
+            assert process.stderr.read() == ""
+        finally:
+            process.kill()
+            process.communicate()
+
+
+class _Elsewhere:
+    """The page of a server in another process."""
+
+    def __init__(self, address: str) -> None:
+        self.base, _, self.key = address.partition("/#")
+        self.tab = ""
+        self.tab = self.act("open")["tab"]
+        self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}")
+        for _ in range(200):
+            if not self.act("open")["board"]["doing"]:
+                break
+            time.sleep(0.05)
+
+    def act(self, name: str, **fields: Any) -> Any:
+        headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}
+        request = urllib.request.Request(
+            f"{self.base}/api/{name}", json.dumps(fields).encode(), {**headers, "X-Armkin-Tab": self.tab}
+        )
+        for _ in range(100):
+            try:
+                return json.load(urllib.request.urlopen(request))
+            except urllib.error.HTTPError as error:
+                if error.code != 409:
+                    raise
+                time.sleep(0.05)  # busy still
+        raise AssertionError(f"{name}: busy all the time")
+
+
+def test_a_server_that_ends_stops_the_arm_first() -> None:
+    with EmulatedBoard() as board:
+        with served(board=board.port) as server:
+            page = Page(server)
+            page.hear("control", lambda news: news["holder"] == "yours")
+            page.idle()
+            begin_move(page, board)
+        rests_within(board, 0.2)
+        status = run("status", "robots/three_dof.yaml", "--port", board.port, "--json").json
+        assert status["position"] == "retained"  # opening the port has reset the board, which stood still
+        page.close()
