@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,8 +124,8 @@ def test_plot_the_homeworks_path(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["1", "2", "3"], 2, "plot needs --out FILE, a .png or .svg"),
-        (["--out", "a.png"], 2, "nothing to draw: give joint values (q1 q2 q3), --target or --path"),
+        (["1", "2", "3"], 2, "there is no display to open a window on; name a file for the picture"),
+        (["--out", "a.png"], 2, "nothing to draw: give joint values (q1 q2 q3), a pose's name, --target or --batch"),
         (["1", "2", "--out", "a.png"], 2, "three_dof takes 3 numbers (q1 q2 q3), got 2"),
         (["1", "2", "3", "--out", "a.gif"], 2, "a.gif: a picture is written as .png or .svg"),
         (["1", "2", "3", "--out", "a.png", "--view", "up"], 2, "--view up: there are front, side, top, iso"),
@@ -138,6 +139,8 @@ def test_plot_the_homeworks_path(tmp_path: Path) -> None:
 def test_plot_errors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int, message: str
 ) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
     result = run("plot", THREE_DOF, *words)
     assert (result.code, result.out) == (code, "")
     assert message in result.err
@@ -146,10 +149,56 @@ def test_plot_errors(
 
 def test_too_long_a_path(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
-    path.write_text("1,2,3\n" * 501)
+    path.write_text("1,2,3\n" * 20_001)
     result = run("plot", THREE_DOF, "--path", path, "--out", tmp_path / "a.png")
     assert result.code == 2
-    assert "more than 500 poses cannot be told apart" in result.err
+    assert "more than 20000 poses are too many for one picture" in result.err
+
+
+def test_plot_takes_what_other_commands_print(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[dict[str, Any]] = []
+
+    def plot_poses(arm: Any, q: Any, out: str, **style: Any) -> None:
+        drawn.append({"poses": np.atleast_2d(q).shape[0], "names": style.get("names"), "out": out})
+
+    monkeypatch.setattr("armkin.plot.plot_poses", plot_poses)
+    targets = b"390,80,300\n9000,0,0\n0,400,200\n"
+    one = run("ik", THREE_DOF, 390, 80, 300, "--json")
+    every = run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches")
+    rows = run("ik", THREE_DOF, "--batch", "-", stdin=targets)
+    lines = run("ik", THREE_DOF, "--batch", "-", "--json", stdin=targets)
+    trace = run("send", THREE_DOF, -30, 5, -5, "--dry-run", "--trace", "-")
+    for source, words in [
+        (one, []),
+        (every, []),
+        (rows, [THREE_DOF, "--batch", "-"]),
+        (rows, [THREE_DOF, "--path", "-"]),
+        (lines, ["three_dof"]),
+        (trace, [THREE_DOF, "--batch", "-"]),
+    ]:
+        assert run("plot", *words, "-o", "a.png", stdin=source.out.encode()).code == 0
+    assert [picture["poses"] for picture in drawn][:5] == [1, 4, 2, 2, 2]
+    assert drawn[5]["poses"] > 100
+    assert drawn[1]["names"][0] == "left, elbow up"
+
+
+def test_plot_without_out_opens_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a stand-in for the toolkit: this machine may have neither a display nor a toolkit."""
+    from matplotlib.figure import Figure
+
+    shown: list[Figure] = []
+
+    class Windows:
+        def figure(self, **options: Any) -> Figure:
+            shown.append(Figure(**options))
+            return shown[-1]
+
+        def show(self) -> None:
+            assert shown[-1].axes
+
+    monkeypatch.setattr("armkin.plot.canvas.windows", Windows)
+    assert run("plot", THREE_DOF, "home").code == 0
+    assert len(shown) == 1
 
 
 @pytest.mark.parametrize("words", [["plot", "0", "0", "0", "--out"], ["workspace", "--plot"]])

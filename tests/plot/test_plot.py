@@ -19,6 +19,7 @@ from armkin.model.arm import from_links
 from armkin.plot import plot_poses, plot_workspace
 from armkin.plot.canvas import space, tick_step
 from armkin.reach import Workspace, workspace
+from armkin.robot_file import catalogue
 from armkin.view.skeleton import skeleton
 from command_line import ROOT
 
@@ -140,10 +141,66 @@ def test_path(tmp_path: Path, drawn: list[Any]) -> None:
     [figure] = drawn
     assert [text for text in texts(figure) if text in ("start", "end")] == ["start", "end"]
     tips = fk(THREE_DOF, poses)[:, :3, 3]
-    assert any(
-        np.array(line.get_data_3d()).shape == (3, 7) and np.allclose(np.array(line.get_data_3d()).T, tips)
-        for line in figure.axes[0].lines
-    )
+    ways = [np.array(line.get_data_3d()).T for line in figure.axes[0].lines]
+    [way] = [way for way in ways if way.shape == (6 * 16 + 1, 3)]
+    assert np.allclose(way[::16], tips)
+    middle = fk(THREE_DOF, (poses[2] + poses[3]) / 2)[:3, 3]  # where the tip is, and not half of the chord
+    assert np.allclose(way[2 * 16 + 8], middle)
+    assert np.linalg.norm((tips[2] + tips[3]) / 2 - middle) > 1
+
+
+def test_a_long_path_shows_some_arms_and_the_whole_way(tmp_path: Path, drawn: list[Any]) -> None:
+    poses = np.deg2rad([[a / 10, 30 + a / 30, -40] for a in range(1000)])
+    plot_poses(THREE_DOF, poses, str(tmp_path / "path.png"))
+    [figure] = drawn
+    arms = [line for line in figure.axes[0].lines if np.array(line.get_data_3d()).shape == (3, 5)]
+    assert len(arms) == 40
+    assert max(np.array(line.get_data_3d()).shape[1] for line in figure.axes[0].lines) > 10_000
+
+
+def boxes(figure: Any) -> tuple[Any, Any]:
+    """What is seen of the axes in space, and the legend: [pixels]."""
+    from armkin.plot.canvas import _seen
+
+    [axes] = figure.axes
+    legend = axes.get_legend()
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    return _seen(axes), None if legend is None else legend.get_window_extent(renderer)
+
+
+@pytest.mark.parametrize("name", catalogue.names())
+def test_nothing_of_a_shipped_robot_is_cut_off_or_covered(name: str, tmp_path: Path, drawn: list[Any]) -> None:
+    arm = armkin.load(name)
+    plot_poses(arm, arm.home, str(tmp_path / "home.png"))
+    near = arm.home + 0.2 * np.where(arm.prismatic, arm.reach, 1.0) * np.array([[1.0], [-1.0]])
+    names = ["right, elbow down, flip", "left, elbow up, no flip"]
+    plot_poses(arm, near, str(tmp_path / "branches.png"), names=names)
+    shown = [text.get_text() for axes in drawn[0].axes for text in axes.texts]
+    assert set(" ".join(shown).replace(",", "").split()) >= set(arm.joint_names)
+    for figure in drawn:
+        if not hasattr(figure.axes[0], "get_zlim"):
+            continue
+        assert (figure.axes[0].elev, figure.axes[0].azim) == (drawn[0].axes[0].elev, drawn[0].axes[0].azim)
+        (low, high), legend = boxes(figure)
+        assert np.all(low >= 0)
+        assert np.all(high <= figure.bbox.size)
+        assert legend is None or legend.x1 <= low[0] + 1
+        places = [axis.get_majorticklocs() for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis)]
+        assert all(len(marks) for marks in places)
+
+
+def test_twins_are_seen_beside_each_other(tmp_path: Path, drawn: list[Any]) -> None:
+    """A wrist flip leaves every corner of the arm where it is."""
+    arm = armkin.load("puma560")
+    s = armkin.ik(arm, fk(arm, [0.3, -0.5, 0.4, 0.5, 0.7, 0.2]), "pose")
+    names = [s.names[k] for k in s.branch[s.valid]]
+    plot_poses(arm, s.q[s.valid], str(tmp_path / "twins.png"), names=names)
+    lines = {line.get_label(): line.get_linewidth() for line in drawn[0].axes[0].lines}
+    by_name = {name: width for label, width in lines.items() for name in names if str(label).startswith(name)}
+    for name in names:
+        if name.endswith("no flip"):
+            continue
+        assert abs(by_name[name] - by_name[name.removesuffix("flip") + "no flip"]) >= 2
 
 
 def test_planar_arm_is_drawn_in_its_plane(tmp_path: Path, drawn: list[Any]) -> None:
@@ -222,8 +279,8 @@ def test_tick_steps_are_round() -> None:
     [
         ([1, 2], {}, "three_dof has 3 joints (q1, q2, q3): expected 3 values on the last axis, got 2"),
         ([1, 2, np.nan], {}, "joint values must be finite to be drawn"),
-        (np.zeros((501, 3)), {}, "501 poses in one picture: give 1 to 500"),
-        (np.zeros((0, 3)), {}, "0 poses in one picture: give 1 to 500"),
+        (np.zeros((20_001, 3)), {}, "20001 poses in one picture: give 1 to 20000"),
+        (np.zeros((0, 3)), {}, "0 poses in one picture: give 1 to 20000"),
         (np.zeros((2, 3)), {"names": ["a"]}, "2 poses and 1 names: give each pose its name"),
     ],
 )

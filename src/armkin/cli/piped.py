@@ -80,13 +80,18 @@ def joint_values(robot: str | None) -> tuple[Arm, list[list[float]]] | None:
     if found is None:
         return None
     arm, parsed = found
+    return arm, joints_of(arm, parsed)
+
+
+def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
+    """Joint values [deg | mm] of answers; those without a branch within limits are skipped, with a warning."""
     values = [_joints(answer, arm) for answer in parsed if not _is_unsolved(answer)]
     if len(values) < len(parsed):
         skipped = f"{len(parsed) - len(values)} of {len(parsed)} answers have no branch within limits"
         if not values:
             raise NoSolutionError(f"{skipped}: there are no joint values on standard input")
         output.warn(f"{skipped}: skipped")
-    return arm, values
+    return values
 
 
 def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:

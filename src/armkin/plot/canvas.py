@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -61,20 +63,44 @@ def require() -> None:
 
 
 @contextmanager
-def picture(path: str, width: float, height: float) -> Iterator[Any]:
-    """A figure [inches] to draw on, saved at the end; the file appears whole or not at all."""
-    kind = check(path)
+def picture(path: str | None, width: float, height: float) -> Iterator[Any]:
+    """A figure [inches] to draw on, saved at the end: the file appears whole or not at all; None: in a window."""
+    kind = None if path is None else check(path)
     require()
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
+        if path is None:
+            plt = windows()
+            yield plt.figure(figsize=(width, height), facecolor="white")
+            plt.show()
+            return
         figure = Figure(figsize=(width, height), facecolor="white")
         yield figure
         # No date and no version of matplotlib in the file.
         blank = {"Date": None, "Creator": "armkin"} if kind == "svg" else {"Software": "armkin"}
         with whole(path, "wb") as file:
             figure.savefig(file, format=kind, metadata=blank)
+
+
+def windows() -> Any:
+    """matplotlib's pyplot, if it can open a window here.
+
+    Raises UsageError where there is no display, MissingExtraError where there is no toolkit for windows.
+    """
+    require()
+    posix = sys.platform not in ("win32", "darwin")
+    if posix and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise UsageError("there is no display to open a window on; name a file for the picture, a .png or .svg")
+    plt = import_module("matplotlib.pyplot")
+    try:
+        plt.switch_backend("TkAgg" if plt.get_backend().lower() == "agg" else plt.get_backend())
+    except Exception as error:
+        raise MissingExtraError(
+            f"matplotlib cannot open a window ({error}); install a toolkit (pip install PyQt6), or name a file"
+        ) from None
+    return plt
 
 
 def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any:
@@ -88,7 +114,7 @@ def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any
         axis.pane.set_edgecolor(FAINT)
         axis._axinfo["grid"].update(color=FAINT, linewidth=0.6)
         axis.line.set_color(SOFT)
-        getattr(axes, f"set_{name}label")(f"{name} / mm", labelpad=8 if name == "z" else 5)
+        getattr(axes, f"set_{name}label")(f"{name} / mm", labelpad=13 if name == "z" else 6)
         axes.tick_params(axis=name, pad=4 if name == "z" else 1, colors=SOFT)
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90)
@@ -114,41 +140,66 @@ def _on_paper(elevation: float, azimuth: float) -> Array:
 def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5) -> None:
     """Limits that hold all points (N, 3) [mm] and the floor, a millimetre as long on every axis.
 
-    The box fills the place that the axes were given, with room for their labels.
+    The box, its ticks and its labels fill the place that the axes were given, and nothing leaves it.
     """
-    from matplotlib.ticker import MultipleLocator
+    from matplotlib.ticker import FixedLocator
 
-    proj3d = import_module("mpl_toolkits.mplot3d.proj3d")
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(low[2], floor)
     size = high - low
     most = float(size.max()) or 1.0
     # No side is so short that its ticks would run into each other.
-    grow = np.maximum(0.5 * (0.4 * most - size), 0.0) + 0.04 * most
+    grow = np.maximum(0.5 * (0.5 * most - size), 0.0) + 0.04 * most
     if low[2] == floor:  # the arm stands on the floor
         low, high = low - grow * [1, 1, 0], high + grow * [1, 1, 2]
     else:
         low, high = low - grow, high + grow
+    step = tick_step(most, ticks)
     for name, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{name}lim")(a, b)
-        getattr(axes, f"{name}axis").set_major_locator(MultipleLocator(tick_step(most, ticks)))
+        # Where two axes meet, the last tick of one would lie on the first of the other.
+        edge = 0.0 if name == "z" else min(0.1 * (b - a), 0.5 * step)
+        marks = step * np.arange(np.ceil((a + edge) / step), np.floor((b - edge) / step) + 1)
+        getattr(axes, f"{name}axis").set_major_locator(FixedLocator(marks.tolist()))
+    _fill(axes, high - low)
 
+
+def renderer(figure: Any) -> Any:
+    """What measures text in a figure, before anything is drawn."""
+    if hasattr(figure.canvas, "get_renderer"):
+        return figure.canvas.get_renderer()
+    agg: Any = import_module("matplotlib.backends.backend_agg")
+    return agg.FigureCanvasAgg(figure).get_renderer()
+
+
+def _fill(axes: Any, size: Array) -> None:
+    """Make the box (size: mm along each axis) as large as its place allows, ticks and labels included."""
     x0, y0, width, height = axes.get_position().bounds
-    square = _on_paper(axes.elev, axes.azim).min() < 0.1
-    room = np.array([0.80 * width, (0.72 if square else 0.86) * height])
-    middle = np.array([x0 + 0.5 * width, y0 + 0.52 * height])
-    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    zoom = 1.0
-    for _ in range(3):  # perspective: the size on paper is only nearly proportional to the zoom
-        axes.set_box_aspect(high - low, zoom=zoom)
-        axes.apply_aspect()
-        across, up, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
-        shown = axes.figure.transFigure.inverted().transform(axes.transData.transform(np.column_stack([across, up])))
-        least, greatest = shown.min(axis=0), shown.max(axis=0)
+    room, middle = np.array([width, height]), np.array([x0 + 0.5 * width, y0 + 0.5 * height])
+    zoom, fits = 1.0, axes.figure.transFigure.inverted()
+    for _ in range(5):  # the labels do not grow with the box, and perspective is only nearly proportional
+        axes.set_box_aspect(size, zoom=zoom)
+        least, greatest = fits.transform(_seen(axes))
         zoom *= float((room / (greatest - least)).min())
-        shift = middle - 0.5 * (least + greatest)
         place = axes.get_position(original=True)
+        shift = middle - 0.5 * (least + greatest)
         axes.set_position([place.x0 + shift[0], place.y0 + shift[1], place.width, place.height])
+
+
+def _seen(axes: Any) -> Array:
+    """Corners of all that is seen of the axes in space, ticks and labels included: (2, 2) [pixels]."""
+    drawer = renderer(axes.figure)
+    axes.apply_aspect()
+    axes.M = axes.get_proj()
+    axes.invM = np.linalg.inv(axes.M)
+    boxes = [axis.get_tightbbox(drawer) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    corners = np.array([[x, y, z] for x in ends[0] for y in ends[1] for z in ends[2]])
+    across, up, _ = import_module("mpl_toolkits.mplot3d.proj3d").proj_transform(*corners.T, axes.M)
+    points = [axes.transData.transform(np.column_stack([across, up]))]
+    points += [box.get_points() for box in boxes if box is not None and np.isfinite(box.get_points()).all()]
+    seen = np.concatenate(points)
+    return np.array([seen.min(axis=0), seen.max(axis=0)])
 
 
 def tick_step(size: float, most: float = 7.5) -> float:

@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.forward import as_joints
+from armkin.forward import as_joints, fk
 from armkin.forward import frames as joint_frames
 from armkin.model.limits import outside
-from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, space, true_proportions
+from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
 from armkin.reach.volume import motion
 from armkin.view.skeleton import Skeleton, skeleton
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MOST = 500  # poses that a picture can still tell apart, generously
+MOST = 20_000  # poses of one path
+_DRAWN = 40  # of them, evenly spaced, that are drawn as arms
+_BETWEEN = 16  # points of the tip's way from one pose to the next
+_ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # of the eye [deg]
 _AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # x, y, z of a frame
 
 
 def plot_poses(
     arm: Arm,
     q: ArrayLike,
-    out: str,
+    out: str | None,
     *,
     names: Sequence[str] | None = None,
     target: ArrayLike | None = None,
@@ -38,9 +42,10 @@ def plot_poses(
     """Draw an arm in one or several poses into a .png or .svg file.
 
     q: (n,) or (K, n) [rad | mm]. names: one for each pose, for the legend; without names several poses
-    are a path, coloured from its start to its end. target: (3,) [mm] a point to mark. frames: draw the
-    joint frames (by default for a single pose only). view: elevation and azimuth of the eye [deg];
-    by default from the side of the arm. Arms that move in the xy plane are drawn in that plane.
+    are a path, coloured from its start to its end, with the way of the tip as joints move in between.
+    target: (3,) [mm] a point to mark. frames: draw the joint frames (by default for a single pose only).
+    view: elevation and azimuth of the eye [deg]. Arms that move in the xy plane are drawn in that plane.
+    out: None opens a window.
     """
     poses = np.atleast_2d(as_joints(arm, q))
     if not 1 <= len(poses) <= MOST:
@@ -49,31 +54,32 @@ def plot_poses(
         raise UsageError("joint values must be finite to be drawn")
     if names is not None and len(names) != len(poses):
         raise UsageError(f"{len(poses)} poses and {len(names)} names: give each pose its name")
-    bones = [skeleton(arm, pose) for pose in poses]
     alone = len(poses) == 1
+    shown = poses if names is not None else poses[_spread(len(poses))]
+    bones = [skeleton(arm, pose) for pose in shown]
     with_frames = alone if frames is None else frames
-    legal = [not outside(arm, pose).any() for pose in poses]
+    legal = [not outside(arm, pose).any() for pose in shown]
     legend = ["start", "end"]
     if names is not None:
         legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
-    with picture(out, 8.0, 5.8) as figure:
-        drawing = _Drawing(arm, figure, bones, view, aside=0.0 if alone else 0.16)
-        # Branches may lie on each other: each one is drawn wider than those that follow on top of it,
-        # and the first one, which is the best, comes last.
-        widths = 2.6 + np.minimum(0.9, 4.0 / len(poses)) * np.arange(len(poses))
-        several = list(enumerate(bones)) if names is None else list(enumerate(bones))[::-1]
+    with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
+        track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
+        drawing = _Drawing(arm, figure, bones, view, track)
+        # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
+        widths = 2.4 + np.minimum(0.5, 3.0 / len(shown)) * np.arange(len(shown)) + _twins(bones)
+        several = list(enumerate(bones)) if names is None else sorted(enumerate(bones), key=lambda k: -widths[k[0]])
         for k, bone in several:
             if alone:
                 drawing.single(bone)
             elif names is None:
-                label = legend[k] if k < 1 else legend[1] if k == len(poses) - 1 else None
-                drawing.arm(bone, _along(k / (len(poses) - 1)), label, 2.6, dashed=not legal[k])
+                label = legend[k] if k < 1 else legend[1] if k == len(shown) - 1 else None
+                drawing.arm(bone, _along(k / (len(shown) - 1)), label, 2.6, dashed=not legal[k])
             else:
-                drawing.arm(bone, _apart(k, len(poses)), legend[k], widths[k], dashed=not legal[k])
-        if not alone and names is None:
-            drawing.track(np.array([bone.tip for bone in bones]))
+                drawing.arm(bone, _apart(k, len(shown)), legend[k], widths[k], dashed=not legal[k])
+        if track is not None:
+            drawing.track(track)
         if with_frames:
-            for pose in poses:
+            for pose in shown:
                 drawing.frames(pose)
         if target is not None:
             drawing.mark(np.asarray(target, dtype=float))
@@ -83,6 +89,8 @@ def plot_poses(
             notes += [] if legal[0] else ["outside the joint limits"]
         if with_frames:
             notes.append("frames: x red, y green" + ("" if drawing.dimensions == 2 else ", z blue"))
+        if alone:
+            drawing.name_joints(bones[0])
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
 
 
@@ -90,10 +98,16 @@ class _Drawing:
     """Axes in space, or in a plane for an arm that moves in the xy plane."""
 
     def __init__(
-        self, arm: Arm, figure: Any, bones: list[Skeleton], view: tuple[float, float] | None, aside: float
+        self,
+        arm: Arm,
+        figure: Any,
+        bones: list[Skeleton],
+        view: tuple[float, float] | None,
+        track: Array | None,
     ) -> None:
         self.robot, self.figure = arm, figure
-        self.points = np.concatenate([*(bone.path for bone in bones), arm.base[None, :3, 3]])
+        ways = [] if track is None else [track]
+        self.points = np.concatenate([*(bone.path for bone in bones), *ways, arm.base[None, :3, 3]])
         normal, _ = motion(arm)
         self.planar = view is None and normal is not None and bool(abs(normal[2]) > 1 - 1e-9)
         self.size = float(np.ptp(self.points, axis=0).max()) or arm.reach
@@ -102,17 +116,28 @@ class _Drawing:
             self.axes = flat(figure, (0.11, 0.1, 0.86, 0.76), ("x / mm", "y / mm"))
         else:
             self.dimensions = 3
-            self.axes = space(figure, (0.02 + aside, 0.0, 0.96 - aside, 0.9), view or self._from_the_side(bones))
+            self.axes = space(figure, (0.02, 0.02, 0.96, 0.88), view or _from_the_side(arm))
             self.floor = min(float(self.points[:, 2].min()), float(arm.base[2, 3]))
 
-    def _from_the_side(self, bones: list[Skeleton]) -> tuple[float, float]:
-        """The eye looks across the plane in which the arm reaches out, but along no wall."""
-        x, y, _ = np.mean([bone.tip for bone in bones], axis=0) - self.robot.base[:3, 3]
-        if np.hypot(x, y) < 0.02 * self.size:
-            return 22.0, -60.0
-        azimuths = np.array([-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0])
-        sideways = np.abs(np.sin(np.radians(azimuths) - np.arctan2(y, x)))
-        return 22.0, float(azimuths[np.argmax(np.round(sideways, 6))])
+    def name_joints(self, bone: Skeleton) -> None:
+        """Each joint's name beside it; joints in one place share a line."""
+        groups: list[tuple[Array, list[str]]] = []
+        for at, name in zip(bone.joints, self.robot.joint_names, strict=True):
+            for place, names in groups:
+                if np.linalg.norm(place - at) < 0.06 * self.size:
+                    names.append(name)
+                    break
+            else:
+                groups.append((at, [name]))
+        for place, names in groups:
+            where = place[: self.dimensions]
+            halo = import_module("matplotlib.patheffects").withStroke(linewidth=2.5, foreground="white")
+            beside = {"fontsize": 9.5, "color": INK, "zorder": 9, "path_effects": [halo]}
+            if self.dimensions == 2:
+                offset = {"xytext": (7, -13), "textcoords": "offset points"}
+                self.axes.annotate(", ".join(names), where, **offset, **beside)
+            else:
+                self.axes.text(where[0], where[1], where[2] + 0.035 * self.size, "   " + ", ".join(names), **beside)
 
     def line(self, points: Array, **style: Any) -> None:
         self.axes.plot(*points.T[: self.dimensions], **style)
@@ -174,22 +199,61 @@ class _Drawing:
         self.line(point[None], marker="o", markersize=13, label="target", zorder=8, **ring)
 
     def finish(self, title: str, note: str, order: Sequence[str] | None) -> None:
-        """Limits, title and legend."""
-        if self.dimensions == 3:
-            true_proportions(self.axes, self.points, self.floor)
-        else:
-            self.axes.margins(0.08)
+        """Title, legend beside the axes, and limits that fill what is left."""
         self.figure.text(0.03, 0.97, title, fontsize=min(13.0, 800 / max(len(title), 1)), va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
-        if order is not None:
-            handles, texts = self.axes.get_legend_handles_labels()
-            rank = {text: k for k, text in enumerate(order)}
-            pairs = sorted(zip(handles, texts, strict=True), key=lambda pair: rank.get(pair[1], len(rank)))
-            place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 0.895 if note else 0.935)}
-            place |= {"bbox_transform": self.figure.transFigure}
-            if self.dimensions == 2:
-                place = {"loc": "best", "frameon": True, "facecolor": "white", "edgecolor": FAINT}
-            self.axes.legend(*zip(*pairs, strict=True), handlelength=2.6, **place)
+        left = 0.02 if order is None else self._legend(order, 0.895 if note else 0.935)
+        if self.dimensions == 3:
+            self.axes.set_position([left, 0.02, 0.98 - left, 0.86])
+            true_proportions(self.axes, self.points, self.floor)
+        else:
+            self.axes.set_position([left + 0.09, 0.1, 0.88 - left, 0.76])
+            self.axes.margins(0.08)
+
+    def _legend(self, order: Sequence[str], top: float) -> float:
+        """A legend in a column of its own; returns where it ends, as a share of the figure's width."""
+        handles, texts = self.axes.get_legend_handles_labels()
+        rank = {text: k for k, text in enumerate(order)}
+        pairs = sorted(zip(handles, texts, strict=True), key=lambda pair: rank.get(pair[1], len(rank)))
+        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, top)}
+        place |= {"bbox_transform": self.figure.transFigure, "fontsize": 9.5 if len(pairs) < 14 else 7.5}
+        legend = self.axes.legend(*zip(*pairs, strict=True), handlelength=2.6, **place)
+        for handle in legend.get_lines():
+            handle.set_linewidth(min(handle.get_linewidth(), 4.0))
+        box = legend.get_window_extent(renderer(self.figure))
+        return float(box.x1 / self.figure.bbox.width) + 0.01
+
+
+def _from_the_side(arm: Arm) -> tuple[float, float]:
+    """The eye looks across the plane in which the arm reaches out at home: the same in all its pictures."""
+    x, y, _ = fk(arm, arm.home)[:3, 3] - arm.base[:3, 3]
+    if np.hypot(x, y) < 0.02 * arm.reach:
+        return _ELEVATION, _AZIMUTHS[0]
+    sideways = np.abs(np.sin(np.radians(_AZIMUTHS) - np.arctan2(y, x)))
+    return _ELEVATION, _AZIMUTHS[int(np.argmax(np.round(sideways, 6)))]
+
+
+def _spread(count: int) -> NDArray[np.int64]:
+    """Indices of the poses of a path that are drawn: its ends, and evenly in between."""
+    return np.unique(np.linspace(0, count - 1, min(count, _DRAWN)).round().astype(np.int64))
+
+
+def _way(poses: Array) -> Array:
+    """Joint values along a path (K, n) -> (M, n): straight from each pose to the next, as joints move."""
+    between = max(1, min(_BETWEEN, MOST // len(poses)))
+    share = np.arange(between)[:, None] / between
+    steps = poses[:-1, None] + share * np.diff(poses, axis=0)[:, None]
+    return np.concatenate([steps.reshape(-1, poses.shape[1]), poses[-1:]])
+
+
+def _twins(bones: Sequence[Skeleton]) -> Array:
+    """How much wider each skeleton is drawn because it lies on earlier ones: wrist flips move no corner."""
+    rank = np.zeros(len(bones))
+    for k, bone in enumerate(bones):
+        for other in bones[:k]:
+            same = bone.path.shape == other.path.shape
+            rank[k] += same and bool(np.allclose(bone.path, other.path, rtol=0, atol=1e-3 * np.ptp(bone.path)))
+    return rank * min(3.2, 9.6 / max(float(rank.max()), 1.0))
 
 
 def _along(share: float) -> Any:

@@ -62,7 +62,7 @@ def workspace(
     progress: called with the number of samples done. position: the tip (N, 3) for joint values (N, n), by default
     `armkin.forward.position`; `armkin.compile(arm).position` is faster.
 
-    Memory does not grow with the number of samples. The volume does not depend on it from 100,000 on; below,
+    Memory does not grow with the number of samples. The volume does not depend on it from 5,000 on; below,
     its error grows: see `extent`.
     """
     started = time.perf_counter()

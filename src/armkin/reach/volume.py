@@ -44,7 +44,7 @@ _STRETCHES = 64  # at most, along the sweep
 _UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples grown from them
 _CHUNK = 1 << 16
 _LEAST_CHUNK = 1 << 11
-_ALL = 100_000  # samples of a survey from which its volume is worth the whole effort
+_ALL = 5_000  # samples of a survey from which its volume is worth the whole effort
 _POOL = 1 << 14  # poses to grow from
 _OVERSHOOT = 0.04  # of the range: samples beyond a limit are set on it
 _MARGIN = 0.02  # of the section's size, around what a first look finds
@@ -64,7 +64,7 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     """Volume [mm3] of an arm's reach, or area [mm2] if it moves in a plane.
 
     An arm whose tip has fewer freedoms than the space it moves in (two joints in space sweep a
-    surface) has the volume 0. samples: of the survey that asks; for fewer than 100,000 the volume, too, is
+    surface) has the volume 0. samples: of the survey that asks; for fewer than 5,000 the volume, too, is
     found from proportionally fewer poses, and its error says so.
     """
     normal, freedoms = motion(arm)

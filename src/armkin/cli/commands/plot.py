@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import holding, inputs, render
+from armkin.cli import holding, inputs, piped, render
 from armkin.cli.csv_rows import batch_rows
 from armkin.cli.numbers import listed
-from armkin.cli.options import Joints, Lock, Robot, TaskName
+from armkin.cli.options import Joints, Lock, RobotOrPipe, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -20,16 +20,18 @@ _VIEWS = {"front": (0.0, -90.0), "side": (0.0, 0.0), "top": (90.0, -90.0), "iso"
 
 
 def plot(
-    robot: Robot,
+    robot: RobotOrPipe = None,
     q: Joints = None,
-    out: Annotated[str | None, typer.Option("--out", metavar="FILE", help="The picture, .png or .svg.")] = None,
+    out: Annotated[
+        str | None, typer.Option("--out", "-o", metavar="FILE", help="The picture, .png or .svg. [default: a window]")
+    ] = None,
     target: Annotated[
         str | None,
         typer.Option("--target", metavar="X,Y,Z", help="Instead of joint values: all branches that reach it."),
     ] = None,
-    path: Annotated[
+    batch: Annotated[
         str | None,
-        typer.Option("--path", metavar="FILE|-", help="Instead: all poses of a CSV file, one row a pose."),
+        typer.Option("--batch", "--path", metavar="FILE|-", help="Instead: all poses of a CSV file, one row a pose."),
     ] = None,
     task: TaskName = None,
     lock: Lock = None,
@@ -48,45 +50,74 @@ def plot(
 ) -> None:
     """A picture of the arm.
 
-    In one pose, in all branches of a target, or along a path.
+    In one pose, in all branches of a target, or along a path. Takes what fk, ik and pulses say with --json
+    from a pipe, too.
     """
-    if out is None:
-        raise UsageError("plot needs --out FILE, a .png or .svg")
-    from armkin.plot import canvas, plot_poses
+    from armkin.plot import canvas
 
-    canvas.check(out)
+    if out is not None:
+        canvas.check(out)
+    else:
+        canvas.windows()  # says at once that there is no display
     canvas.require()
-    arm = inputs.load(robot)
-    if target is not None and q:
-        _no_words(arm, task, target, q)
-    if sum((bool(q), target is not None, path is not None)) > 1:
-        raise UsageError("joint values, --target and --path: give one of the three")
-    if not (q or target or path):
-        raise UsageError(f"nothing to draw: give joint values ({' '.join(arm.joint_names)}), --target or --path")
     if target is None and (task is not None or lock):
         raise UsageError("--task and --lock belong to --target")
-    eye = None if view is None else _eye(view)
+    style: dict[str, Any] = {"frames": frames, "view": None if view is None else _eye(view)}
+    if target is None and batch is None and not q:
+        _piped(robot, out, **style)
+        return
+    arm = inputs.load(inputs.named(robot))
+    if target is not None and q:
+        _no_words(arm, task, target, q)
+    if sum((bool(q), target is not None, batch is not None)) > 1:
+        raise UsageError("joint values, --target and --batch: give one of the three")
     if target is not None:
-        _branches(arm, target, task, lock, out, frames=frames, view=eye)
-    elif path is not None:
-        poses = _poses(arm, path)
-        title = f"{arm.name}: {len(poses)} poses"
-        plot_poses(arm, units.joints_in(arm, poses), out, title=title, frames=frames, view=eye)
+        _branches(arm, target, task, lock, out, **style)
+    elif batch is not None:
+        _path(arm, _poses(arm, batch), out, **style)
     else:
-        import numpy as np
-
-        values = inputs.joints(arm, q)
-        title = render.pose_line(arm, values)
-        plot_poses(arm, units.joints_in(arm, values), out, title=title, frames=frames, view=eye)
-        [outside] = render.violations(arm, np.array([values]), units.joints_in(arm, [values]))
-        render.warn_of_limits(arm, outside)
+        _pose(arm, inputs.joints(arm, q), out, **style)
 
 
-def _no_words(arm: Arm, task: str | None, target: str, q: list[str]) -> None:
-    """`--target 390 80 300`: say that it wants commas, where that is what is wrong."""
-    from armkin.inverse.tasks.fitting import task_for
+def _pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
+    """A single pose [deg | mm]."""
+    import numpy as np
 
-    inputs.target_list(arm, task_for(arm, task), target, q)
+    from armkin.plot import plot_poses
+
+    q = units.joints_in(arm, values)
+    plot_poses(arm, q, out, title=render.pose_line(arm, values), **style)
+    [outside] = render.violations(arm, np.array([values]), q[None])
+    render.warn_of_limits(arm, outside)
+
+
+def _path(arm: Arm, poses: Any, out: str | None, **style: Any) -> None:
+    """Poses (K, n) [deg | mm], one after another."""
+    from armkin.plot import plot_poses
+
+    plot_poses(arm, units.joints_in(arm, poses), out, title=f"{arm.name}: {len(poses)} poses", **style)
+
+
+def _piped(robot: str | None, out: str | None, **style: Any) -> None:
+    """What a command before the pipe has printed: its branches, or its poses."""
+    from armkin.plot import plot_poses
+
+    found = piped.answers(robot)
+    if found is None:
+        arm = inputs.load(inputs.named(robot))
+        names = " ".join(arm.joint_names)
+        raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
+    arm, answers = found
+    if len(answers) == 1 and len(answers[0].get("branches") or ()) > 1:
+        branches = answers[0]["branches"]
+        q = units.joints_in(arm, [branch["joints"] for branch in branches])
+        plot_poses(arm, q, out, names=[str(branch["name"]) for branch in branches], **style)
+        return
+    values = piped.joints_of(arm, answers)
+    if len(values) == 1:
+        _pose(arm, values[0], out, **style)
+    else:
+        _path(arm, values, out, **style)
 
 
 def _eye(text: str) -> tuple[float, float]:
@@ -98,7 +129,14 @@ def _eye(text: str) -> tuple[float, float]:
     return elevation, azimuth
 
 
-def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out: str, **style: Any) -> None:
+def _no_words(arm: Arm, task: str | None, target: str, q: list[str]) -> None:
+    """`--target 390 80 300`: say that it wants commas, where that is what is wrong."""
+    from armkin.inverse.tasks.fitting import task_for
+
+    inputs.target_list(arm, task_for(arm, task), target, q)
+
+
+def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out: str | None, **style: Any) -> None:
     """All branches of one target."""
     import numpy as np
 
@@ -127,10 +165,10 @@ def _poses(arm: Arm, path: str) -> Any:
     from armkin.plot.poses import MOST
 
     parts: list[Any] = []
-    for chunk in batch_rows(path, arm.joint_names, arm.name):
+    for chunk in batch_rows(path, arm.joint_names, arm.name, units.poses_out(arm)):
         parts.append(chunk.values)
         if sum(map(len, parts)) > MOST:
-            raise UsageError(f"{path}: more than {MOST} poses cannot be told apart in one picture")
+            raise UsageError(f"{path}: more than {MOST} poses are too many for one picture")
     if not parts:
         raise UsageError(f"{path}: no poses; give one row of {','.join(arm.joint_names)} for each")
     return np.concatenate(parts)
