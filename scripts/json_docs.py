@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write docs/json.md from the types of the commands' answers (src/armkin/cli/answers.py)."""
+"""Write docs/json.md from the types of the commands' answers (src/armkin/cli/answers/)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armkin.cli import answers
 PAGE = Path(__file__).parents[1] / "docs" / "json.md"
 HEAD = """# JSON of the commands
 
-Written by `scripts/json_docs.py` from `src/armkin/cli/answers.py`; a test holds the two equal, and real
+Written by `scripts/json_docs.py` from `src/armkin/cli/answers/`; a test holds the two equal, and real
 answers of every command to these types.
 
 With `--json` a command prints one object on one line to stdout, at full precision, in millimetres and

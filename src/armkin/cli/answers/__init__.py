@@ -1,0 +1,71 @@
+"""The JSON of every command: keys, types and what they mean.
+
+`docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
+commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
+"""
+
+from armkin.cli.answers.arm import Branch as Branch
+from armkin.cli.answers.arm import Calibrate as Calibrate
+from armkin.cli.answers.arm import Closest as Closest
+from armkin.cli.answers.arm import Correction as Correction
+from armkin.cli.answers.arm import Error as Error
+from armkin.cli.answers.arm import Errors as Errors
+from armkin.cli.answers.arm import Export as Export
+from armkin.cli.answers.arm import Fk as Fk
+from armkin.cli.answers.arm import Flagged as Flagged
+from armkin.cli.answers.arm import Found as Found
+from armkin.cli.answers.arm import Frame as Frame
+from armkin.cli.answers.arm import Head as Head
+from armkin.cli.answers.arm import Ik as Ik
+from armkin.cli.answers.arm import Info as Info
+from armkin.cli.answers.arm import Ports as Ports
+from armkin.cli.answers.arm import PulsePositions as PulsePositions
+from armkin.cli.answers.arm import Pulses as Pulses
+from armkin.cli.answers.arm import Robots as Robots
+from armkin.cli.answers.arm import Rounded as Rounded
+from armkin.cli.answers.arm import ShippedRobot as ShippedRobot
+from armkin.cli.answers.arm import Solver as Solver
+from armkin.cli.answers.arm import Solving as Solving
+from armkin.cli.answers.arm import Suggested as Suggested
+from armkin.cli.answers.arm import Violation as Violation
+from armkin.cli.answers.arm import Workspace as Workspace
+from armkin.cli.answers.moving import BranchAt as BranchAt
+from armkin.cli.answers.moving import Difference as Difference
+from armkin.cli.answers.moving import DryRun as DryRun
+from armkin.cli.answers.moving import Grip as Grip
+from armkin.cli.answers.moving import GripOfServo as GripOfServo
+from armkin.cli.answers.moving import NearestSingularity as NearestSingularity
+from armkin.cli.answers.moving import Path as Path
+from armkin.cli.answers.moving import PathBranch as PathBranch
+from armkin.cli.answers.moving import PathMoved as PathMoved
+from armkin.cli.answers.moving import PathRun as PathRun
+from armkin.cli.answers.moving import Reconfiguration as Reconfiguration
+from armkin.cli.answers.moving import Send as Send
+from armkin.cli.answers.moving import Servo as Servo
+from armkin.cli.answers.moving import Setup as Setup
+from armkin.cli.answers.moving import Stands as Stands
+from armkin.cli.answers.moving import StatusOfBoard as StatusOfBoard
+from armkin.cli.answers.moving import StatusOfGrbl as StatusOfGrbl
+from armkin.cli.answers.moving import StatusOfServos as StatusOfServos
+from armkin.cli.answers.moving import Zero as Zero
+
+# Command -> its answers; a command that is not here has no --json.
+ANSWERS: dict[str, tuple[type, ...]] = {
+    "fk": (Fk,),
+    "ik": (Ik,),
+    "pulses": (Pulses,),
+    "workspace": (Workspace,),
+    "info": (Info,),
+    "robots": (Robots,),
+    "export": (Export,),
+    "send": (DryRun, Send),
+    "path": (Path, PathMoved),
+    "status": (StatusOfBoard, StatusOfGrbl, StatusOfServos),
+    "home": (Stands,),
+    "jog": (Stands,),
+    "grip": (Grip, GripOfServo),
+    "calibrate": (Calibrate, Suggested),
+    "setup": (Setup,),
+    "zero": (Zero,),
+    "ports": (Ports,),
+}

@@ -1,0 +1,202 @@
+"""Answers about an arm that moves, and about its board."""
+
+# No annotations as text here: a key that may be absent is known by NotRequired at run time.
+from typing import Annotated, Literal, NotRequired, TypedDict
+
+from armkin.board.told import Summary, Where
+from armkin.cli.answers.arm import Head
+
+
+class DryRun(Head, Summary):
+    """`send --dry-run`."""
+
+    dry_run: Literal[True]
+
+
+class Send(Head):
+    """`send`: the plan, and where the arm stands after it."""
+
+    port: str
+    waypoints: int
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    joints: Annotated[list[float] | None, "where the board says that it stands [deg or mm]"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    motors: list[str]
+    pulse_units: Annotated[list[str], "step, us or count"]
+    start_pulses: list[int]
+    pulses: Annotated[list[int] | None, "as the board counts"]
+    moves: Annotated[list[int], "planned"]
+    position_mm: list[float] | None
+    position: Annotated[str, "known, retained or lost"]
+    duration_s: float
+    segments: int
+    top_speed: Annotated[list[float], "greatest speed of every joint [deg/s or mm/s]"]
+    top_rate: Annotated[list[float], "greatest rate of every motor [pulses/s]"]
+
+
+class BranchAt(TypedDict):
+    """Where on a path a branch's name begins."""
+
+    s_mm: float
+    name: str
+
+
+class PathRun(TypedDict):
+    """A part of a path on one branch."""
+
+    s_mm: Annotated[list[float], "where it begins and ends"]
+    branches: list[BranchAt]
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    end_joints: Annotated[list[float], "[deg or mm]"]
+
+
+class Reconfiguration(TypedDict):
+    """Where a run ends before the path does."""
+
+    s_mm: float
+    why: Annotated[str, "limit, reach, boundary, singularity or end"]
+    joint: Annotated[str | None, "whose limit it is"]
+    value: Annotated[float | None, "the limit [deg or mm]"]
+    status_beyond: Annotated[str, "exact, boundary, singular or unreachable"]
+
+
+class PathBranch(TypedDict):
+    """A branch at a path's start."""
+
+    name: str
+    start_joints: Annotated[list[float], "[deg or mm]"]
+    carries_mm: Annotated[float, "how far along the path it goes"]
+    ends_because: Annotated[str, "why no farther, in words"]
+
+
+class NearestSingularity(TypedDict):
+    """Where the arm comes nearest to a singularity."""
+
+    s_mm: float
+    condition: Annotated[float | None, "of the Jacobian; null: infinite"]
+
+
+class Path(Head):
+    """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
+
+    task: str
+    length_mm: float
+    duration_s: Annotated[float | None, "null: not planned to its end"]
+    samples: Annotated[int, "targets that were solved"]
+    complete: Annotated[bool, "every isolated branch of every sample is guaranteed to be known"]
+    tolerance_mm: float
+    deviation_mm: Annotated[float | None, "a bound of the distance between plan and path"]
+    joint_units: Annotated[list[str], "deg or mm"]
+    start_joints: Annotated[list[float] | None, "[deg or mm]"]
+    joints: Annotated[list[float] | None, "at the end [deg or mm]"]
+    runs: list[PathRun]
+    reconfigurations: list[Reconfiguration]
+    branches: list[PathBranch]
+    limits: Annotated[dict[str, dict[str, float]] | None, "speed, accel, jerk: greatest share of each joint's limit"]
+    nearest_singularity: NearestSingularity | None
+    segments: Annotated[int | None, "that a board is sent; null without drives"]
+    dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]
+
+
+class PathMoved(Path):
+    """`path --port`: the plan, and where the arm stands after it."""
+
+    port: str
+    position: Annotated[str, "known, retained or lost"]
+    pulses: Annotated[list[int] | None, "as the board counts"]
+    position_mm: list[float] | None
+
+
+class Stands(Head, Where):
+    """`home` and `jog`: where the arm stands after it."""
+
+    port: str
+
+
+class StatusOfBoard(Stands):
+    """`status`: what the board says."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    configured: Annotated[bool, "for this robot file"]
+    state: str
+    error: Annotated[str | None, "why the last session ended"]
+    drivers_on: bool
+    servo_pulses_on: bool
+    abort_input: bool
+    switches: Annotated[dict[str, bool], "levels of the limit inputs"]
+    boots: int
+    reset_cause: int
+
+
+class StatusOfGrbl(Stands):
+    """`status` of a board of kind grbl."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    state: Annotated[str, "as GRBL says it: idle, run, hold, alarm, ..."]
+    inputs: Annotated[str, "letters of the active ones: limits X Y Z A B C, probe P, door D"]
+    settings: Annotated[list[str], "those that differ from the robot file, in words"]
+
+
+class Servo(TypedDict):
+    """What a bus servo says of itself."""
+
+    name: Annotated[str, "of the motor"]
+    id: int
+    torque: Annotated[bool, "whether its motor is on"]
+    load_percent: Annotated[float, "of its greatest torque"]
+    voltage: float
+    temperature: Annotated[int, "[deg C]"]
+    errors: Annotated[list[str], "voltage, angle sensor, overheating, overcurrent, overload"]
+
+
+class StatusOfServos(Stands):
+    """`status` of a board of kind feetech."""
+
+    board: Annotated[str, "its kind"]
+    firmware: str
+    servos: list[Servo]
+
+
+class Difference(TypedDict):
+    """A setting of a board that is not as the robot file wants it."""
+
+    setting: Annotated[int, "its number, as in $100"]
+    what: str
+    found: Annotated[float | None, "null: the board has no such setting"]
+    wanted: float
+    serious: Annotated[bool, "motion would be wrong or too fast; otherwise only slower"]
+
+
+class Setup(Head):
+    """`setup`: a board's settings against the robot file."""
+
+    port: str
+    firmware: str
+    differences: Annotated[list[Difference], "as found, before anything was written"]
+    written: bool
+
+
+class Zero(Head):
+    """`zero`: where the zero of bus servos is."""
+
+    port: str
+    counts: Annotated[list[int], "of every servo, in the pose given"]
+    zero: Annotated[list[int], "of every drive"]
+
+
+class GripOfServo(Head):
+    """`grip` on a servo bus."""
+
+    port: str
+    gripper: Annotated[float, "where it came to rest, in its drive's degrees"]
+    target: float
+
+
+class Grip(Head):
+    """Where the gripper stands."""
+
+    port: str
+    gripper: Annotated[float, "in its drive's degrees (mm with a lead)"]
+    counts: int
