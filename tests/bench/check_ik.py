@@ -1,8 +1,10 @@
 """Every branch of every class of arms, by the thousand: hit rates, branch counts and accuracy as a table.
 
     python tests/bench/check_ik.py [--robots] [--classes] [--near] [--oracle] [--poses 10000] [--arms 50] [--only TEXT]
+    python tests/bench/check_ik.py [--postures] [--surfaces] [--rounded] [--share 1.0] [--only TEXT]
 
-Without a choice all four tables are made. The oracle is a multi-start Newton iteration on screws that shares
+Without a choice all tables are made. The second line asks what people ask: round postures, singular surfaces,
+rounded targets; `--share 0.1` a tenth of them. The oracle is a multi-start Newton iteration on screws that shares
 no code with armkin; EAIK and ssik are compared as well where they are installed and fit the arm.
 """
 
@@ -11,7 +13,8 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +22,17 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 
 import oracle
+import truth
 from checks import Array, Report, examine, not_found, random_joints
-from geometries import CLASSES, random_case
+from geometries import CLASSES, random_case, right_angles
+from geometries import case as case_of
 from test_every_branch import NAMES, shipped
 from test_near import OFF, moved
+
+import armkin
+from armkin.errors import UsageError
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm
 
 HEAD = "method | poses | lost | branches | mm | deg | twice | us/pose"
 
@@ -156,17 +166,94 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
             print(f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {where} |", flush=True)
 
 
+ASKED = "| robot or class | asked | targets | wrong | complete | singular | us/pose |\n|---|---|---|---|---|---|---|"
+
+
+RIGHT_ANGLES = "6R right angles"
+
+
+def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None, float]]:
+    """Shipped robots, five arms of every class; and which share of the targets each is asked."""
+    for name in NAMES:
+        if only in name:
+            yield name, *shipped(name), None, 1.0
+    for name in CLASSES:
+        for seed in range(5):
+            if only in name:
+                case = random_case(name, seed)
+                yield f"{name} {seed}", case.arm, case.screw, case.task, 0.5
+    found: dict[str, int] = {}
+    for seed in range(200 if only in RIGHT_ANGLES else 0):
+        made = case_of(right_angles(np.random.default_rng(seed)), "pose")
+        with suppress(UsageError):  # it cannot reach poses at will
+            method = solver(made.arm, "pose")[1].name
+            found[method] = found.get(method, 0) + 1
+            if found[method] <= 5:
+                yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 0.5
+
+
+def asked(name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | None, q: Array, target: Array) -> None:
+    """A line: what is wrong with the answers to targets made from postures, near home and near the postures."""
+    begin = time.perf_counter()
+    armkin.ik(arm, target, task)
+    seconds = time.perf_counter() - begin
+    verdict = truth.judge(arm, screw, task, q, target)
+    beside = truth.judge(arm, screw, task, q, target, near=q)
+    few = np.arange(0, len(q), max(len(q) // 10, 1))
+    truth.ask_oracle(arm, screw, verdict, target, few, 60 if arm.n < 4 else 250, 3)
+    s = verdict.solutions
+    wrong = "; ".join(str(v).partition(": ")[2].rpartition("; ")[0] for v in (verdict, beside) if not v) or "none"
+    print(
+        f"| {name} | {label} | {len(q)} | {wrong} | {s.complete.mean():.3f} "
+        f"| {(s.status == armkin.Status.SINGULAR).mean():.3f} | {1e6 * seconds / max(len(q), 1):.0f} |",
+        flush=True,
+    )
+
+
+def postures(share: float, only: str) -> None:
+    print(f"\n{ASKED}")
+    for name, arm, screw, task, part in asked_arms(only):
+        for step in (90, 45):
+            q = truth.round_postures(arm, step, max(int(4096 * share * part), 1))
+            definition, _ = solver(arm, task)
+            asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array())
+
+
+def surfaces(share: float, only: str) -> None:
+    print(f"\n{ASKED}")
+    for name, arm, screw, task, part in asked_arms(only):
+        definition, _ = solver(arm, task)
+        for label, q in truth.singular_postures(arm, screw, task, max(int(1000 * share * part), 1)).items():
+            asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array())
+
+
+def rounded(share: float, only: str) -> None:
+    print(f"\n{ASKED}")
+    for name, arm, screw, task, part in asked_arms(only):
+        definition, _ = solver(arm, task)
+        q = random_joints(screw, max(int(1000 * share * part), 1), 5)
+        target = oracle.goal(definition, screw, q).array()
+        for digits in (3, 4, 5, 6, 7, 7.5, 8, 9, 10, 11, 12, 13, 14, 15, 16):
+            what = "float32" if digits == 7.5 else f"{digits} digits"
+            asked(name, what, arm, screw, task, q, truth.typed(definition, target, digits))
+            if definition.orientation == "full" and digits >= 7:
+                asked(name, f"{what}, matrices", arm, screw, task, q, truth.printed(target, digits))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for choice in ("robots", "classes", "near", "oracle"):
+    for choice in ("robots", "classes", "near", "oracle", "postures", "surfaces", "rounded"):
         parser.add_argument(f"--{choice}", action="store_true")
     parser.add_argument(
         "--poses", type=int, default=10_000, help="for each robot or class; a tenth for --near and --oracle"
     )
     parser.add_argument("--arms", type=int, default=50, help="random arms of a class, for --classes and --oracle")
+    parser.add_argument("--share", type=float, default=1.0, help="of the postures, surfaces and rounded targets")
     parser.add_argument("--only", default="", help="robots or classes whose name holds this")
     args = parser.parse_args()
-    everything = not (args.robots or args.classes or args.near or args.oracle)
+    everything = not (
+        args.robots or args.classes or args.near or args.oracle or args.postures or args.surfaces or args.rounded
+    )
     if args.robots or everything:
         robots(args.poses, args.only)
     if args.classes or everything:
@@ -175,6 +262,9 @@ def main() -> None:
         near(args.poses // 10, args.only)
     if args.oracle or everything:
         against_oracle(args.poses // 10, args.arms, args.only)
+    for table in (postures, surfaces, rounded):
+        if getattr(args, table.__name__) or everything:
+            table(args.share, args.only)
 
 
 if __name__ == "__main__":

@@ -264,3 +264,16 @@ for _k in range(6):
 add("RRPPRR general", "pose", lambda r: dh(r, "RRPPRR", [_N] * 6, [_N] * 6))
 add("PRRRRP general", "pose", lambda r: dh(r, "PRRRRP", [_N] * 6, [_N] * 6))
 add("RPRPRP general", "pose", lambda r: dh(r, "RPRPRP", [_N] * 6, [_N] * 6))
+
+
+def right_angles(rng: Rng) -> Fields:
+    """Six joints of quarter turns, many lengths zero: what people build."""
+
+    def lengths(of: list[float]) -> list[float | None]:
+        return [float(v) for v in rng.choice(of, 6, p=[0.45, 0.2, 0.15, 0.1, 0.1])]
+
+    alpha = [float(v) for v in rng.choice([0, 90, -90, 180], 6, p=[0.15, 0.4, 0.35, 0.1])]
+    fields = dh(rng, "RRRRRR", [*alpha], lengths([0, 100, 200, 300, -150]), lengths([0, 80, 160, 250, -90]))
+    for joint in fields["joints"]:
+        joint["dh"]["theta"] = float(rng.choice([0, 90, -90, 180]))
+    return fields

@@ -1,27 +1,39 @@
 """Every other arm of up to six joints, for full poses: numeric elimination.
 
-An arm with fewer joints gets virtual ones at its tool; its own branches are those that
-leave the virtual joints at zero. Completeness: see `armkin.inverse.elimination.method`; a branch of the
-shorter arm is an isolated branch of the longer one wherever its own Jacobian has full rank,
-because the virtual axes are in general position.
+An arm with fewer joints gets virtual ones; its own branches are those that leave the virtual joints at zero.
+Five joints of which two at an end meet get one through that point, which makes a spherical wrist or shoulder, a
+closed form. Others get theirs at the tool, in general position. Completeness: see
+`armkin.inverse.elimination.method`; a branch of the shorter arm is an isolated branch of the longer one wherever
+its own Jacobian has full rank, because the virtual axes are in general position.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.forward import fk
+from armkin.inverse.closed import spherical
+from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import AT_ZERO
+from armkin.inverse.numeric.tolerances import ACCEPTED, AT_ZERO, EXACT
 from armkin.inverse.tasks.task import Task
-from armkin.model.rotation import inverse
+from armkin.model.arm import from_links
+from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.rotation import inverse, rotation_about
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+
+PHASE = 0.7321  # [rad]
+_POSE = Task("pose", 3, np.zeros((0, 6)), np.zeros(0), "full")
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -38,6 +50,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             ordered=False,
             elimination=prepared,
         )
+    if arm.n == 5 and (wrist := _with_wrist(arm, task)) is not None:
+        return wrist
     link, prismatic = _padded(arm)
     prepared = method.prepare(link, prismatic)
 
@@ -71,6 +85,66 @@ def _six(prepared: method.Elimination, T: Array) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose and the arm has a regular pencil."""
     q, doubt, settled = method.solve(prepared, T)
     return Rows(q, doubt, settled & prepared.complete)
+
+
+def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
+    """Five joints, axes 4 and 5 or 1 and 2 meeting: the closed form with a virtual joint through that point."""
+    chain = Chain(arm.link, arm.prismatic)
+    for first in (False, True):
+        longer = _lengthened(reverse(chain) if first else chain, EXACT * arm.reach)
+        if longer is None:
+            continue
+        six = reverse(longer) if first else longer
+        inner = spherical.recognise(from_links(six.link, six.prismatic.tolist()), _POSE)
+        if inner is not None and inner.pairs is not None:
+            axes = "1 and 2" if first else "4 and 5"
+            why = f"5 joints for a pose of six: a virtual joint where axes {axes} meet must stay at zero; {inner.why}"
+            geometry = Geometry("five joints", why, True, _of_five(inner.pairs, first), ordered=inner.ordered)
+            if _is_sound(arm, task, geometry):
+                return geometry
+    return None
+
+
+def _is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
+    """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
+    q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
+    _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
+    return int((miss.min(axis=1) <= ACCEPTED**2).sum()) >= 15
+
+
+def _of_five(
+    solve: Callable[[list[Entry], Prefer], Candidates], first: bool
+) -> Callable[[list[Entry], Prefer], Candidates]:
+    """The closed form of five joints from that of six, of which the first or the last is virtual."""
+    own = slice(1, 6) if first else slice(0, 5)
+
+    def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
+        virtual = None if prefer[0] is None else Pair(1.0, 0.0)
+        found = solve(goal, [virtual, *prefer] if first else [*prefer, virtual])
+        # the residual is to be that of the five joints: it vanishes where the virtual one is at zero
+        return found._replace(pairs=found.pairs[own], angles=found.angles[own], miss=None)
+
+    return pairs
+
+
+def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
+    """Five joints with a sixth one behind, where axes 4 and 5 meet; None if they do not.
+
+    The virtual axis stands across axis 5, turned by `PHASE` from where an axis of a built arm would stand, so that
+    the wrist is not singular in the postures that people ask for.
+    """
+    L = chain.link[4]
+    if chain.prismatic[3:].any() or is_parallel(L, 1e-6):
+        return None
+    t, w = L[:3, 3], L[:3, 2]
+    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])  # on axis 4, of the common perpendicular's foot
+    there = (inverse(L) @ [0.0, 0.0, height, 1.0])[:3]
+    if np.hypot(*there[:2]) > tolerance:
+        return None
+    axis = np.eye(4)
+    axis[:3, :3] = rotation_about(2, PHASE) @ rotation_about(0, np.pi / 2)
+    axis[:3, 3] = there
+    return Chain(np.array([*chain.link[:5], axis, inverse(axis) @ chain.link[5]]), np.append(chain.prismatic, False))
 
 
 def _padded(arm: Arm) -> tuple[Array, Bool]:

@@ -16,7 +16,18 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, HOPELESS, SAME, SEED, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import (
+    CLUSTER,
+    DOUBLE,
+    HAIR,
+    HOPELESS,
+    MOVING,
+    SAME,
+    SEED,
+    SOLUTION,
+    TURNED,
+    WEAK,
+)
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
 
@@ -26,6 +37,7 @@ if TYPE_CHECKING:
 
 GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
+AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
 
@@ -111,17 +123,26 @@ def _settle(
     rank[:, 0] = 0.0
     group = np.where(valid, -1, M)  # which candidate stands for each one
     free, singular, double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
+    moves, which, asked = np.zeros((K, M), bool), np.zeros((K, M, n), bool), ~(valid & (sigma < MOVING))
+
+    def ask(k: Int, b: Int) -> None:
+        """Whether these candidates lie on self-motions, if that is not known."""
+        some = np.flatnonzero(~asked[k, b])
+        if len(some):
+            k, b = k[some], b[some]
+            asked[k, b] = True
+            moves[k, b], which[k, b] = _self_motion(
+                arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k]
+            )
+
+    if (~asked).sum() <= AT_ONCE:
+        ask(*np.nonzero(~asked))
     chosen, curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
     while (group < 0).any():
         k = np.flatnonzero((group < 0).any(axis=1))
         b = np.where(group[k] < 0, rank[k], np.inf).argmin(axis=1)
-        moving, joints = np.zeros(len(k), bool), np.zeros((len(k), n), bool)
-        weak = np.flatnonzero(sigma[k, b] < WEAK)
-        if len(weak):
-            kw, bw = k[weak], b[weak]
-            moving[weak], joints[weak] = _self_motion(
-                arm, task, q[kw, bw], V[kw, bw], np.maximum(nullity[kw, bw], 1), target[kw]
-            )
+        ask(k, b)
+        moving, joints = moves[k, b], which[k, b]
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (k, M, n)
         rest = group[k] < 0
         # of a self-motion: whatever differs in its free joints alone
@@ -244,22 +265,35 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
-    here = newton.missing(arm, task, q, target)
-    for who, direction in _null_directions(arm.n, V, nullity):
-        # where several directions are lost at once, a short step would be drawn back into the corner
-        for step in (STEP, 10 * STEP) if (nullity[who] > 1).any() else (STEP,):
-            along, which = np.ones(len(who), bool), np.zeros((len(who), arm.n), bool)
-            for way in (step, -step):
-                away, half = (q[who] + part * way * direction * unit for part in (1.0, 0.6))
-                far, size = newton.correct(arm, task, away, target[who], steps=6, least=WEAK)
-                mid, size2 = newton.correct(arm, task, half, target[who], steps=6, least=WEAK)
-                moved = np.abs(far - q[who]) / unit
-                least = 0.3 * step * np.abs(direction).max(axis=1)
-                apart = (np.abs(far - mid) / unit).max(axis=1) > 0.3 * least
-                along &= (moved.max(axis=1) > least) & apart & (np.maximum(size, size2) <= here[who] + GROWTH * STEP)
-                which |= moved > 1e-3 * STEP
-            moving[who] |= along
-            joints[who] |= along[:, None] & which
+    pushes = list(_null_directions(arm.n, V, nullity))
+    who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
+    # most candidates fall back at once
+    first = STEP * (10 if len(pushes) > 1 else 1)
+    there, size = newton.correct(arm, task, q[who] + first * push * unit, target[who], steps=6, least=WEAK)
+    size -= newton.missing(arm, task, q, target)[who]
+    far = (np.abs(there - q[who]) / unit).max(axis=1) > 0.3 * first * np.abs(push).max(axis=1)
+    some = np.flatnonzero(far & (size <= GROWTH * first))
+    if not len(some):
+        return moving, joints
+    who, push = who[some], push[some]
+    # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
+    sizes, ways, parts = np.ix_(*([STEP, 10 * STEP], [1.0, -1.0], [1.0, 0.6], [0.0], [0.0]))[:3]
+    start = q[who] + sizes * ways * parts * push * unit
+    goal = np.concatenate([target[who]] * 8)
+    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=6, least=WEAK)
+    there, size = there.reshape(start.shape), size.reshape(start.shape[:4])
+    moved = np.abs(there[:, :, 0] - q[who]) / unit  # (2, 2, m, n)
+    least = 0.3 * np.array([[STEP], [10 * STEP]]) * np.abs(push).max(axis=1)  # (2, m)
+    apart = (np.abs(there[:, :, 0] - there[:, :, 1]) / unit).max(axis=3) > 0.3 * least[:, None]
+    grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
+    short, long = (apart & (moved.max(axis=3) > least[:, None])).all(axis=1) & (
+        grown <= GROWTH * np.array([[STEP], [10 * STEP]])
+    )
+    # Where several directions are lost at once, a short step is drawn back into the corner. Where the residual grows
+    # at all, it must do so slowly as far as the long step: near a fold the first tenth of a radian costs nothing.
+    along = (short & ((grown[0] <= 1e-12) | long)) | (long & (len(pushes) > 1))
+    np.logical_or.at(moving, who, along)
+    np.logical_or.at(joints, who, along[:, None] & (moved > 1e-3 * STEP).any(axis=(0, 1)))
     return moving, joints
 
 

@@ -29,7 +29,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
 )
 from armkin.inverse.closed.three_joints import Position
-from armkin.inverse.numeric.tolerances import EXACT, TANGENT
+from armkin.inverse.numeric.tolerances import EXACT, SHARP
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -136,7 +136,7 @@ class SphericalWrist:
         if self.mirrored:
             return self._mirrored(pairs, doubt, miss, x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc, SHARP)
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
 
@@ -176,5 +176,5 @@ class SphericalWrist:
             sign * np.arctan2(fifth.s, fifth.c),
             q6 - flipped * np.copysign(np.pi, q6),
         ]
-        doubt = doubt | (disc < TANGENT) | doubt4
+        doubt = doubt | (disc < SHARP) | doubt4
         return Candidates([*pairs, fourth, fifth, sixth], doubt, miss + wrong, angles)

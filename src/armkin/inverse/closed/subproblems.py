@@ -86,14 +86,16 @@ def signs(axis: int) -> Array:
 
 
 def linear(
-    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None
-) -> tuple[Pair, Bool]:
+    a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None,
+    tangent: float = TANGENT,
+) -> tuple[Pair, Bool]:  # fmt: skip
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
     a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
     length that makes a and b dimensionless; prefer: the angle to give where the equation
     leaves it free, or None to do without (such targets are in doubt and looked at again); disc:
-    ``a^2 + b^2 - c^2`` if the caller knows it without cancellation. Returns the pair and doubt, a
+    ``a^2 + b^2 - c^2`` if the caller knows it without cancellation; tangent: of it, where roots are about to
+    merge. Returns the pair and doubt, a
     boolean array: True where the roots are about to merge or the angle is free.
 
     Without a real root the pair is that of the closest angle, not normalised; the caller finds by
@@ -103,7 +105,7 @@ def linear(
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     if disc is None:
         disc = h2 - c * c
-    doubt = np.abs(disc) < TANGENT * h2
+    doubt = np.abs(disc) < tangent * h2
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
     least = FREE * scale * scale
     if isinstance(h2, float) and isinstance(least, float):

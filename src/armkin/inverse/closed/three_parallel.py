@@ -19,7 +19,7 @@ from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import TwoLink
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, SHARP
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -117,7 +117,7 @@ class ThreeParallel:
         ]
         w = pose.turn_back(D, turned)
         disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc)
+        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, SHARP)
         c5, s5 = fifth
         mx, my, mz = self.m
         v = pose.turn_back(

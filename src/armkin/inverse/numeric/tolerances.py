@@ -17,11 +17,13 @@ TURNED = 1e-5  # joints that a self-motion holds differ by less along it
 
 # ---- how singular
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
+MOVING = 3e-8  # and below which it is asked whether it is
 DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
 CLUSTER = 0.02  # candidates this close may be one root of third or fourth order
 
 # ---- closed forms, relative to the equation's own size
 TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
+SHARP = 1e-15  # the same of a wrist, whose two roots differ by half a turn of its neighbours
 FREE = 1e-18  # squared amplitude below which an equation says nothing about its angle
 TOUCHING = 1e-4  # complex roots this close to the real line may be a double root seen through rounding
 
