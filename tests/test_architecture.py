@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, str] = {
     "path_file": "errors robot_file",
     "motion": "errors formula model forward inverse/tasks inverse motors path_file",
     "reach": "errors files formula model forward motors",
-    "export": "errors formula robot_file model forward inverse/tasks",
+    "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",

@@ -96,12 +96,20 @@ def test_visuals_are_primitives_along_the_links(path: Path) -> None:
     assert all(limit.get("effort") is not None and limit.get("velocity") is not None for limit in limits)
 
 
-def test_a_link_is_drawn_where_the_next_joint_stands() -> None:
-    root = ET.fromstring(write_urdf(armkin.load("three_dof")))
-    [upper] = [link for link in root.iterfind("link") if link.get("name") == "q2_link"]
-    balls = [v.find("origin").get("xyz") for v in upper.iterfind("visual") if v.find("geometry/sphere") is not None]
-    [joint] = [joint for joint in root.iterfind("joint") if joint.get("name") == "q3"]
-    assert [float(x) for x in balls[-1].split()] == [float(x) for x in joint.find("origin").get("xyz").split()]
+def test_links_are_drawn_from_axis_to_axis() -> None:
+    """In three_dof's home the last ball of every link stands on the next joint's axis."""
+    arm = armkin.load("three_dof")
+    root = ET.fromstring(write_urdf(arm))
+    for name, following in (("q1", "q2"), ("q2", "q3")):
+        [link] = [link for link in root.iterfind("link") if link.get("name") == f"{name}_link"]
+        [joint] = [joint for joint in root.iterfind("joint") if joint.get("name") == following]
+        balls = [v.find("origin").get("xyz") for v in link.iterfind("visual") if v.find("geometry/sphere") is not None]
+        end = np.array(balls[-1].split(), dtype=float)
+        place = joint.find("origin")
+        roll = float(place.get("rpy").split()[0])
+        z = np.array([0, -np.sin(roll), np.cos(roll)])  # both of its turns are about x alone
+        off = end - np.array(place.get("xyz").split(), dtype=float)
+        assert np.linalg.norm(off - (off @ z) * z) < 1e-6
 
 
 def test_a_makers_table_comes_back_as_printed() -> None:
@@ -141,7 +149,7 @@ def test_the_command_writes_each_kind(tmp_path: Path) -> None:
     q = (10, 20, -30, 40, 50, 60)
     expected = run("fk", "ur5e", *q, "--json").json["position_mm"]
     for kind in ("--dh", "--mdh", "--screws"):
-        path = tmp_path / "arm.yaml"
+        path = tmp_path / f"arm{kind}.yaml"
         assert run("export", "ur5e", kind, "--out", path) == (0, "", "")
         assert run("fk", path, *q, "--json").json["position_mm"] == pytest.approx(expected, abs=1e-9)
     exported = run("export", "three_dof", "--urdf")

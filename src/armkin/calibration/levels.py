@@ -19,9 +19,9 @@ from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
 FOLDS = 5
-GAIN = 0.9  # a richer level must leave at most so much of the simpler one's squared error
-CERTAIN = 1.5  # and gain so many standard errors,
-FEW = 12.0  # and with few rows more: CERTAIN + FEW / rows
+GAIN = 0.97  # of the file's squared error on unseen rows, what a first correction may leave,
+CERTAIN = 0.5  # and how many standard errors it must gain; a further one must only gain,
+FEW = 14.0  # with few rows by more: FEW / rows standard errors
 CAP = 4.0  # errors beyond so many medians count as that: a row that is wrong decides nothing
 
 
@@ -55,7 +55,7 @@ def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
             errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
     level = 0
     for richer in range(1, len(LEVELS)):
-        if not np.array_equal(sets[richer], sets[level]) and _better(errors[level], errors[richer]):
+        if not np.array_equal(sets[richer], sets[level]) and _better(errors[level], errors[richer], first=level == 0):
             level = richer
     chosen = fits[level]
     assert chosen is not None
@@ -81,9 +81,13 @@ def _parts(count: int) -> list[NDArray[np.intp]]:
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
 
 
-def _better(simple: Array, rich: Array) -> bool:
-    """Whether the richer level's errors on unseen rows are smaller by more than chance."""
+def _better(simple: Array, rich: Array, *, first: bool) -> bool:
+    """Whether the richer level's errors on unseen rows are smaller by more than chance.
+
+    The file is left only for a clear gain. From there on the prior keeps richer levels from doing harm.
+    """
     a, b = (np.minimum(errors, CAP * np.median(errors)) ** 2 for errors in (simple, rich))
     gain = a - b
     chance = float(gain.std(ddof=1) / np.sqrt(len(gain)))
-    return bool(b.mean() <= GAIN * a.mean() and gain.mean() > (CERTAIN + FEW / len(gain)) * chance)
+    most, certain = (GAIN, CERTAIN) if first else (1.0, 0.0)
+    return bool(b.mean() <= most * a.mean() and gain.mean() > (certain + FEW / len(gain)) * chance)

@@ -8,6 +8,7 @@ robot file has and a URDF has not (home, accelerations, drives) is left out.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
@@ -16,6 +17,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.model.arm import actual
 from armkin.robot_file.writing import angles, number
+from armkin.view.skeleton import shape
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -35,19 +37,21 @@ def urdf(arm: Arm) -> str:
     '<robot name="three_dof">'
     """
     turned = actual(arm)
-    links = ["base_link", *(f"{name}_link" for name in arm.joint_names)]
-    radius = THICK * arm.reach
+    links = ["base_link"]
+    for name in arm.joint_names:
+        links.append(_free(f"{name}_link", tuple(links)))
+    radius, form = THICK * arm.reach, shape(turned)
     lines = [
         '<?xml version="1.0"?>',
         f"<!-- {_comment(arm)} -->",
         f"<robot name={quoteattr(arm.name)}>",
         *(f'  <material name="{name}"><color rgba="{rgba}"/></material>' for name, rgba in _COLOURS),
-        *_link("base_link", [_piece(np.zeros(3), turned.link[0][:3, 3], radius)]),
+        *_link("base_link", _body(form.bodies[0], radius)),
     ]
     for i, name in enumerate(arm.joint_names):
         lines += _joint(turned, i, name, links[i], links[i + 1])
-        lines += _link(links[i + 1], [_hub(radius), *_body(turned.link[i + 1], radius * 0.85)])
-    tool = "tool" if "tool" not in links else "tool_link"
+        lines += _link(links[i + 1], [_hub(float(form.at[i]), radius), *_body(form.bodies[i + 1], radius * 0.85)])
+    tool = _free("tool", tuple(links))
     lines += [
         f'  <joint name="{_free("tool_joint", arm.joint_names)}" type="fixed">',
         *_place(turned.link[-1], links[-1], tool),
@@ -104,16 +108,15 @@ def _link(name: str, pieces: list[list[str]]) -> list[str]:
     return [f'  <link name="{name}">', *drawn, "  </link>"] if drawn else [f'  <link name="{name}"/>']
 
 
-def _body(link: Array, radius: float) -> list[list[str]]:
-    """A link as `armkin.view.skeleton` draws it: along its joint's axis first, then straight to the next joint."""
-    corner = np.array([0.0, 0.0, link[2, 3]])
-    return [_piece(np.zeros(3), corner, radius), _piece(corner, link[:3, 3], radius)]
+def _body(corners: Array, radius: float) -> list[list[str]]:
+    """A link as `armkin.view.skeleton` shapes it: straight from corner to corner."""
+    return [_piece(start, end, radius) for start, end in pairwise(corners)]
 
 
-def _hub(radius: float) -> list[str]:
-    """A joint: a short cylinder about its axis."""
-    shape = f'<cylinder radius="{_size(radius)}" length="{_size(2.2 * radius)}"/>'
-    return _visual("joint", '<origin xyz="0 0 0" rpy="0 0 0"/>', shape)
+def _hub(at: float, radius: float) -> list[str]:
+    """A joint: a short cylinder about its axis, `at` [mm] along it."""
+    size = f'<cylinder radius="{_size(radius)}" length="{_size(2.2 * radius)}"/>'
+    return _visual("joint", f'<origin xyz="0 0 {_size(at)}" rpy="0 0 0"/>', size)
 
 
 def _piece(start: Array, end: Array, radius: float) -> list[str]:
@@ -134,9 +137,9 @@ def _piece(start: Array, end: Array, radius: float) -> list[str]:
     ]
 
 
-def _visual(material: str, origin: str, shape: str) -> list[str]:
+def _visual(material: str, origin: str, form: str) -> list[str]:
     return [
-        f'    <visual>{origin}<geometry>{shape}</geometry><material name="{material}"/></visual>',
+        f'    <visual>{origin}<geometry>{form}</geometry><material name="{material}"/></visual>',
     ]
 
 

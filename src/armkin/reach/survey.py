@@ -14,6 +14,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
+from armkin.model.arm import actual
 from armkin.reach import cloud as clouds
 from armkin.reach.measures import MEASURES, measure
 from armkin.reach.sampling import Random, Sampling, grid
@@ -84,7 +85,7 @@ def workspace(
             if progress is not None:
                 progress(tally.done)
         # Within the block: without its volume there is no result, and then no file either.
-        size = extent(arm, seed, sampling.count) if volume else None
+        size = extent(actual(arm), seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
 
 

@@ -72,10 +72,8 @@ def calibrate(
         tips = units.targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
     found = armkin.calibrate(arm, q, tips, fix=kinds)
     if out is not None:
-        from armkin.files import whole
-
-        with whole(out) as file:
-            file.write(_file(found, arm))
+        with output.destination(out) as write:
+            write(_file(found, arm))
     answer = _answer(arm, found, numbers, out)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
