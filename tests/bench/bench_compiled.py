@@ -119,30 +119,34 @@ def agree(count: int, only: str | None) -> None:
 _PEAK = """
 import resource, sys, numpy as np, armkin
 arm = armkin.load(sys.argv[1]); N = int(sys.argv[2])
-fast = armkin.compile(arm) if sys.argv[3] == "compiled" else None
 sys.path.insert(0, sys.argv[4])
 from bench_ik import random_joints, targets
-solve = (lambda goal: fast.ik(goal)) if fast else (lambda goal: armkin.ik(arm, goal))
-goal = np.concatenate([targets(arm, None, random_joints(arm, 50_000, k)) for k in range(N // 50_000)])
-solve(goal[:10_000])
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+fast = armkin.compile(arm) if sys.argv[3] == "compiled" else None
+solve = fast.ik if fast else lambda goal: armkin.ik(arm, goal)
+first = targets(arm, None, random_joints(arm, 5000))
+goal = np.empty((N, *first.shape[1:]))
+for k in range(0, N, 5000):
+    goal[k : k + 5000] = targets(arm, None, random_joints(arm, 5000, k))
+solve(goal[:5000])
+before = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
 s = solve(goal)
-results = sum(getattr(s, n).nbytes for n in ("q", "valid", "within_limits", "branch", "status", "free", "complete"))
-now = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
-print(results / 1e6, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 - now / 1e6, now / 1e6 - before / 1e3)
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+names = ("q", "valid", "within_limits", "branch", "status", "free", "complete", "rounding")
+results = sum(getattr(s, name).nbytes for name in names)
+print(results / 1e6, (peak - before - results) / 1e6)
 """
 
 
 def memory(count: int, only: str | None) -> None:
-    print("| arm | way | results MB | peak beyond what stays MB |")
+    print("| arm | way | results MB | peak beyond the results MB |")
     print("|---|---|---|---|")
-    for name, _, share in ROWS[:7]:
+    for name, _, share in ROWS[:8]:
         if only and name != only:
             continue
         for way in ("compiled", "numpy"):
             words = [sys.executable, "-c", _PEAK, str(ROBOTS / f"{name}.yaml"), str(int(count * share)), way]
             told = subprocess.run([*words, str(Path(__file__).parent)], capture_output=True, text=True, check=True)
-            results, beyond, _ = map(float, told.stdout.split())
+            results, beyond = map(float, told.stdout.split())
             print(f"| {name} | {way} | {results:.0f} | {beyond:.0f} |", flush=True)
 
 

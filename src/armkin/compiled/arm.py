@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import math
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -11,10 +10,11 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin import forward
 from armkin.compiled import source, toolchain
+from armkin.compiled.results import Results
 from armkin.compiled.single import Single
 from armkin.errors import UsageError
 from armkin.formula import arrays
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-SHARE = 8192  # poses that are worth a thread
+WORTH = 8192  # poses of a closed form that are worth a thread
+BLOCK = 16384  # poses of an elimination whose results are kept in all columns
 UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
 
 
@@ -133,7 +134,7 @@ class _CompiledTask:
             pointers = (a[rows].ctypes.data for a in (flat, out, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(_shared(part, len(flat), workers)):
+        if sum(_shared(part, len(flat), workers, WORTH)):
             far = np.flatnonzero(wild)
             out[far] = python(self.arm, flat[far])
         return out.reshape(*values.shape[:-1], *shape)
@@ -157,22 +158,19 @@ class _CompiledTask:
         if close.shape not in ((self.n,), (*lead, self.n)) or not np.isfinite(close).all():
             return solve.ik(self.arm, targets, self.name, near=near)
         target = np.ascontiguousarray(given.reshape(-1, *self.goal_shape))
-        out = _Out(len(target), self.branches, self.n)
         each, rounding = np.ascontiguousarray(close), np.zeros(len(target))
-        left = self._run(target, each, out, workers, read=False)
-        if left and (out.state == UNREAD).any():
+        solved = self._solved if self.geometry.pairs is not None else self._in_blocks
+        out = solved(target, each, workers, read=False)
+        if out is None:
             read = read_targets(self.task, target)  # refuses what is no target
             target, rounding = np.ascontiguousarray(read.values), read.rounding
-            left = self._run(target, each, out, workers, read=True)
-        q, complete = out.q, np.full(len(target), self.geometry.complete)
-        if left:
-            q = self._in_python(target, close.reshape(-1, self.n), out, complete)
+            out = solved(target, each, workers, read=True)
+            assert out is not None
         if self.arm.prismatic.any():
-            complete[distance(self.arm, self.task, target) > FAR] = False
-        if self.geometry.pairs is None:  # as many columns as the target with most branches has
-            q = out.narrow()
+            out.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
-            out.branch[...] = follow(self.arm, self.task, q, target)
+            out.branch[...] = follow(self.arm, self.task, out.q, target)
+        q = out.q
         B = q.shape[1]
         return Solutions(
             arm=self.arm,
@@ -188,7 +186,7 @@ class _CompiledTask:
             names=self._names(B),
             method=self.geometry.name,
             why=self.geometry.why,
-            complete=complete.reshape(lead),
+            complete=out.complete.reshape(lead),
             rounding=rounding.reshape(lead),
         )
 
@@ -217,34 +215,41 @@ class _CompiledTask:
             return None
         return self._single.solve(target, close if close is None else close.astype(np.float64))
 
-    def _run(self, target: Array, near: Array, out: _Out, workers: int, *, read: bool) -> int:
-        """Solve what can be solved in C; how many targets are left."""
+    def _solved(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
+        """All branches of targets (N, ...); None if some must be read first. near: (n,) or (N, n)."""
+        out = Results(len(target), self.branches, self.n)
         step = self.n if near.size != self.n or len(target) == 1 else 0
+        each = near.reshape(-1, self.n)
 
         def part(rows: slice) -> int:
-            close = near.reshape(-1, self.n)[rows] if step else near
             arrays_ = (out.q, out.valid, out.within, out.branch, out.status, out.state)
             pointers = (a[rows].ctypes.data for a in arrays_)
+            close = each[rows] if step else each
             count = rows.stop - rows.start
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
-        return sum(_shared(part, len(target), workers))
+        least = WORTH if self.geometry.pairs is not None else WORTH // 64
+        left = sum(_shared(part, len(target), workers, least))
+        if left and not read and (out.state == UNREAD).any():
+            return None
+        out.complete[...] = self.geometry.complete
+        if left:
+            rows = np.flatnonzero(out.state)
+            out.write(rows, solve.ik(self.arm, target[rows], self.name, near=each[rows] if step else each[0]))
+        return out
 
-    def _in_python(self, target: Array, near: Array, out: _Out, complete: NDArray[np.bool_]) -> Array:
-        """The targets that C has left open, by `armkin.ik`; all joint values (N, B, n)."""
-        rows = np.flatnonzero(out.state)
-        some = solve.ik(self.arm, target[rows], self.name, near=near[rows] if len(near) > 1 else near[0])
-        out.widen(some.q.shape[1])
-        B = some.q.shape[1]
-        out.q[rows, :B], out.q[rows, B:] = some.q, math.nan
-        for mine, theirs, none in (
-            (out.valid, some.valid, False),
-            (out.within, some.within_limits, False),
-            (out.branch, some.branch, -1),
-        ):
-            mine[rows, :B], mine[rows, B:] = theirs, none
-        out.status[rows], out.free[rows], complete[rows] = some.status, some.free, some.complete
-        return out.q
+    def _in_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
+        """The same for an elimination, whose rows are kept in no more columns than the batch needs."""
+        out = Results(len(target), 0, self.n)
+        for start in range(0, max(len(target), 1), BLOCK):
+            rows = slice(start, min(start + BLOCK, len(target)))
+            close = near if near.size == self.n else near.reshape(-1, self.n)[rows]
+            found = self._solved(target[rows], close, workers, read=read)
+            if found is None:
+                return None
+            found.narrow()
+            out.write(rows, found)
+        return out
 
     def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int) -> Solutions:
         """A calibrated arm, by way of its actual joint values."""
@@ -263,38 +268,11 @@ def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]
         return None, None
 
 
-class _Out:
-    """Results of a batch of N targets, in the layout of `Solutions`."""
-
-    def __init__(self, N: int, B: int, n: int) -> None:
-        self.q = np.empty((N, B, n))
-        self.valid, self.within = np.empty((N, B), bool), np.empty((N, B), bool)
-        self.branch = np.empty((N, B), np.int8)
-        self.status, self.state = np.zeros(N, np.int8), np.empty(N, np.uint8)
-        self.free = np.zeros((N, n), bool)
-
-    def widen(self, B: int) -> None:
-        """Make room for B branches a target."""
-        more = B - self.q.shape[1]
-        if more > 0:
-            self.q = np.pad(self.q, ((0, 0), (0, more), (0, 0)), constant_values=math.nan)
-            self.valid, self.within = (np.pad(a, ((0, 0), (0, more))) for a in (self.valid, self.within))
-            self.branch = np.pad(self.branch, ((0, 0), (0, more)), constant_values=-1)
-
-    def narrow(self) -> Array:
-        """Leave columns away that no target needs; the joint values."""
-        B = int(self.valid.sum(axis=1).max(initial=0))
-        self.q, self.valid, self.within, self.branch = (
-            np.ascontiguousarray(a[:, :B]) for a in (self.q, self.valid, self.within, self.branch)
-        )
-        return self.q
-
-
-def _shared(part: Callable[[slice], int], count: int, workers: int) -> list[int]:
-    """``part(rows)`` for all rows, by that many threads: C code runs without Python's lock."""
+def _shared(part: Callable[[slice], int], count: int, workers: int, least: int) -> list[int]:
+    """``part(rows)`` for all rows, by that many threads, `least` rows or more at once: C runs without Python's lock."""
     if workers < 1:
         raise UsageError(f"workers: {workers}; at least 1 thread is needed")
-    share = max(SHARE, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
+    share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
     rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
     if workers == 1 or len(rows) < 2:
         return [part(slice(0, count))]

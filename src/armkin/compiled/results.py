@@ -1,0 +1,81 @@
+"""Results of a batch in the layout of `armkin.Solutions`, with room to grow in place.
+
+How many columns a batch needs is known only when all of it is solved: an elimination finds up to 16 branches,
+seldom as many; an edge may add one. The memory behind the arrays is taken for more, and the system gives it only
+where something is written: a million poses need no second copy of their results.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.solutions import Solutions
+
+ROOM = 24  # columns that there is room for from the beginning
+BLOCK = 4096  # rows moved at once
+
+
+class Results:
+    """q (N, B, n), valid, within, branch (N, B), status, state, complete (N,), free (N, n)."""
+
+    def __init__(self, N: int, B: int, n: int) -> None:
+        self.N, self.B, self.n = N, B, n
+        self._take(max(B, ROOM))
+        self.status, self.state = np.zeros(N, np.int8), np.empty(N, np.uint8)
+        self.free, self.complete = np.zeros((N, n), bool), np.ones(N, bool)
+
+    def _take(self, room: int) -> None:
+        """Memory for that many columns."""
+        N, n = self.N, self.n
+        self._room = room
+        self._memory = (np.empty(N * room * n), np.empty(N * room, bool), np.empty(N * room, bool))
+        self._indices = np.empty(N * room, np.int8)
+        self._shape()
+
+    def _shape(self) -> None:
+        N, B, n = self.N, self.B, self.n
+        q, valid, within = self._memory
+        self.q: Array = q[: N * B * n].reshape(N, B, n)
+        self.valid: Bool = valid[: N * B].reshape(N, B)
+        self.within: Bool = within[: N * B].reshape(N, B)
+        self.branch: NDArray[np.int8] = self._indices[: N * B].reshape(N, B)
+
+    def widen(self, B: int) -> None:
+        """At least B columns; new ones are empty."""
+        if B <= self.B:
+            return
+        old, before = (self.q, self.valid, self.within, self.branch), self.B
+        self.B = B
+        if self._room < B:
+            self._take(2 * B)
+        else:
+            self._shape()
+        pairs = zip(old, (self.q, self.valid, self.within, self.branch), (math.nan, False, False, -1), strict=True)
+        for narrow, wide, none in pairs:
+            # from the end: a row moves to where rows behind it have stood
+            for start in reversed(range(0, self.N, BLOCK)):
+                rows = narrow[start : start + BLOCK].copy()
+                wide[start : start + BLOCK, :before] = rows
+                wide[start : start + BLOCK, before:] = none
+
+    def write(self, rows: slice | NDArray[np.intp], found: Results | Solutions) -> None:
+        """Some rows, which may have more columns than there are."""
+        within = found.within if isinstance(found, Results) else found.within_limits
+        B = found.q.shape[-2]
+        self.widen(B)
+        self.q[rows, :B], self.q[rows, B:] = found.q, math.nan
+        self.valid[rows, :B], self.valid[rows, B:] = found.valid, False
+        self.within[rows, :B], self.within[rows, B:] = within, False
+        self.branch[rows, :B], self.branch[rows, B:] = found.branch, -1
+        self.status[rows], self.free[rows], self.complete[rows] = found.status, found.free, found.complete
+
+    def narrow(self) -> None:
+        """Leave columns away that no target needs; a copy."""
+        B = int(self.valid.sum(axis=1).max(initial=0))
+        self.q, self.valid = self.q[:, :B].copy(), self.valid[:, :B].copy()
+        self.within, self.branch = self.within[:, :B].copy(), self.branch[:, :B].copy()
+        self.B = B
