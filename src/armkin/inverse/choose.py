@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
 from armkin.inverse.branches.names import find
+from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
 from armkin.inverse.closest import Closest
 from armkin.inverse.closest import closest as nearest_pose
@@ -98,6 +100,40 @@ def solve(request: Request, targets: Array) -> list[Answer]:
         for i, answer in enumerate(_answers(request, held, s, near)):
             parts[i].append((int(s.status[i]), answer, wanted))
     return [_merged(request, found) for found in parts]
+
+
+def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
+    """Answers of targets along a path, each compared with the one before instead of one pose for all.
+
+    Yields the request that holds for each target (its `near` is the best branch of the target before) and the
+    answer with the copies nearest to that, sorted and chosen anew. A target without a best branch is passed over.
+    """
+    held = [request.arm.joint_names.index(name) for name in (*request.held, *request.swept)]
+    for answer in answers:
+        near = units.joints_in(request.arm, request.near_out)
+        branches = sorted(
+            (_nearer(request.arm, branch, near, held) for branch in answer.branches),
+            key=lambda branch: (not branch.within_limits, branch.motion),
+        )
+        names = tuple(dict.fromkeys(branch.name for branch in branches))
+        wanted = set(names)
+        if request.branch is not None:
+            with suppress(UsageError):  # none of that name reaches this target
+                wanted = {names[i] for i in find(names, request.branch)}
+            wanted = wanted if answer.best is not None else set()
+        best = next((i for i, b in enumerate(branches) if b.within_limits and b.name in wanted), None)
+        yield request, replace(answer, branches=branches, best=best)
+        if best is not None:
+            request = replace(request, near=branches[best].joints)
+
+
+def _nearer(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branch:
+    """The copy of a branch nearest to a pose (n,); held joints stay."""
+    rows, _ = nearest_row(arm, branch.q[None], near[None])
+    q = rows[0]
+    q[held] = branch.q[held]
+    motion = float(np.abs(units.joints_out(arm, q - near)).sum())
+    return branch._replace(q=q, joints=units.joints_out(arm, q).tolist(), motion=motion)
 
 
 def closest(request: Request, target: Array) -> Closest:

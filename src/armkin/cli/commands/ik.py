@@ -51,6 +51,10 @@ def ik(
     task: TaskName = None,
     lock: Lock = None,
     sweep: Sweep = None,
+    continuous: Annotated[
+        bool,
+        typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
+    ] = False,
     compiled: Compiled = False,
     json: JsonLines = False,
     batch: Batch = None,
@@ -79,13 +83,16 @@ def ik(
         if sweep:
             raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
         request = replace(request, ik=_compiled)
+    if continuous and batch is None:
+        raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None:
         inputs.no_numbers(target)
+        rows = _Rows(request, what, all_branches, turns, continuous=continuous, with_closest=json)
         tally = run_batch(
             batch_rows(batch, what.labels, f"task {what.name}"),
             out,
             json,
-            lambda chunk: _answers(request, what, chunk, all_branches, turns, with_closest=json),
+            rows.answers,
             [
                 "row",
                 "status",
@@ -117,15 +124,33 @@ def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Soluti
     return armkin.compile(arm).ik(targets, task, near)
 
 
-def _answers(
-    request: choose.Request, task: Task, chunk: Chunk, all_branches: bool, turns: bool, *, with_closest: bool
-) -> Iterator[Ik]:
-    from armkin.inverse import choose
+class _Rows:
+    """The rows of a batch; continuous: each is compared with the one before."""
 
-    targets = units.targets_in(task.labels, chunk.values)
-    answers = choose.solve(request, targets)
-    for values, goal, found in zip(chunk.values.tolist(), targets, answers, strict=True):
-        yield _answer(request, task, values, goal, found, all_branches, turns, with_closest=with_closest)
+    def __init__(
+        self,
+        request: choose.Request,
+        task: Task,
+        all_branches: bool,
+        turns: bool,
+        *,
+        continuous: bool,
+        with_closest: bool,
+    ) -> None:
+        self.request, self.task, self.continuous = request, task, continuous
+        self.show = {"all_branches": all_branches, "turns": turns, "with_closest": with_closest}
+
+    def answers(self, chunk: Chunk) -> Iterator[Ik]:
+        """The answers of some rows."""
+        from armkin.inverse import choose
+
+        targets = units.targets_in(self.task.labels, chunk.values)
+        found = choose.solve(self.request, targets)
+        each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
+        for values, goal, (request, one) in zip(chunk.values.tolist(), targets, each, strict=True):
+            yield _answer(request, self.task, values, goal, one, **self.show)
+            if self.continuous and one.best is not None:
+                self.request = replace(request, near=one.branches[one.best].joints)
 
 
 def _answer(
