@@ -54,6 +54,14 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
                 page.keyboard.press("Tab")
             raise AssertionError(f"Tab does not reach {selector}")
 
+        def type_target() -> None:
+            tab_to("#target input")
+            for number in ("390", "80", "300"):
+                page.keyboard.press("Control+a")
+                page.keyboard.type(number)
+                page.keyboard.press("Tab")
+            settled(page)
+
         # Joints: a slider by its arrow keys.
         tab_to("#sliders input[type=range]")
         before = value(page, "#box-0")
@@ -67,12 +75,7 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.keyboard.press("PageDown")
         settled(page)
         assert value(page, "#target label:nth-child(3) input") == pytest.approx(z - 5)
-        tab_to("#target input")
-        for number in ("390", "80", "300"):
-            page.keyboard.press("Control+a")
-            page.keyboard.type(number)
-            page.keyboard.press("Tab")
-        settled(page)
+        type_target()
         page.evaluate("document.activeElement.blur()")
         page.keyboard.press("3")
         settled(page)
@@ -94,6 +97,7 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.keyboard.press("p")
         until(page, "document.querySelector('#play').textContent === 'Play'")
         # The board: send by Enter, STOP by Esc, jog while the space bar is down.
+        type_target()  # far from home, wherever the program was paused
         tab_to("#speed")
         page.keyboard.type("10")
         page.evaluate("document.activeElement.blur()")
