@@ -2,7 +2,7 @@ import js from "@eslint/js";
 
 const browser = [
   "Blob", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver", "URL",
-  "clearInterval", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
+  "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
   "requestAnimationFrame", "setInterval", "setTimeout", "window",
 ];
 

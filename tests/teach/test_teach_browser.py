@@ -182,7 +182,7 @@ def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
         page.click("[data-view=space]")
         page.evaluate("document.activeElement.blur()")
         page.mouse.move(5, 500)
-        page.wait_for_timeout(300)
+        page.wait_for_timeout(1000)
         page.screenshot(path=now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
         picture.write_bytes(now.read_bytes())
@@ -281,6 +281,8 @@ def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     page.fill("#name-1", "the other end")
     page.keyboard.press("Tab")
     until(page, "document.querySelector('#name-1').value === 'the other end'")
+    page.click("#show-0")
+    until(page, "document.querySelector('#target input').value === '390.0000'")
     with page.expect_download() as download:
         page.click("#save")
     file = tmp_path / "path.yaml"

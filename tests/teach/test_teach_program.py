@@ -13,7 +13,7 @@ import armkin
 from armkin import path_file
 from armkin.errors import ArmkinError
 from armkin.teach.program import Program, played
-from command_line import ROOT
+from command_line import ROOT, run
 
 POSES = [[10, 80, -80], [-20, 60, -70], [20, 45, -60]]
 
@@ -59,6 +59,8 @@ def test_the_file_gives_the_plan_of_the_page(program: Program, arm: armkin.Arm, 
     assert page.duration == alone.duration
     t = np.linspace(0, page.duration, 50)
     assert np.array_equal(page.q(t), alone.q(t))
+    said = run("path", "robots/three_dof.yaml", file, "--json").json
+    assert said["duration_s"] == page.duration
     shown = played(arm, page)
     assert shown["duration_s"] == alone.duration
     assert np.max(shown["shares"]) <= 1 + 1e-9
@@ -156,3 +158,10 @@ def test_pages_share_one_program() -> None:
         assert first.act("plan")[0] == 422
         first.close()
         second.close()
+
+
+def test_the_pose_where_a_move_ends(program: Program, arm: armkin.Arm) -> None:
+    assert np.rad2deg(program.end_of(0, None)) == pytest.approx(POSES[0])
+    for index, pose in ((1, POSES[1]), (2, POSES[2]), (4, POSES[2])):
+        there = armkin.fk(arm, np.deg2rad(pose))[:3, 3]
+        assert armkin.fk(arm, program.end_of(index, None))[:3, 3] == pytest.approx(there, abs=1e-5)

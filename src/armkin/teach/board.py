@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +20,9 @@ from armkin.board.foreign import Foreign
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits
+from armkin.robot_file.catalogue import locate
 from armkin.teach import guard
+from armkin.teach.guard import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
@@ -162,13 +167,18 @@ class Board:
             if self.pilot.doing:
                 return
             self.check_file()
-            self.pilot.submit("follow", self._follow)
+            with suppress(RefusedError):  # busy with something else since
+                self.pilot.submit("follow", self._follow)
 
     def check_file(self) -> None:
         """Raise FileError if the robot file is not the one that the page was made of."""
-        from armkin.model.build import load
-
-        if self.arm.path and load(self.arm.path).sha256 != self.arm.sha256:
+        if not self.arm.path:
+            return
+        try:
+            data = Path(locate(self.arm.path)).read_bytes()
+        except OSError as error:
+            raise FileError(f"{self.arm.path}: {error.strerror}: the arm was not moved") from None
+        if hashlib.sha256(data).hexdigest() != self.arm.sha256:
             raise FileError(f"{self.arm.path} has changed: start armkin teach again, the arm was not moved")
 
     def run(self, machine: Backend, goals: Array, speed: float) -> None:

@@ -144,6 +144,13 @@ class Program:
 
         return path(self.arm, self.file(), start=start, speed=speed)
 
+    def end_of(self, index: int, start: Array | None) -> Array:
+        """Joint values where a move ends: (n,) [rad | mm]."""
+        part = Program(self.arm)
+        part.head, part.moves = self.head, self.moves[: index + 1]
+        plan = part.plan(start)
+        return plan.q(plan.duration)
+
     # Edits
 
     def _record(self, fields: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import guard
 from armkin.teach.program import Program, played
@@ -28,7 +29,7 @@ class Rehearsal:
 
     def actions(self) -> dict[str, Action]:
         """Name -> action, for the page in control."""
-        return {"program": self.edit, "plan": self.plan, "save": self.save, "load": self.load}
+        return {"program": self.edit, "plan": self.plan, "end": self.end, "save": self.save, "load": self.load}
 
     def start(self) -> Array | None:
         """Joint values where the arm stands; None if that is not known."""
@@ -56,6 +57,13 @@ class Rehearsal:
         """The program's motion from where the arm stands, else from home: to be played."""
         with self._lock:
             return played(self.arm, self.program.plan(self.start()))
+
+    def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """Where a move ends."""
+        with self._lock:
+            index = guard.whole(fields, "index", max(len(self.program.moves), 1))
+            q = self.program.end_of(index, self.start())
+        return {"q": units.joints_out(self.arm, q).tolist()}
 
     def _told(self) -> dict[str, Any]:
         state = self.program.state()

@@ -58,13 +58,16 @@ class Tabs:
             now = time.monotonic()
             for tab in [t for t in self._tabs.values() if not t.listening and now - t.born > _FORGET]:
                 del self._tabs[tab.id]
-            if sum(tab.listening for tab in self._tabs.values()) >= MOST:
-                raise RefusedError(429, f"the page is open {MOST} times already: close one of them")
+            self._check_room()
             if len(self._tabs) >= 10 * MOST:
                 raise RefusedError(429, "too many pages are being opened: try again in a minute")
             tab = Tab()
             self._tabs[tab.id] = tab
             return tab
+
+    def _check_room(self) -> None:
+        if sum(tab.listening for tab in self._tabs.values()) >= MOST:
+            raise RefusedError(429, f"the page is open {MOST} times already: close one of them")
 
     def find(self, name: str) -> Tab:
         """The page of that id; RefusedError if there is none."""
@@ -79,6 +82,7 @@ class Tabs:
         with self._lock:
             if tab.listening or tab.id not in self._tabs:
                 raise RefusedError(410, "this page is not known any more: reload it")
+            self._check_room()
             tab.listening = True
             if not self._control:
                 self._control = tab.id

@@ -35,7 +35,7 @@ class Page {
       pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text) => trouble(text, "board"),
     });
     this.program = new Program(arm, {
-      pose, settled: () => this.ask({}), played: (q) => this.played(q),
+      pose, settled: () => this.ask({}), show: (q) => this.turn(q), played: (q) => this.played(q),
       trail: (tips) => this.view?.trail(tips),
       trouble: (text) => trouble(text, "program"),
     });

@@ -7,7 +7,7 @@ import { act, Latest } from "./server.js";
 export class Program {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {{pose: () => Promise<number[]>, settled: () => void, played: (q: number[]) => void,
+   * @param {{pose: () => Promise<number[]>, settled: () => void, show: (q: number[]) => void, played: (q: number[]) => void,
    *   trail: (tips: number[][]) => void, trouble: (text: string) => void}} page
    */
   constructor(arm, page) {
@@ -82,6 +82,17 @@ export class Program {
     }
   }
 
+  /** Show the pose where a move ends; the next one is recorded behind it. @param {number} k */
+  async goto(k) {
+    this.chosen = k;
+    try {
+      this.page.show((await act("end", { index: k })).q);
+      this.page.trouble("");
+    } catch (error) {
+      this.page.trouble(/** @type {Error} */ (error).message);
+    }
+  }
+
   async save() {
     try {
       const { text, name } = await act("save");
@@ -135,9 +146,11 @@ export class Program {
     blend.value = move.blend === null ? "" : String(move.blend);
     blend.disabled = !moves;
     blend.addEventListener("change", () => this.edit({ do: "blend", index: k, blend: blend.value === "" ? null : blend.valueAsNumber }));
+    const show = make("button", { type: "button", class: "kind", "aria-label": `show ${said}, ${move.kind}`, id: `show-${k}` }, `${k + 1} ${move.kind}`);
+    show.addEventListener("click", () => this.goto(k));
     return make(
       "li", { title: `${move.kind}: ${move.said}` },
-      make("span", { class: "kind" }, `${k + 1} ${move.kind}`), name, blend,
+      show, name, blend,
       button("↑", "move up", { do: "reorder", to: k - 1 }, k === 0),
       button("↓", "move down", { do: "reorder", to: k + 1 }, k === this.count - 1),
       button("✕", "delete", { do: "delete" }, false),

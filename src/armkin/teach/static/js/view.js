@@ -11,6 +11,9 @@ import { Gizmo } from "./gizmo.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
+const FINE = Math.min(devicePixelRatio, 2);
+const SLOW = 60; // [ms] between two pictures of something that moves
+
 export class View {
   /**
    * @param {HTMLCanvasElement} canvas
@@ -20,13 +23,17 @@ export class View {
     this.canvas = canvas;
     this.arm = arm;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(FINE);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(36, 1, arm.reach / 100, arm.reach * 30);
     this.camera.up.set(0, 0, 1);
     this.waiting = false;
+    this.last = 0; // [ms] when it was drawn
+    this.slow = 0; // pictures in a row that came late
+    this.coarse = false;
+    this.resting = 0;
     /** @type {Line | null} */
     this.way = null;
     this.shapes = new Shapes(arm);
@@ -179,6 +186,25 @@ export class View {
     this.now();
   }
 
+  /** Where drawing is slow, as without a graphics card, draw coarsely what moves, and finely what rests. */
+  pace() {
+    const now = performance.now();
+    const gap = now - this.last;
+    this.last = now;
+    this.slow = gap < 400 && gap > SLOW ? this.slow + 1 : 0;
+    if (this.slow >= 3 && !this.coarse) {
+      this.coarse = true;
+      this.renderer.setPixelRatio(FINE / 2);
+    }
+    if (!this.coarse) return;
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => {
+      this.coarse = false;
+      this.renderer.setPixelRatio(FINE);
+      this.draw();
+    }, 400);
+  }
+
   /** Draw at the next opportunity. */
   draw() {
     if (this.waiting) return;
@@ -188,6 +214,7 @@ export class View {
 
   now() {
     this.waiting = false;
+    this.pace();
     this.renderer.render(this.scene, this.camera);
     const at = this.gizmo.handle.getWorldPosition(new Vector3()).project(this.camera);
     const { width, height } = this.canvas.getBoundingClientRect();
