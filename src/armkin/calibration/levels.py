@@ -21,7 +21,7 @@ LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
 FOLDS = 5
 GAIN = 0.97  # of the file's squared error on unseen rows, what a first correction may leave,
 CERTAIN = 0.5  # and how many standard errors it must gain; a further one must only gain,
-FEW = 14.0  # with few rows by more: FEW / rows standard errors
+FEW = 18.0  # with few rows by more: FEW / rows standard errors
 CAP = 4.0  # errors beyond so many medians count as that: a row that is wrong decides nothing
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FLAGGED = 0.1  # a row of less weight is called wrong
 HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
+MANY = 10  # rows
 
 # Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
 _PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")
@@ -170,7 +171,8 @@ def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measured:
 def _must_explain(data: Measured, choice: Choice) -> None:
     spread = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
     left = float(np.median(choice.errors[choice.level]))
-    if left > HOPELESS * spread:
+    enough = HOPELESS if len(data) >= MANY else 1.0  # few rows say little of rows they have not seen
+    if left > enough * spread:
         raise UsageError(
             f"the rows do not fit this arm: half of them stay more than {left:.3g} mm off, of points {spread:.3g} mm "
             "around; check the robot file, the order of the columns and the units"
