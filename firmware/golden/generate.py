@@ -10,9 +10,11 @@ from pathlib import Path
 HERE = Path(__file__).parent
 AXES = 5  # uno_cnc_shield: X Y Z A and a servo
 BOARDS = {  # id, axes, servos, switches, rows, queue, frame
-    "uno_cnc_shield": (1, 5, 0x10, 3, 5, 32, 160),
-    "uno_servos": (3, 6, 0x3F, 0, 6, 32, 160),
+    "uno_cnc_shield": (1, 5, 0x10, 3, 4, 32, 160),
+    "uno_servos": (3, 6, 0x3F, 0, 6, 32, 128),
 }
+RECEIVE = 127
+STEP = 1 << 23
 
 
 def cobs(data: bytes) -> bytes:
@@ -27,7 +29,7 @@ def wire(payload: bytes) -> bytes:
     return cobs(payload + struct.pack("<I", zlib.crc32(payload))) + b"\0"
 
 
-def hello(tag: int, nonce: int, version: int = 1) -> bytes:
+def hello(tag: int, nonce: int, version: int = 2) -> bytes:
     return struct.pack("<BBBI", 0x01, tag, version, nonce)
 
 
@@ -55,44 +57,66 @@ def set_position(tag: int, mask: int, counts: list[int]) -> bytes:
     return struct.pack(f"<BBH{len(counts)}i", 0x13, tag, mask, *counts)
 
 
-Segment = tuple[int, int, int, list[int]]
+Segment = tuple[int, int, int, list[int]]  # ticks, interval, add in 1/256 cycle, rates in 2^-23 step a tick
 
 
 def motion(tag: int, mask: int, flags: int, start: list[int], end: list[int], segments: list[Segment]) -> bytes:
     k = len(start)
-    form = f"<HHh{k}h" if flags & 2 else f"<BHh{k}b"
     body = struct.pack(f"<BBHBB{k}i{k}i", 0x14, tag, mask, flags, len(segments), *start, *end)
-    return body + b"".join(struct.pack(form, t, i, a, *s) for t, i, a, s in segments)
+    axes = [i for i in range(16) if mask >> i & 1]
+    for t, i, a, rates in segments:
+        if flags & 2:
+            fine = sum(1 << axis for axis, r in zip(axes, rates, strict=True) if abs(r) < 1 << 15)
+            short = [r if abs(r) < 1 << 15 else int(r / 256) for r in rates]
+            body += struct.pack("<HH", t, i) + (256 * a).to_bytes(3, "little", signed=True)
+            body += struct.pack(f"<hH{k}h", 0, fine, *short)
+        else:
+            body += struct.pack(f"<BHh{k}h", t, i, a, *(int(r / 256) for r in rates))
+    return body
 
 
 def home(tag: int, switch: int, flags: int, slow: int, backoff: int, travel: int, time: int, rate: list[int]) -> bytes:
-    return struct.pack(f"<BBBBBHIH{len(rate)}h", 0x15, tag, switch, flags, slow, backoff, travel, time, *rate)
+    return struct.pack(f"<BBBBBIIH{len(rate)}i", 0x15, tag, switch, flags, slow, backoff, travel, time, *rate)
 
 
 def jog(tag: int, rate: list[int]) -> bytes:
-    return struct.pack(f"<BB{len(rate)}h", 0x16, tag, *rate)
+    return struct.pack(f"<BB{len(rate)}i", 0x16, tag, *rate)
 
 
-def image(rows: list[tuple[int, int, list[int]]] | None = None, flags: int = 0) -> bytes:
+def image(
+    rows: list[tuple[int, int, list[int]]] | None = None,
+    flags: int = 0,
+    guards: list[tuple[int, list[int]]] | None = None,
+) -> bytes:
     """The three-joint arm on X Y Z, nothing on A, a gripper on the servo. A4988 timing."""
     rows = rows or []
-    out = struct.pack("<8BI", 1, AXES, len(rows), flags, 10, 10, 2, 1, 0x1234ABCD)
-    out += struct.pack("<BiiiHI", 1, -4267, 4267, 0, 3000, 9000)
-    out += struct.pack("<BiiiHI", 1, -13127, 3580, 0, 8000, 24000)
-    out += struct.pack("<BiiiHI", 3, -2000, 14000, 0, 6000, 18000)
-    out += struct.pack("<BiiiHI", 0, 0, 0, 0, 0, 0)
-    out += struct.pack("<BiiiHI", 1, 900, 2100, 1500, 1000, 4000)
+    out = struct.pack("<8BI", 2, AXES, len(rows), flags, 10, 10, 2, 1, 0x1234ABCD)
+    out += struct.pack("<BiiiII", 1, -4267, 4267, 0, 3000, 9000)
+    out += struct.pack("<BiiiII", 1, -13127, 3580, 0, 8000, 24000)
+    out += struct.pack("<BiiiII", 3, -2000, 14000, 0, 6000, 18000)
+    out += struct.pack("<BiiiII", 0, 0, 0, 0, 0, 0)
+    out += struct.pack("<BiiiII", 1, 900, 2100, 1500, 1000, 4000)
+    for flag, weight in guards or [(0, [0] * AXES)] * 3:
+        out += struct.pack(f"<B{AXES}b", flag, *weight)
     for lower, upper, weight in rows:
         out += struct.pack(f"<ii{AXES}h", lower, upper, *weight)
     return out
 
 
-def ack(next_: int, error: int = 0, detail: int = 0, state: int = 0, free: int = 32, queued: int = 0) -> bytes:
-    return struct.pack("<6BH", 0x80, next_, error, detail, state, free, queued)
+digest = 0  # of the session that the conversation is in
+
+
+def ack(next_: int, error: int = 0, detail: int = 0, state: int = 0, free: int | None = None, queued: int = 0) -> bytes:
+    slots = BOARDS[board_of_talk][5] if free is None else free
+    return struct.pack("<6BHH", 0x80, next_, error, detail, state, slots, queued, digest)
+
+
+board_of_talk = "uno_cnc_shield"
 
 
 def info(tag: int, nonce: int, config_crc: int, known: int, flags: int, board: str = "uno_cnc_shield") -> str:
-    head = struct.pack("<BBB", 0x81, tag, 1).hex() + "????" + struct.pack("<IBBHBBBB", nonce, *BOARDS[board]).hex()
+    head = struct.pack("<BBB", 0x81, tag, 2).hex() + "????" + struct.pack("<IBBHBBBB", nonce, *BOARDS[board]).hex()
+    head += struct.pack("<H", RECEIVE).hex()
     return head + "????" + struct.pack("<IIHB", 16_000_000, config_crc, known, flags).hex() + "??????"
 
 
@@ -105,27 +129,50 @@ def report(
     flags: int,
     known: int,
     counts: list[int],
-    free: int = 32,
+    free: int | None = None,
     queued: int = 0,
     page: int = 0,
     bad: str = "00",
 ) -> str:
+    free = BOARDS[board_of_talk][5] if free is None else free
     head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
-    return head + "??00" + bad + struct.pack(f"<B{len(counts)}i", page, *counts).hex()
+    return head + "??00" + bad + struct.pack(f"<BH{len(counts)}i", page, digest, *counts).hex()
+
+
+def rates(ticks: int, steps: list[int], unit: int = 1) -> list[int]:
+    """Rates that make so many steps in so many ticks, in whole units (256: as the narrow form has them)."""
+    out = []
+    for s in steps:
+        exact = s * STEP / ticks
+        small = unit == 1 and abs(exact) < (1 << 15) - 0.5
+        coarse = round(exact / 256) * 256
+        full = STEP - 128 if coarse > 0 else 128 - STEP  # the greatest rate is a step a tick, but for 2^-16
+        out.append(round(exact) if small else coarse if abs(coarse) < 32767 * 256 else full)
+    return out
+
+
+def whole(ticks: int, interval: int, add: int, steps: list[int], unit: int = 256) -> Segment:
+    """A segment of whole steps."""
+    return ticks, interval, add, rates(ticks, steps, unit)
 
 
 def steps_of(segments: list[Segment]) -> list[int]:
-    return [sum(column) for column in zip(*(s for *_, s in segments), strict=True)]
+    """Steps that segments make from rest: places are followed to 2^-23 step."""
+    places = [STEP // 2] * len(segments[0][3])
+    for t, _, _, r in segments:
+        places = [p + t * x for p, x in zip(places, r, strict=True)]
+    return [p >> 23 for p in places]
 
 
 # three narrow segments for X Y Z, then one wide one back and a gripper move
-RAMP: list[Segment] = [
-    (100, 8000, -2000, [-10, -95, 53]),
-    (200, 7200, 0, [-20, -127, 106]),
-    (100, 7200, 2000, [-10, -95, 53]),
+RAMP = [
+    whole(100, 8000, -2000, [-10, -50, 28]),
+    whole(200, 7200, 0, [-20, -117, 65]),
+    whole(100, 7200, 2000, [-10, -50, 29]),
 ]
-BACK: list[Segment] = [(400, 6000, 0, [40, 317, -212])]
-GRIP: list[Segment] = [(300, 16000, 0, [300])]
+BACK = [whole(400, 6000, 0, [40, 217, -122], 1)]
+GRIP = [whole(300, 20000, 0, [90], 1)]
+assert [steps_of(RAMP), steps_of(BACK), steps_of(GRIP)] == [[-40, -217, 122], [40, 217, -122], [90]]
 
 
 def units(segments: list[Segment]) -> int:
@@ -151,8 +198,8 @@ def frames() -> str:
             motion(tag, mask, flags, start, end, segments),
         )
 
-    add("HELLO tag=5 version=1 nonce=3735928559", hello(5, 3735928559))
-    add("HELLO tag=0 version=1 nonce=0", hello(0, 0))
+    add("HELLO tag=5 version=2 nonce=3735928559", hello(5, 3735928559))
+    add("HELLO tag=0 version=2 nonce=0", hello(0, 0))
     add("STATUS? tag=7 page=0", status(7))
     add("STATUS? tag=255 page=1", status(255, 1))
     add("HOLD tag=9", hold(9))
@@ -161,47 +208,26 @@ def frames() -> str:
     add("ENABLE tag=2 what=3", enable(2, 3))
     add("SET_POSITION tag=3 mask=23 counts=0,-1,70000,1500", set_position(3, 23, [0, -1, 70000, 1500]))
     add_motion(4, 7, 1, [0, 0, 0], RAMP)
-    add_motion(5, 7, 3, [-40, -317, 212], BACK)
+    add_motion(5, 7, 3, [-40, -217, 122], BACK)
     add_motion(6, 16, 3, [1500], GRIP)
-    add_motion(255, 1, 0, [-128], [(255, 400, -1, [127]), (255, 65535, 1, [-128])])
+    add_motion(255, 1, 0, [-128], [whole(255, 400, -1, [127]), whole(255, 65535, 1, [-128])])
     add(
         "HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
         home(7, 2, 1, 26, 200, 100000, 300, [0, -4000, 0, 0, 0]),
     )
     add("JOG tag=8 rate=100,0,-100,0,0", jog(8, [100, 0, -100, 0, 0]))
-    add("ACK next=6 error=0 detail=0 state=1 free=28 queued=313", ack(6, 0, 0, 1, 28, 313))
-    add("ACK next=6 error=17 detail=2 state=2 free=0 queued=65535", ack(6, 17, 2, 2, 0, 65535))
+    add("ACK next=6 error=0 detail=0 state=1 free=28 queued=313 session=0", ack(6, 0, 0, 1, 28, 313))
+    add("ACK next=6 error=17 detail=2 state=2 free=0 queued=65535 session=0", ack(6, 17, 2, 2, 0, 65535))
     add(
-        "INFO tag=5 version=1 firmware=1,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 "
-        "queue=32 frame=160 min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
-        struct.pack(
-            "<5BIBBHBBBBHIIHBHB",
-            0x81,
-            5,
-            1,
-            1,
-            0,
-            3735928559,
-            1,
-            5,
-            16,
-            3,
-            5,
-            32,
-            160,
-            400,
-            16_000_000,
-            305441741,
-            23,
-            5,
-            3,
-            2,
-        ),
+        "INFO tag=5 version=2 firmware=2,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 "
+        "queue=32 frame=160 receive=127 min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
+        struct.pack("<5BIBBHBBBB", 0x81, 5, 2, 2, 0, 3735928559, 1, 5, 16, 3, 5, 32, 160)
+        + struct.pack("<HHIIHBHB", 127, 400, 16_000_000, 305441741, 23, 5, 3, 2),
     )
     add(
         "STATUS tag=7 next=6 error=0 detail=0 state=1 flags=7 free=28 queued=313 known=23 switches=7 "
-        "overruns=0 bad=1 page=0 counts=-40,-317,212,0,1500",
-        struct.pack("<8BHH4B5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, -40, -317, 212, 0, 1500),
+        "overruns=0 bad=1 page=0 session=48879 counts=-40,-317,212,0,1500",
+        struct.pack("<8BHH4BH5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, 48879, -40, -317, 212, 0, 1500),
     )
     head = "# NAME field=value ... | payload | wire, written by generate.py from PROTOCOL.md\n"
     return head + "".join(f"{text} | {p.hex()} | {wire(p).hex()}\n" for text, p in lines)
@@ -211,15 +237,27 @@ class Talk:
     """Collects the lines of a conversation; `tag` counts the sequence."""
 
     def __init__(self, title: str, board: str = "uno_cnc_shield") -> None:
+        global board_of_talk
+        board_of_talk = board
+        self.opened(None)
         self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", f"board {board}"]
 
     def note(self, text: str) -> None:
         self.lines.append(f"# {text}")
 
+    def opened(self, nonce: int | None) -> None:
+        """From here on the replies are those of another session, or of none."""
+        global digest
+        digest = 0 if nonce is None else nonce & 0xFFFF
+
     def raw(self, text: str) -> None:
         self.lines.append(text)
+        if text == "reset":
+            self.opened(None)
 
     def say(self, payload: bytes, answer: bytes | str) -> None:
+        if payload[0] == 1 and payload[2] == 2:
+            self.opened(struct.unpack_from("<I", payload, 3)[0])
         self.lines += [f"> {payload.hex()}", f"< {answer if isinstance(answer, str) else answer.hex()}"]
 
     def setup(self, nonce: int, what: int = 3) -> int:
@@ -249,17 +287,17 @@ def talks() -> None:
     t.note("wide segments, back home; then the gripper: an axis like the others")
     t.say(motion(6, 7, 3, end, [0, 0, 0], BACK), ack(7, 0, 0, 1, 31, units(BACK)))
     t.raw("wait 300")
-    t.say(motion(7, 16, 3, [1500], [1800], GRIP), ack(8, 0, 0, 1, 31, units(GRIP)))
+    t.say(motion(7, 16, 3, [1500], [1590], GRIP), ack(8, 0, 0, 1, 31, units(GRIP)))
     t.raw("wait 450")
-    t.say(status(8), report(8, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1800]))
+    t.say(status(8), report(8, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1590]))
     t.note("a repeated HELLO changes nothing, a duplicate moves nothing")
     t.say(hello(9, 0xDEADBEEF), info(9, 0xDEADBEEF, crc, 0b10111, 7))
-    t.say(motion(7, 16, 3, [1500], [1800], GRIP), ack(8))
-    t.say(status(9), report(9, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1800]))
-    t.note("position and image survive a reset at rest, drivers come back on, servo pulses do not")
+    t.say(motion(7, 16, 3, [1500], [1590], GRIP), ack(8))
+    t.say(status(9), report(9, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1590]))
+    t.note("steppers and image survive a reset at rest, drivers come back on; servo pulses do not, so servos are lost")
     t.raw("reset")
-    t.say(status(10), report(10, 0, 1, 0, 0, 0b1101, 0b10111, [0, 0, 0, 0, 1800]))
-    t.say(hello(11, 77), info(11, 77, crc, 0b10111, 0b1101))
+    t.say(status(10), report(10, 0, 1, 0, 0, 0b1101, 0b111, [0, 0, 0, 0, 1590]))
+    t.say(hello(11, 77), info(11, 77, crc, 0b111, 0b1101))
     t.say(set_position(0, 1, [0]), ack(0, 10))
     t.write("move.talk")
 
@@ -278,27 +316,28 @@ def talks() -> None:
     t.say(hello(1, 100), info(1, 100, 0, 0, 0))
     t.say(enable(0, 1), ack(0, 3))
     t.say(hello(1, 99), info(1, 99, 0, 0, 0))
-    t.say(motion(0, 1, 1, [0], [1], [(1, 16000, 0, [1])]), ack(0, 6))
+    t.say(motion(0, 1, 1, [0], [1], [whole(20, 16000, 0, [1])]), ack(0, 6))
     t.setup(101, what=0b11)
     t.note("a gap is not executed")
-    t.say(motion(6, 1, 1, [0], [1], [(1, 16000, 0, [1])]), ack(5))
+    t.say(motion(6, 1, 1, [0], [1], [whole(20, 16000, 0, [1])]), ack(5))
     known, at_home = 0b10111, [0, 0, 0, 0, 1500]
     slow = (100, 16000, 0)
     for nonce, payload, error, detail in (
         (1000, b"\x17\x00", 3, 0),
-        (1001, motion(0, 1, 1, [0], [5], [(*slow, [5])]) + b"\0", 4, 0),
-        (1002, motion(0, 1, 1, [0], [5], [(*slow, [5])])[:-1], 4, 0),
-        (1003, motion(0, 1, 4, [0], [5], [(*slow, [5])]), 4, 0),
+        (1001, motion(0, 1, 1, [0], [5], [whole(*slow, [5])]) + b"\0", 4, 0),
+        (1002, motion(0, 1, 1, [0], [5], [whole(*slow, [5])])[:-1], 4, 0),
+        (1003, motion(0, 1, 4, [0], [5], [whole(*slow, [5])]), 4, 0),
         (1004, struct.pack("<BBHBBii", 0x14, 0, 1, 1, 0, 0, 0), 4, 0),
-        (1005, motion(0, 8, 1, [0], [5], [(*slow, [5])]), 5, 3),
-        (1006, motion(0, 32, 1, [0], [5], [(*slow, [5])]), 5, 5),
-        (1007, motion(0, 3, 1, [0, 7], [5, 12], [(*slow, [5, 5])]), 12, 1),
-        (1008, motion(0, 3, 1, [0, 0], [5, 6], [(*slow, [5, 5])]), 13, 1),
-        (1009, motion(0, 1, 1, [0], [5], [(*slow, [4]), (100, 100, 0, [1])]), 14, 1),
-        (1010, motion(0, 1, 1, [0], [5], [(100, 65000, 2000, [5])]), 14, 0),
-        (1011, motion(0, 3, 1, [0, 0], [5, 6], [(5, 16000, 0, [5, 6])]), 15, 1),
-        (1012, motion(0, 1, 1, [0], [100], [(100, 4000, 0, [100])]), 16, 0),
-        (1013, motion(0, 17, 3, [0, 1500], [0, 2101], [(601, 16000, 0, [0, 601])]), 17, 4),
+        (1005, motion(0, 8, 1, [0], [5], [whole(*slow, [5])]), 5, 3),
+        (1006, motion(0, 32, 1, [0], [5], [whole(*slow, [5])]), 5, 5),
+        (1007, motion(0, 3, 1, [0, 7], [5, 12], [whole(*slow, [5, 5])]), 12, 1),
+        (1008, motion(0, 3, 1, [0, 0], [5, 6], [whole(*slow, [5, 5])]), 13, 1),
+        (1009, motion(0, 1, 1, [0], [5], [whole(*slow, [4]), whole(100, 100, 0, [1])]), 14, 1),
+        (1010, motion(0, 1, 1, [0], [5], [whole(100, 65000, 2000, [5])]), 14, 0),
+        (1011, motion(0, 3, 1, [0, 0], [5, 6], [(5, 16000, 0, [0, -STEP])]), 15, 1),
+        (1012, motion(0, 1, 1, [0], [100], [whole(100, 4000, 0, [100])]), 16, 0),
+        (1014, motion(0, 1, 1, [0], [100], [whole(200, 8000, 0, [100])]), 29, 0),
+        (1013, motion(0, 17, 3, [0, 1500], [0, 2101], [whole(2600, 16000, 0, [0, 601], 1)]), 17, 4),
         (1015, set_position(0, 3, [0, 0]), 10, 0),
         (1016, set_position(0, 8, [0]), 5, 3),
         (1017, jog(0, [0, 8001, 0, 0, 0]), 16, 1),
@@ -315,15 +354,15 @@ def talks() -> None:
     t.note("drivers off: steppers are lost; pulses off: servos too")
     t.say(hello(1, 2000), info(1, 2000, crc, known, 0b111))
     t.say(enable(0, 2), ack(1))
-    t.say(motion(1, 16, 1, [1500], [1510], [(*slow, [10])]), ack(2, 0, 0, 1, 31, units([(*slow, [10])])))
+    t.say(motion(1, 16, 1, [1500], [1510], [whole(*slow, [10])]), ack(2, 0, 0, 1, 31, units([whole(*slow, [10])])))
     t.raw("wait 150")
-    t.say(motion(2, 1, 1, [0], [5], [(*slow, [5])]), ack(2, 9, 0))
+    t.say(motion(2, 1, 1, [0], [5], [whole(*slow, [5])]), ack(2, 9, 0))
     t.say(hello(1, 2001), info(1, 2001, crc, 0b10000, 0b110))
     t.say(set_position(0, 7, [0, 0, 0]), ack(1))
-    t.say(motion(1, 1, 1, [0], [5], [(*slow, [5])]), ack(1, 11, 0))
+    t.say(motion(1, 1, 1, [0], [5], [whole(*slow, [5])]), ack(1, 11, 0))
     t.note("a broken image is not taken, and what was known is lost")
     bad = bytearray(image())
-    bad[12 + 19 + 13 : 12 + 19 + 15] = b"\0\0"
+    bad[12 + 21 + 13 : 12 + 21 + 17] = bytes(4)
     t.say(hello(1, 2002), info(1, 2002, crc, known, 0b110))
     t.say(config(0, 0, bytes(bad)), ack(1))
     t.say(commit(1, bytes(bad)), ack(1, 7))
@@ -333,26 +372,27 @@ def talks() -> None:
     t = Talk("A joint limit of coupled motors: Y and Z turn one joint by their sum")
     img = image(rows=[(-1000, 1000, [0, 2, 2, 0, 0])])
     t.say(hello(1, 9), info(1, 9, 0, 0, 0))
-    t.say(config(0, 0, img), ack(1))
-    t.say(commit(1, img), ack(2))
-    t.say(set_position(2, 7, [0, 0, 0]), ack(3))
-    t.say(enable(3, 1), ack(4))
-    pair: list[Segment] = [(600, 4000, 0, [600, -600]), (400, 4000, 0, [0, 400])]
-    t.say(motion(4, 6, 3, [0, 0], [600, -200], pair), ack(5, 0, 0, 1, 30, units(pair)))
-    t.raw("wait 350")
-    t.say(motion(5, 6, 3, [600, -200], [701, -200], [(101, 16000, 0, [101, 0])]), ack(5, 18))
+    t.say(config(0, 0, img[:100]), ack(1))
+    t.say(config(1, 100, img[100:]), ack(2))
+    t.say(commit(2, img), ack(3))
+    t.say(set_position(3, 7, [0, 0, 0]), ack(4))
+    t.say(enable(4, 1), ack(5))
+    pair = [whole(300, 16000, 0, [300, -200], 1), whole(100, 16000, 0, [0, 0], 1)]
+    t.say(motion(5, 6, 3, [0, 0], [300, -200], pair), ack(6, 0, 0, 1, 30, units(pair)))
+    t.raw("wait 450")
+    t.say(motion(6, 6, 3, [300, -200], [701, -200], [whole(401, 16000, 0, [401, 0], 1)]), ack(6, 18))
     t.write("joint_limit.talk")
 
     t = Talk("Damaged bytes are dropped without an answer, and counted")
     t.say(hello(1, 3), info(1, 3, 0, 0, 0))
-    whole = wire(status(2))
-    broken = bytearray(whole)
+    sound = wire(status(2))
+    broken = bytearray(sound)
     broken[2] ^= 0x10
-    for data in (bytes(broken), whole[:-3] + b"\0", b"\x05\x01\0", bytes([1] * 200) + b"\0"):
+    for data in (bytes(broken), sound[:-3] + b"\0", b"\x05\x01\0", bytes([1] * 200) + b"\0"):
         t.raw(f"wire {data.hex()}")
         t.raw("silent")
     t.note("empty frames are ignored, a question after them is answered")
-    t.raw("wire 000000" + whole.hex())
+    t.raw("wire 000000" + sound.hex())
     t.raw("< " + report(2, 0, 0, 0, 0, 0, 0, [0] * AXES, bad="04"))
     t.note("an unknown type outside of the sequence gets no answer, nor does a HELLO of the wrong length")
     t.raw("wire " + wire(b"\x0f\x01").hex())
@@ -365,40 +405,43 @@ def talks() -> None:
 def servo_talk() -> None:
     """Two joints of a servo arm: the count is the pulse width."""
     board, crc_of = "uno_servos", zlib.crc32
-    img = struct.pack("<8BI", 1, 6, 0, 0, 0, 0, 0, 0, 7)
-    img += struct.pack("<BiiiHI", 1, 500, 2500, 1500, 1000, 4000) * 2
-    img += struct.pack("<BiiiHI", 0, 0, 0, 0, 0, 0) * 4
+    img = struct.pack("<8BI", 2, 6, 0, 0, 0, 0, 0, 0, 7)
+    img += struct.pack("<BiiiII", 1, 500, 2500, 1500, 1000, 4000) * 2
+    img += struct.pack("<BiiiII", 0, 0, 0, 0, 0, 0) * 4
     t = Talk("Servos: a start pose and consent before the first pulse, then motion like any other", board)
     t.say(hello(1, 1), info(1, 1, 0, 0, 0, board))
-    t.say(config(0, 0, img), ack(1))
-    t.say(commit(1, img), ack(2))
+    t.say(config(0, 0, img[:90]), ack(1))
+    t.say(config(1, 90, img[90:]), ack(2))
+    t.say(commit(2, img), ack(3))
     t.note("nobody has said where the servos stand, then nobody has consented to pulses")
-    move: list[Segment] = [(100, 16000, 0, [50, -100]), (100, 32000, 0, [0, -50])]
-    t.say(motion(2, 3, 3, [1500, 1500], [1550, 1350], move), ack(2, 9, 0))
+    move = [whole(200, 16000, 0, [40, -40], 1), whole(100, 16000, 0, [0, -20], 1)]
+    t.say(motion(3, 3, 3, [1500, 1500], [1540, 1440], move), ack(3, 9, 0))
     t.say(hello(1, 2), info(1, 2, crc_of(img), 0, 4, board))
     t.say(set_position(0, 3, [1500, 2501]), ack(0, 5, 1))
     t.say(hello(1, 3), info(1, 3, crc_of(img), 0, 4, board))
     t.say(set_position(0, 3, [1500, 1500]), ack(1))
-    t.say(motion(1, 3, 3, [1500, 1500], [1550, 1350], move), ack(1, 11, 0))
+    t.say(motion(1, 3, 3, [1500, 1500], [1540, 1440], move), ack(1, 11, 0))
     t.say(hello(1, 4), info(1, 4, crc_of(img), 3, 4, board))
     t.say(enable(0, 2), ack(1))
-    t.say(motion(1, 3, 3, [1500, 1500], [1550, 1350], move), ack(2, 0, 0, 1, 30, units(move)))
+    t.say(motion(1, 3, 3, [1500, 1500], [1540, 1440], move), ack(2, 0, 0, 1, 30, units(move)))
     t.raw("wait 400")
-    t.say(status(5), report(5, 2, 0, 0, 0, 6, 3, [1550, 1350, 0, 0, 0, 0]))
+    t.say(status(5), report(5, 2, 0, 0, 0, 6, 3, [1540, 1440, 0, 0, 0, 0]))
     t.note("beyond the pulse that the joint may have")
-    t.say(motion(2, 3, 3, [1550, 1350], [2501, 1350], [(951, 16000, 0, [951, 0])]), ack(2, 17, 0))
-    t.note("after a reset at rest the position is retained, the pulses wait for consent")
+    t.say(motion(2, 3, 3, [1540, 1440], [2501, 1440], [whole(5000, 16000, 0, [961, 0], 1)]), ack(2, 17, 0))
+    t.note("after a reset the servos are lost: nothing held them")
     t.raw("reset")
-    t.say(hello(1, 5), info(1, 5, crc_of(img), 3, 0b1100, board))
-    t.say(motion(0, 1, 3, [1550], [1560], [(10, 16000, 0, [10])]), ack(0, 11, 0))
-    t.say(hello(1, 6), info(1, 6, crc_of(img), 3, 0b1100, board))
-    t.say(enable(0, 2), ack(1))
-    t.say(motion(1, 1, 3, [1550], [1560], [(10, 16000, 0, [10])]), ack(2, 0, 0, 1, 31, units([(10, 16000, 0, [10])])))
-    t.raw("wait 50")
-    t.say(status(6), report(6, 2, 0, 0, 0, 0b1110, 3, [1560, 1350, 0, 0, 0, 0]))
+    t.say(hello(1, 5), info(1, 5, crc_of(img), 0, 0b100, board))
+    tiny = [whole(100, 16000, 0, [10, 0], 1)]
+    t.say(motion(0, 3, 3, [1540, 1440], [1550, 1440], tiny), ack(0, 9, 0))
+    t.say(hello(1, 6), info(1, 6, crc_of(img), 0, 0b100, board))
+    t.say(set_position(0, 3, [1540, 1440]), ack(1))
+    t.say(enable(1, 2), ack(2))
+    t.say(motion(2, 3, 3, [1540, 1440], [1550, 1440], tiny), ack(3, 0, 0, 1, 31, units(tiny)))
+    t.raw("wait 150")
+    t.say(status(6), report(6, 3, 0, 0, 0, 0b110, 3, [1550, 1440, 0, 0, 0, 0]))
     t.note("pulses off: the servos may go anywhere, so they are lost")
-    t.say(enable(2, 0), ack(3))
-    t.say(status(7), report(7, 3, 0, 0, 0, 4, 0, [1560, 1350, 0, 0, 0, 0]))
+    t.say(enable(3, 0), ack(4))
+    t.say(status(7), report(7, 4, 0, 0, 0, 4, 0, [1550, 1440, 0, 0, 0, 0]))
     t.write("servos.talk")
 
 

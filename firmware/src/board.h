@@ -12,8 +12,8 @@
 
 #define AXES (STEPPERS + SERVOS)
 _Static_assert(STEPPERS <= 8 && AXES <= 15, "masks of axes");
-#define ROWS AXES
+#define ROWS (STEPPERS ? STEPPERS : AXES)  // of the configuration: coupled joints
 #define ALL_AXES ((1U << AXES) - 1)
 #define STEPPER_AXES ((1U << STEPPERS) - 1)
 #define SERVO_AXES (ALL_AXES & ~STEPPER_AXES)
-#define CLOCK 16000000UL
+_Static_assert(256000ULL * UNIT_DIVISOR == (unsigned long long)CLOCK * UNIT_FACTOR, "256 cycles in ms");

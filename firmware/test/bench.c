@@ -20,6 +20,7 @@ bool bench_abort = true;
 uint64_t bench_cycles, bench_ticks;
 bool bench_drivers_on;
 void (*bench_on_tick)(void);
+bool bench_frozen, bench_spill, bench_power_level = true;
 
 static uint16_t directions;
 static bool timer_on;
@@ -31,7 +32,7 @@ static uint8_t sent[1 << 16];
 static size_t sent_head, sent_tail;
 
 uint8_t hal_send_room(void) {
-    return 127;
+    return 255;
 }
 
 void hal_send(uint8_t byte) {
@@ -59,6 +60,16 @@ uint8_t hal_switches(void) {
 
 bool hal_abort_level(void) {
     return bench_abort;
+}
+
+bool hal_power_level(void) {
+    return bench_power_level;
+}
+
+bool hal_spilled(void) {
+    const bool since = bench_spill;
+    bench_spill = false;
+    return since;
 }
 
 void hal_probe(uint8_t input, bool high) {
@@ -101,7 +112,9 @@ static void tick(void) {
 void bench_run(uint32_t us) {
     const uint64_t end = bench_cycles + us * (CLOCK / 1000000);
     for (;;) {
-        protocol_poll();
+        if (!bench_frozen) {
+            protocol_poll();
+        }
         const bool tick_first = timer_on && next_tick < next_millisecond;
         const uint64_t next = tick_first ? next_tick : next_millisecond;
         if (next > end) {
@@ -113,7 +126,9 @@ void bench_run(uint32_t us) {
             tick();
         } else {
             next_millisecond += CLOCK / 1000;
-            protocol_millisecond();
+            if (!bench_frozen) {
+                protocol_millisecond();
+            }
         }
     }
 }
@@ -121,7 +136,7 @@ void bench_run(uint32_t us) {
 void bench_reset(uint8_t cause) {
     timer_on = false;
     sent_tail = sent_head;
-    link_byte(0);
+    protocol_byte(0);
     link_bad = 0;
     next_millisecond = bench_cycles + CLOCK / 1000;
     protocol_start(cause);
@@ -133,13 +148,14 @@ void bench_power(void) {
     }
     memset(bench_pins, 0, sizeof bench_pins);
     bench_switches = 0xFF;
-    bench_abort = true;
+    bench_abort = bench_power_level = true;
+    bench_frozen = bench_spill = false;
     bench_reset(0);
 }
 
 void bench_wire(const uint8_t *bytes, size_t length) {
     for (size_t i = 0; i < length; i++) {
-        link_byte(bytes[i]);
+        protocol_byte(bytes[i]);
     }
 }
 

@@ -10,6 +10,7 @@
 #include "../src/core/crc.h"
 #include "../src/core/link.h"
 #include "../src/core/motion.h"
+#include "../src/core/protocol.h"
 #include "host.h"
 
 static uint64_t state = 1;
@@ -60,20 +61,20 @@ static size_t obeyed(uint8_t *payload) {
         case 2:
             payload[0] = 0x16;
             for (uint8_t i = 0; i < AXES; i++) {
-                put16(payload + 2 + 2 * i, i < STEPPERS ? rnd(2000) : 0);
+                put32(payload + 2 + 4 * i, i < STEPPERS ? rnd(2000) : 0);
             }
-            return 2 + 2 * AXES;
+            return 2 + 4 * AXES;
         case 3:
             payload[0] = 0x15;
-            memset(payload + 2, 0, 11 + 2 * AXES);
+            memset(payload + 2, 0, 13 + 4 * AXES);
             payload[4] = 1 + rnd(255);
-            payload[5] = payload[11] = 100;
-            put32(payload + 7, 10000);
-            put16(payload + 13, rnd(4000) + 1);
-            return 13 + 2 * AXES;
+            payload[5] = payload[13] = 100;
+            put32(payload + 9, 10000);
+            put32(payload + 15, rnd(4000) + 1);
+            return 15 + 4 * AXES;
         case 4:
             payload[0] = 0x01;
-            payload[2] = 1;
+            payload[2] = 2;
             put32(payload + 3, rnd(1 << 30));
             return 7;
         case 5:
@@ -206,7 +207,7 @@ static uint32_t compared;
 
 // At rest the pins have made the steps that the board reports.
 static void compare_at_rest(void) {
-    while (session.state != IDLE) {
+    while (motion.state != IDLE) {
         bench_run(10000);
     }
     int32_t now[AXES];

@@ -1,5 +1,7 @@
 #include "host.h"
 
+#include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "../src/core/bytes.h"
@@ -10,7 +12,7 @@ uint8_t host_frame[300];
 size_t host_length;
 
 struct image host_image(void) {
-    struct image image = {.layout = 1, .axes = AXES, .step_high = 10, .step_low = 10, .dir_setup = 2, .wake = 1};
+    struct image image = {.layout = 2, .axes = AXES, .step_high = 10, .step_low = 10, .dir_setup = 2, .wake = 1};
     for (uint8_t i = 0; i < AXES; i++) {
         const bool servo = i >= STEPPERS;
         image.axis[i] = (struct axis_config){
@@ -19,7 +21,7 @@ struct image host_image(void) {
             .upper = servo ? 2500 : 100000,
             .home = servo ? 1500 : 0,
             .max_rate = servo ? 2000 : 20000,
-            .max_accel = servo ? 8000 : 100000,
+            .max_accel = servo ? 16000 : 200000,
         };
     }
     return image;
@@ -38,20 +40,20 @@ static size_t answer(uint8_t type, uint8_t *payload) {
 }
 
 static struct ack read_ack(const uint8_t *p) {
-    return (struct ack){p[0], p[1], p[2], p[3], p[4], get16(p + 5)};
+    return (struct ack){p[0], p[1], p[2], p[3], p[4], get16(p + 5), get16(p + 7)};
 }
 
 static struct ack await_ack(void) {
     uint8_t payload[300];
-    CHECK(answer(0x80, payload) == 8);
+    CHECK(answer(0x80, payload) == 10);
     return read_ack(payload + 1);
 }
 
 void host_hello(uint32_t nonce) {
-    uint8_t payload[300] = {0x01, 0, 1};
+    uint8_t payload[300] = {0x01, 0, 2};
     put32(payload + 3, nonce);
     bench_payload(payload, 7);
-    CHECK(answer(0x81, payload) == 33);
+    CHECK(answer(0x81, payload) == 35);
     host_next = 0;
 }
 
@@ -67,7 +69,7 @@ struct ack host_order(uint8_t type, const void *body, size_t length) {
 }
 
 void host_configure(const struct image *image) {
-    const uint16_t length = 12 + AXES * 19 + image->rows * sizeof image->row[0];
+    const uint16_t length = offsetof(struct image, row) + image->rows * sizeof image->row[0];
     for (uint16_t at = 0; at < length; at += 100) {
         uint8_t body[102];
         const uint16_t n = length - at < 100 ? length - at : 100;
@@ -115,20 +117,28 @@ size_t host_motion_payload(uint8_t *payload, uint16_t mask, uint8_t flags, const
     }
     for (uint8_t k = 0; k < n; k++) {
         const struct host_segment *s = &segments[k];
-        if (flags & HOST_WIDE) {
-            p = put16(p, s->ticks);
+        const bool wide = flags & HOST_WIDE;
+        int16_t rates[AXES];
+        uint16_t fine = 0;
+        for (uint8_t i = 0; i < AXES; i++) {
+            double rate = s->rate[i] ? s->rate[i] : s->steps[i] * 8388608.0 / s->ticks;
+            if (wide && fabs(rate) < 32767.5) {
+                fine |= 1U << i;
+            } else {
+                rate /= 256;
+            }
+            rates[i] = fmax(-32767, fmin(32767, round(rate)));
+        }
+        if (wide) {
+            p = put16(put16(p, s->ticks), s->interval);
+            *p++ = 0;
+            p = put16(put16(put16(p, s->add), s->bend), fine);
         } else {
             *p++ = s->ticks;
+            p = put16(put16(p, s->interval), s->add);
         }
-        p = put16(put16(p, s->interval), s->add);
         for (uint8_t i = 0; i < AXES; i++) {
-            if (mask >> i & 1) {
-                if (flags & HOST_WIDE) {
-                    p = put16(p, s->steps[i]);
-                } else {
-                    *p++ = s->steps[i];
-                }
-            }
+            p = mask >> i & 1 ? put16(p, rates[i]) : p;
         }
     }
     return p - payload;
@@ -145,20 +155,20 @@ struct ack host_hold(void) {
     return await_ack();
 }
 
-struct ack host_home(uint8_t input, uint8_t closed, uint8_t slow, uint16_t backoff, uint32_t travel, uint16_t time,
-                     const int16_t *rate) {
-    uint8_t body[11 + 2 * AXES] = {input, closed, slow};
-    uint8_t *p = put16(put32(put16(body + 3, backoff), travel), time);
+struct ack host_home(uint8_t input, uint8_t closed, uint8_t slow, uint32_t backoff, uint32_t travel, uint16_t time,
+                     const int32_t *rate) {
+    uint8_t body[13 + 4 * AXES] = {input, closed, slow};
+    uint8_t *p = put16(put32(put32(body + 3, backoff), travel), time);
     for (uint8_t i = 0; i < AXES; i++) {
-        p = put16(p, rate[i]);
+        p = put32(p, rate[i]);
     }
     return host_order(0x15, body, sizeof body);
 }
 
-struct ack host_jog(const int16_t *rate) {
-    uint8_t body[2 * AXES];
+struct ack host_jog(const int32_t *rate) {
+    uint8_t body[4 * AXES];
     for (uint8_t i = 0; i < AXES; i++) {
-        put16(body + 2 * i, rate[i]);
+        put32(body + 4 * i, rate[i]);
     }
     return host_order(0x16, body, sizeof body);
 }
@@ -166,7 +176,7 @@ struct ack host_jog(const int16_t *rate) {
 struct status host_status(uint8_t page) {
     uint8_t payload[300] = {0x02, 7, page};
     bench_payload(payload, 3);
-    CHECK(answer(0x82, payload) == 16 + 4 * AXES);
+    CHECK(answer(0x82, payload) == 18 + 4 * AXES);
     CHECK(payload[1] == 7);
     struct status status = {
         .ack = read_ack(payload + 2),
@@ -178,8 +188,9 @@ struct status host_status(uint8_t page) {
     };
     status.ack.free = payload[7];
     status.ack.queued = get16(payload + 8);
+    status.ack.session = get16(payload + 16);
     for (uint8_t i = 0; i < AXES; i++) {
-        status.counts[i] = (int32_t)get32(payload + 16 + 4 * i);
+        status.counts[i] = (int32_t)get32(payload + 18 + 4 * i);
     }
     return status;
 }

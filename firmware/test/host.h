@@ -17,7 +17,7 @@
 
 struct ack {
     uint8_t next, error, detail, state, free;
-    uint16_t queued;
+    uint16_t queued, session;
 };
 
 struct status {
@@ -29,10 +29,13 @@ struct status {
 
 enum { HOST_END = 1, HOST_WIDE = 2 };
 
+// Whole steps in whole ticks, from half a step to half a step as near as the rates come.
 struct host_segment {
     uint16_t ticks, interval;
-    int16_t add;
+    int16_t add;  // 1/256 cycle
+    int16_t bend;
     int16_t steps[AXES];
+    int32_t rate[AXES];  // 2^-23 step a tick, where it is not 0, as the form can say it: then `steps` says what comes of it
 };
 
 extern uint8_t host_next;
@@ -49,9 +52,9 @@ size_t host_motion_payload(uint8_t *payload, uint16_t mask, uint8_t flags, const
                            const struct host_segment *segments);
 struct ack host_motion(uint16_t mask, uint8_t flags, const int32_t *start, uint8_t n, const struct host_segment *s);
 struct ack host_hold(void);
-struct ack host_home(uint8_t input, uint8_t closed, uint8_t slow, uint16_t backoff, uint32_t travel, uint16_t time,
-                     const int16_t *rate);
-struct ack host_jog(const int16_t *rate);
+struct ack host_home(uint8_t input, uint8_t closed, uint8_t slow, uint32_t backoff, uint32_t travel, uint16_t time,
+                     const int32_t *rate);
+struct ack host_jog(const int32_t *rate);
 struct status host_status(uint8_t page);
 void host_ready(uint32_t nonce);            // all of the above up to a known position (0, servos 1500) and power on
 void host_wait_idle(uint32_t at_most_ms);   // asking all the while

@@ -21,6 +21,8 @@ class Board:
     frame: int  # [bytes] payload + CRC
     min_interval: int  # [cycles] between ticks
     clock: int = 16_000_000  # [1/s]
+    receive: int = 127  # [bytes] that may follow a frame without an answer
+    power: str = "A1"  # input that senses the motors' power
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -35,7 +37,7 @@ class Board:
     @property
     def rows(self) -> int:
         """Joint-limit rows that its configuration may have."""
-        return len(self.axes)
+        return len(self.steppers) or len(self.axes)
 
 
 BOARDS = {
@@ -51,8 +53,10 @@ BOARDS = {
             128,
             240,
             576,
+            receive=255,
+            power="A4",
         ),
-        Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 160, 1600),
+        Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 128, 1600),
     )
 }
 

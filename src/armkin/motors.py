@@ -85,6 +85,11 @@ def pulses(arm: Arm, q: ArrayLike) -> Pulses:
     return np.copysign(whole, exact).astype(np.int64)
 
 
+def places(arm: Arm, q: ArrayLike) -> Array:
+    """Pulses of every motor before they are rounded: (..., n) [rad | mm] -> (..., motors)."""
+    return _exact(arm, q)[0]
+
+
 def joints(arm: Arm, p: ArrayLike) -> Array:
     """Joint values where the motors stand at these pulses.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import accumulate
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from armkin.board.firmware import segments
 from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.protocol import Segment
+from armkin.board.sim.velocity import times_valid
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import build as arms
 from armkin.model.arm import Arm
@@ -27,20 +28,26 @@ def three_dof() -> Arm:
     return arms.load("robots/three_dof.yaml")
 
 
-def tick_times(cut: tuple[Segment, ...]) -> list[int]:
-    """Cycle of every tick, as the device counts (PROTOCOL.md, section 6)."""
-    intervals = [(256 * s.interval + j * s.add) >> 8 for s in cut for j in range(s.ticks)]
-    return list(accumulate(intervals))
-
-
-def made(cut: tuple[Segment, ...], axis: int) -> list[int]:
-    """Net steps of an axis after every tick: the device's Bresenham."""
-    out, base = [], 0
+def tick_times(cut: Sequence[Segment]) -> list[int]:
+    """Cycle of every tick, as the device adds intervals up (PROTOCOL.md, section 6)."""
+    out, now = [], 0
     for s in cut:
-        n, sign = abs(s.steps[axis]), 1 if s.steps[axis] > 0 else -1
-        done = ((j * n + s.ticks - 1 - s.ticks // 2) // s.ticks for j in range(1, s.ticks + 1))
-        out += [base + sign * d for d in done]
-        base += s.steps[axis]
+        interval, add = s.interval << 16, s.add << 8
+        for left in range(s.ticks - 1, -1, -1):
+            now += interval >> 16
+            out.append(now)
+            interval += add >> 8
+            if left % 16 == 0:
+                add += s.bend << 2
+    return out
+
+
+def made(cut: Sequence[Segment], axis: int) -> list[int]:
+    """Net steps of an axis after every tick: the device's phases."""
+    out, place = [], 1 << 22
+    for s in cut:
+        out += [(place + j * s.rates[axis]) >> 23 for j in range(1, s.ticks + 1)]
+        place += s.ticks * s.rates[axis]
     return out
 
 
@@ -54,24 +61,21 @@ def trapezoid(t: np.ndarray, length: float, top: float, accel: float) -> np.ndar
     return np.where(t < rise, up, np.where(t > whole - rise, down, cruise))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.lists(counts, min_size=1, max_size=5), st.data())
 def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], data: st.DataObject) -> None:
-    end = [x + data.draw(st.integers(-2500, 2500)) for x in start]
+    end = [x + data.draw(st.integers(-900, 900)) for x in start]
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
-    rate = data.draw(st.floats(20, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
-    accel = data.draw(st.floats(100, 400_000))
+    rate = data.draw(st.floats(500, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
+    accel = data.draw(st.floats(500, 400_000))
     move = segments.line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
-    totals = [sum(s.steps[k] for s in move.segments) for k in range(len(start))]
-    assert [a + t for a, t in zip(start, totals, strict=True)] == end
     for s in move.segments:
+        assert times_valid(s, MIN_INTERVAL)
         assert 1 <= s.ticks <= 65535
-        assert min(s.interval, s.last_interval) >= MIN_INTERVAL
-        assert max(s.interval, s.last_interval) <= 65535
-        assert abs(s.add) <= 32767
-        assert all(abs(x) <= min(s.ticks, 32767) for x in s.steps)
+        assert abs(s.bend) <= 32767
+        assert all(abs(r) < 32768 or r % 256 == 0 or abs(r) == 2**23 - 128 for r in s.rates)
     assert move.cycles == sum(segments.cycles_of(s) for s in move.segments)
     if n == 0:
         assert move.segments == ()
@@ -79,64 +83,52 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     times = np.array(tick_times(move.segments))
     assert times[-1] == move.cycles
 
-    # Every motor stays within a count (and a quarter: linear intervals) of its share of one trapezoid.
-    ideal = trapezoid(times / CLOCK, n, move.peak * n, accel) / n
-    late = 1.25 + 4e-3 * n  # whole cycles make a cruise up to 0.2 % slower, and linear intervals are no root
+    # Every motor stays within a count (and a quarter: the device's parabolas) of its share of one trapezoid.
+    peak = min(rate, math.sqrt(accel * n))
+    ideal = trapezoid(times / CLOCK, n, rate, accel) / n
+    whole = n / peak + peak / accel
+    assert move.cycles / CLOCK == pytest.approx(whole, rel=2e-3, abs=1e-4)
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
-        assert np.abs(made(move.segments, k) - ideal * (b - a)).max() <= late
-        assert sum(s.steps[k] > 0 for s in move.segments) == 0 or b > a  # monotone
-        assert sum(s.steps[k] < 0 for s in move.segments) == 0 or b < a
-    # No tick is faster than the leader's top rate.
+        counts_made = np.array(made(move.segments, k))
+        assert counts_made[-1] == b - a
+        assert np.abs(counts_made - ideal * (b - a)).max() <= 1.25 + 2e-3 * n
+        assert np.all(np.diff(counts_made, prepend=0) * np.sign(b - a) >= 0)  # monotone
+    # No tick is faster than the leader's top rate, but for the rounding of intervals to cycles.
     gaps = np.diff(times, prepend=0)
-    leader = next(k for k, (a, b) in enumerate(zip(start, end, strict=True)) if abs(b - a) == n)
-    per_tick = [abs(s.steps[leader]) / s.ticks for s in move.segments for _ in range(s.ticks)]
-    assert (per_tick / (gaps / CLOCK)).max() <= rate * (1 + 1e-9)
+    per_tick = np.repeat([max(map(abs, s.rates)) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
+    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 20_000), st.floats(50, 40_000), st.floats(200, 400_000))
 def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
     move = segments.line([0], [n], rate / n, accel / n)
+    # Wherever the interval changes as fast as it does in a segment, and where a segment meets the next but one.
     times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
-    position = np.cumsum([0, *(s.steps[0] for s in move.segments)])
-    # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
-    # rounding of a step: the definition of an acceleration that whole steps allow.
+    place = np.cumsum([0, *(s.ticks * s.rates[0] / 2**23 for s in move.segments)])
     for i in range(len(times) - 2):
         t0, t1, t2 = times[i : i + 3]
-        p0, p1, p2 = position[i : i + 3]
+        p0, p1, p2 = place[i : i + 3]
         bend = (p2 - p1) / (t2 - t1) - (p1 - p0) / (t1 - t0)
-        assert abs(bend) <= accel * (t2 - t0) / 2 + 0.02 * rate + 1 / (t2 - t0)
+        assert abs(bend) <= accel * 1.02 * (t2 - t0) / 2 + 0.006 * rate
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(1, 30_000), st.floats(50, 40_000), st.floats(200, 200_000))
-def test_a_queue_of_28_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
-    """PROTOCOL.md, section 7: DRY when the queued time falls to u^2 / (u + e) + u / 32 + 2 ms."""
+@given(st.integers(1, 30_000), st.floats(50, 35_000), st.floats(200, 200_000))
+def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
+    """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
     move = segments.line([0], [n], rate / n, accel / n)
     length = [segments.cycles_of(s) / CLOCK for s in move.segments]
-    rate_at = [[abs(s.steps[0]) * CLOCK / s.ticks / x for x in (s.interval, s.last_interval)] for s in move.segments]
-    for i in range(len(length) - 28):
-        u, e = rate_at[i][0] / accel, rate_at[i + 27][1] / accel
-        assert sum(length[i : i + 28]) > u * u / (u + e) + u / 32 + 0.002 + 0.02
-
-
-@given(st.integers(1, 2000), st.floats(50, 40_000), st.floats(200, 200_000))
-@settings(max_examples=30, deadline=None)
-def test_progress_inverts_the_ticks(n: int, rate: float, accel: float) -> None:
-    move = segments.line([0], [n], rate / n, accel / n)
-    times = np.array(tick_times(move.segments), dtype=float)
-    done = segments.progress(move, times)
-    assert np.all(np.diff(done) >= 0)
-    assert done[-1] == 1
-    assert np.abs(done * n - made(move.segments, 0)).max() <= 1
-    assert segments.progress(move, np.array([0.0]))[0] == 0
+    for i in range(len(length) - 30):
+        s = move.segments[i]
+        u = abs(s.rates[0]) / 2**23 * CLOCK / min(s.interval, s.last_interval) / accel
+        assert sum(length[i : i + 30]) > u + u / 32 + 0.002 + 0.02
 
 
 def test_the_published_pose(three_dof: Arm) -> None:
     plan = plan_moves(three_dof, [0, 0, 0], np.deg2rad([-30, 5, -5]))
     assert plan.end.tolist() == [-1067, -10144, 5667]
-    totals = np.sum([s.steps for move in plan.moves() for s in move.segments], axis=0)
-    assert totals.tolist() == [-1067, -10144, 5667]
+    assert [made(next(plan.moves()).segments, k)[-1] for k in range(3)] == [-1067, -10144, 5667]
     assert np.all(plan.trajectory.top_speed <= three_dof.max_speed * (1 + 1e-12))
     # 85 deg at 60 deg/s with ramps of 120 deg/s^2 take 1.917 s, less what rounding to steps has spared.
     assert plan.duration == pytest.approx(85 / 60 + 0.5, abs=1e-4)

@@ -89,7 +89,7 @@ def built(name: str, field: dict[str, str]) -> bytes:
     if name == "JOG":
         return protocol.jog(tag, integers(field["rate"]))
     if name in ("ACK", "CREDIT"):
-        fields = (int(field[k]) for k in ("next", "error", "detail", "state", "free", "queued"))
+        fields = (int(field[k]) for k in ("next", "error", "detail", "state", "free", "queued", "session"))
         return protocol.pack_ack((protocol.Ack if name == "ACK" else protocol.Credit)(*fields))
     if name == "INFO":
         values = {k: int(v) for k, v in field.items() if k != "firmware"}
@@ -121,16 +121,16 @@ def test_the_golden_file_has_every_frame() -> None:
 
 
 def test_credit_is_an_ack_that_reports_no_gap() -> None:
-    ack = bytes.fromhex("830600 00011c3901".replace(" ", ""))
+    ack = bytes.fromhex("830600 00011c3901adde".replace(" ", ""))
     credit = protocol.parse(ack)
-    assert credit == protocol.Credit(6, 0, 0, 1, 28, 313)
+    assert credit == protocol.Credit(6, 0, 0, 1, 28, 313, 0xDEAD)
     assert isinstance(credit, protocol.Credit)
     assert protocol.pack_ack(credit) == ack
 
 
 def test_error_codes_are_those_of_the_text() -> None:
     text = (GOLDEN.parent / "PROTOCOL.md").read_text()
-    rows = re.findall(r"^\| (\d+) \| ([A-Z_]+) \|", text[text.index("## 10.") :], re.MULTILINE)
+    rows = re.findall(r"^\| (\d+) \| ([A-Z_]+) \|", text[text.index("## 11.") :], re.MULTILINE)
     assert {int(code): name for code, name in rows} == {e.value: e.name for e in protocol.Error if e}
 
 
@@ -206,7 +206,7 @@ def test_what_does_not_fit_is_refused() -> None:
             st.booleans(),
             st.booleans(),
             *[st.integers(-(2**30), 2**30)] * 3,
-            st.integers(0, 65535),
+            st.integers(0, 2**32 - 1),
             st.integers(0, 2**24),
         ),
         max_size=9,
@@ -217,16 +217,18 @@ def test_image_round_trip(axes: list[protocol.AxisImage], data: st.DataObject) -
     weight = st.tuples(*[st.integers(-32768, 32767)] * len(axes))
     row = st.builds(protocol.RowImage, st.integers(-9, 0), st.integers(0, 9), weight)
     rows = data.draw(st.lists(row, max_size=3))
-    image = protocol.Image(tuple(axes), tuple(rows), abort_closed=True, meaning=2**32 - 1)
+    bare = protocol.GuardImage(weight=(0,) * len(axes))
+    guards = (bare, protocol.GuardImage(True, (-127, *(0,) * (len(axes) - 1))) if axes else bare)
+    image = protocol.Image(tuple(axes), tuple(rows), guards, abort_closed=True, power_sensed=True, meaning=2**32 - 1)
     packed = image.pack()
-    assert protocol.Image.unpack(packed) == image
-    assert protocol.Image.unpack(packed + b"\0") is None
-    assert protocol.Image.unpack(packed[:-1]) is None
+    assert protocol.Image.unpack(packed, 2) == image
+    assert protocol.Image.unpack(packed + b"\0", 2) is None
+    assert protocol.Image.unpack(packed[:-1], 2) is None
 
 
 def test_golden_image() -> None:
     data = next(f["data"] for name, f, _, _ in golden_frames() if name == "CONFIG")
-    image = protocol.Image.unpack(bytes.fromhex(data))
+    image = protocol.Image.unpack(bytes.fromhex(data), 3)
     assert image is not None
     assert image.axes[2] == protocol.AxisImage(True, True, -2000, 14000, 0, 6000, 18000)
     assert not image.axes[3].used
@@ -234,7 +236,7 @@ def test_golden_image() -> None:
 
 
 @pytest.mark.parametrize(
-    "payload", [b"\x80\0", b"\x81" + bytes(31), b"\x82" + bytes(16), b"\x83" + bytes(8), b"\x00\x00"]
+    "payload", [b"\x80\0", b"\x81" + bytes(33), b"\x82" + bytes(18), b"\x83" + bytes(10), b"\x00\x00"]
 )
 def test_replies_of_the_wrong_shape_are_none(payload: bytes) -> None:
     assert protocol.parse(payload) is None

@@ -12,21 +12,24 @@ from typing import TypeVar
 from emulator import EmulatedBoard
 
 from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Ack, Info, Segment, State, Status
+from armkin.board.firmware.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole
 
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)
 CREDIT = 0x83  # an ACK that comes unasked
 AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6}
+SWITCHES = {"uno_cnc_shield": 3, "mega_ramps14": 6, "uno_servos": 0}
+RECEIVE = {"uno_cnc_shield": 127, "mega_ramps14": 255, "uno_servos": 127}
 STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0}
 WIDE = protocol.AxisImage(True, False, -(1 << 30), 1 << 30, 0, 40_000, 400_000)
-SERVO = protocol.AxisImage(True, False, 500, 2500, 1500, 2000, 8000)
+SERVO = protocol.AxisImage(True, False, 500, 2500, 1500, 2000, 40_000)
 
 
 def image_for(board: str, stepper: protocol.AxisImage = WIDE, **times: int) -> protocol.Image:
-    """Every axis used, every stepper alike; A4988 timing."""
+    """Every axis used, every stepper alike, no switch guards; A4988 timing."""
     steppers = STEPPERS[board]
-    return protocol.Image((stepper,) * steppers + (SERVO,) * (AXES[board] - steppers), **times)
+    axes = (stepper,) * steppers + (SERVO,) * (AXES[board] - steppers)
+    return protocol.Image(axes, guards=(GuardImage(),) * SWITCHES[board], **times)
 
 
 @dataclass
@@ -37,11 +40,15 @@ class Batch:
     start: tuple[int, ...]
     segments: tuple[Segment, ...]
     at_rest: bool = False
+    places: tuple[int, ...] = ()  # 2^-23 step; from rest unless given
     end: tuple[int, ...] = field(init=False)
+    end_places: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        sums = [sum(column) for column in zip(*(s.steps for s in self.segments), strict=True)]
-        self.end = tuple(a + b for a, b in zip(self.start, sums, strict=True))
+        begin = self.places or tuple(count * STEP + HALF for count in self.start)
+        ways = [sum(s.ticks * s.rates[i] for s in self.segments) for i in range(len(self.axes))]
+        self.end_places = tuple(p + way for p, way in zip(begin, ways, strict=True))
+        self.end = tuple(p // STEP for p in self.end_places)
 
     def payload(self, tag: int) -> bytes:
         return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=self.at_rest)
@@ -52,10 +59,11 @@ def batches(
 ) -> list[Batch]:
     """One motion cut into batches of `size` segments, the last one with END."""
     out: list[Batch] = []
-    at = tuple(start)
+    at: tuple[int, ...] = tuple(start)
+    places: tuple[int, ...] = ()
     for i in range(0, len(segments), size):
-        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size])))
-        at = out[-1].end
+        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size]), places=places))
+        at, places = out[-1].end, out[-1].end_places
     if at_rest:
         out[-1].at_rest = True
     return out
@@ -146,6 +154,10 @@ class BareHost:
         """
         first = self.sequence
         done = sent = 0  # batches
+
+        def size(number: int) -> int:  # on the line
+            return len(work[number].payload(0)) + 6
+
         free = self.status().free
         last_progress = last_poll = self.time
         deadline = self.time + give_up
@@ -165,16 +177,20 @@ class BareHost:
                 sent = done
                 last_progress = self.time
             under_way = sum(len(b.segments) for b in work[done:sent])
+            room = RECEIVE[self.board.board] - 12 - sum(map(size, range(done + 1, sent)))
             while (
                 sent < len(work)
                 and sent - done < window
                 and self._line_free + 10 * len(out) / self.baud < self.time + 2 * slice_s
                 and under_way + len(work[sent].segments) <= free
+                and (sent == done or size(sent) <= room)
             ):
                 out += protocol.wire(work[sent].payload((first + sent) % 256))
                 under_way += len(work[sent].segments)
                 if sent == done:
                     last_progress = self.time
+                else:
+                    room -= size(sent)
                 sent += 1
             for reply in self.run(slice_s, out):
                 if isinstance(reply, Info):
@@ -214,6 +230,14 @@ def cruise(
         slope = min(1.0, time / ramp + 0.02, (seconds - time) / ramp + 0.02)
         interval = round(CLOCK / (rate * slope))
         ticks = max(10, round(length * CLOCK / interval))
-        segments.append(Segment(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
+        segments.append(whole(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
         time += ticks * interval / CLOCK
     return segments
+
+
+def run_up(rate: float, seconds: float, share: Sequence[float], length: float = 0.01) -> list[Segment]:
+    """From rest up to `rate` ticks/s in so many seconds; axis i makes `share[i]` steps a tick."""
+    parts = round(seconds / length)
+    speeds = [rate * (k + 0.5) / parts for k in range(parts)]
+    counts = [(round(CLOCK / v), round(length * v)) for v in speeds]
+    return [whole(n, interval, 0, tuple(round(s * n) for s in share)) for interval, n in counts if n]

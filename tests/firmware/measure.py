@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for
+from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for, run_up
 from emulator import BUILD, FIRMWARE, EmulatedBoard, make
 
 from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Segment
+from armkin.board.firmware.protocol import whole
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order
 
@@ -62,8 +62,8 @@ def stepping(board: str, rate: float, seconds: float = 0.6, elf: Path | None = N
         host.setup(image, counts_at_home(board))
         emulated.control("clear")
         start = [0] * steppers + [1500]
-        plan = batches(axes, start, there, 6)
-        plan += batches(axes, plan[-1].end, back, 6)
+        plan = batches(axes, start, there, 4)
+        plan += batches(axes, plan[-1].end, back, 4)
         status = host.stream(plan, poll=0.01)
         stats = emulated.stats()
         named = [stats["axes"][name] for name in list(stats["axes"])[:steppers]]
@@ -109,9 +109,9 @@ def segments_per_second(baud: int, rate: float, batch: int, count: int = 1500, t
         host.setup(image_for(board, replace(WIDE, max_accel=15_000_000)), counts_at_home(board))
         emulated.control("clear")
         # a pause in front, so that the queue is full when it matters
-        work = [Segment(100, 9600, 0, (0, 0, 0, 0))]
+        work = [whole(100, 9600, 0, (0, 0, 0, 0))]
         interval = round(CLOCK / rate / ticks)
-        work += [Segment(ticks, interval, 0, (ticks // 2 + i % 3, -ticks // 2, ticks // 3, -1)) for i in range(count)]
+        work += [whole(ticks, interval, 0, (ticks // 2 + i % 3, -ticks // 2, ticks // 3, -1)) for i in range(count)]
         plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
         status = host.stream(plan, slice_s=0.25e-3)
         x = emulated.stats()["axes"]["X"]
@@ -125,8 +125,9 @@ def first_step_ms(batch: int = 8) -> float:
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
         host = BareHost(emulated)
         host.run(0.02)
-        host.setup(image_for("uno_cnc_shield"), counts_at_home("uno_cnc_shield"))
-        work = [Segment(50, 1600, 0, (50, -50, 25, 25))] * batch
+        image = image_for("uno_cnc_shield", replace(WIDE, max_accel=15_000_000))
+        host.setup(image, counts_at_home("uno_cnc_shield"))
+        work = [whole(50, 1600, 0, (50, -50, 25, 25))] * batch
         host.order(Batch((0, 1, 2, 3), (0, 0, 0, 0), tuple(work), at_rest=True).payload(0))
         trace = emulated.trace()
         arrived, _ = trace.edges("uart.in")
@@ -153,8 +154,10 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         image = image_for("uno_cnc_shield", replace(WIDE, max_accel=accel))
         host.setup(image, counts_at_home("uno_cnc_shield"))
         interval = round(CLOCK / rate)
-        long = Segment(30_000, interval, 0, (30_000, -15_000))
-        host.order(Batch((0, 1), (0, 0), (long,), at_rest=True).payload(0))
+        long = [whole(15_000, interval, 0, (15_000, -7_500))] * 2
+        ramp = run_up(rate, rate / accel, (1.0, -0.5))
+        for batch in batches((0, 1), (0, 0), ramp + long + ramp[::-1][:4], 6, at_rest=False):
+            host.order(batch.payload(0))
         host.run(0.3)
         host.status()
         begin = emulated.control("cycles")["cycle"]
@@ -194,7 +197,7 @@ def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, 
         image = replace(image_for(board, fast), step_high=high, step_low=19, dir_setup=7, wake=2)
         host.setup(image, counts_at_home(board))
         emulated.control("clear")
-        work = [Segment(20, interval, 0, ((-1) ** n * 20,) * steppers) for n in range(8)]
+        work = [whole(20, interval, 0, ((-1) ** n * 20,) * steppers) for n in range(8)]
         host.order(Batch(axes, (0,) * steppers, tuple(work), at_rest=True).payload(0))
         host.run(0.1)
         figures = list(emulated.stats()["axes"].values())[:steppers]
@@ -234,11 +237,11 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             sessions += 1
             host.hello(1000 * (seed + 1) + sessions)
             left = (end[0] - at[0]) // share[0]
-            work = [Segment(12, 16_000, 0, share)] * left
+            work = [whole(12, 16_000, 0, share)] * left
             # what a hold in mid-segment left over of the one step ratio
             rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
             if any(rest):
-                work.append(Segment(20, 16_000, 0, rest))
+                work.append(whole(20, 16_000, 0, rest))
             status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
             at = status.counts[:3]
         emulated.control("restore")

@@ -5,11 +5,10 @@
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
 
-#include "../core/link.h"
 #include "../core/protocol.h"
 #include "avr.h"
 
-enum { SERVO_PERIOD_MS = 20, BYTES_AT_ONCE = 32 };
+enum { SERVO_PERIOD_MS = 20, BYTES_AT_ONCE = 64 };
 
 // Timer 0 counts units of 16 µs and is looked at, not interrupted by: milliseconds are not lost if a look comes 4 ms late.
 static uint8_t elapsed(void) {
@@ -50,7 +49,7 @@ int main(void) {
         uint8_t byte;
         wdt_reset();
         for (uint8_t n = 0; n < BYTES_AT_ONCE && serial_get(&byte); n++) {
-            link_byte(byte);
+            protocol_byte(byte);
         }
         for (uint8_t n = elapsed(); n; n--) {
             millisecond();

@@ -22,9 +22,13 @@ uint8_t hal_switches(void) {
     return levels;
 }
 
-#define ABORT_READ(port, bit) PIN_READ(port, bit)
+#define READ_ONE(port, bit) PIN_READ(port, bit)
 bool hal_abort_level(void) {
-    return ABORT_PIN(ABORT_READ);
+    return ABORT_PIN(READ_ONE);
+}
+
+bool hal_power_level(void) {
+    return POWER_PIN(READ_ONE);
 }
 
 void pins_setup(void) {

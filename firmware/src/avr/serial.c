@@ -2,6 +2,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "../chip.h"
 #include "../core/hal.h"
 #include "avr.h"
 
@@ -14,24 +15,28 @@
 #define USART_UDRE_vect USART0_UDRE_vect
 #endif
 
-enum { RING = RAMEND > 4096 ? 256 : 128, MASK = RING - 1 };  // powers of two
+enum { RING = HAL_RECEIVE + 1, MASK = RING - 1, SENDING = RING / 2, SENDING_MASK = SENDING - 1 };
+_Static_assert((RING & MASK) == 0, "powers of two");
 
-static uint8_t received[RING], sending[RING];
+static uint8_t received[RING], sending[SENDING];
+static volatile bool spilled;
 static volatile uint8_t received_head, received_tail, sending_head, sending_tail;
 
 ISR(USART_RX_vect) {
     const uint8_t byte = UDR0;
     const uint8_t head = received_head, next = (head + 1) & MASK;
-    if (next != received_tail) {  // else it is lost, and the frame's CRC will tell
+    if (next != received_tail) {
         received[head] = byte;
         received_head = next;
+    } else {
+        spilled = true;  // it is lost
     }
 }
 
 ISR(USART_UDRE_vect) {
     const uint8_t tail = sending_tail;
     UDR0 = sending[tail];
-    const uint8_t next = (tail + 1) & MASK;
+    const uint8_t next = (tail + 1) & SENDING_MASK;
     sending_tail = next;
     if (next == sending_head) {
         UCSR0B = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
@@ -48,13 +53,21 @@ bool serial_get(uint8_t *byte) {
     return true;
 }
 
+bool hal_spilled(void) {
+    const bool since = spilled;
+    if (since) {
+        spilled = false;
+    }
+    return since;
+}
+
 uint8_t hal_send_room(void) {
-    return MASK - ((sending_head - sending_tail) & MASK);
+    return SENDING_MASK - ((sending_head - sending_tail) & SENDING_MASK);
 }
 
 void hal_send(uint8_t byte) {
     sending[sending_head] = byte;
-    sending_head = (sending_head + 1) & MASK;
+    sending_head = (sending_head + 1) & SENDING_MASK;
     UCSR0B = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0 | 1 << UDRIE0;
 }
 

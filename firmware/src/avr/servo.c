@@ -74,7 +74,7 @@ ISR(TIMER2_COMPA_vect) {
     }
 }
 
-void servo_frame(void) {
+APART void servo_frame(void) {
     int32_t counts[AXES];
     if (busy) {
         return;

@@ -4,12 +4,15 @@
 // then the arithmetic of the next tick, during which STEP stays high; then STEP low.
 #include <avr/interrupt.h>
 
+#include "../chip.h"
 #include "../core/config.h"
 #include "../core/dda.h"
 #include "../core/hal.h"
 #include "avr.h"
 
 uint8_t direction_invert;
+
+enum { LATE = 160 };  // cycles that a tick may come late: 10 us, as after the load of a segment at the highest rates
 
 static uint8_t step_high;  // cycles that STEP stays high at least
 static const volatile uint8_t *probe_port;
@@ -47,8 +50,8 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
     STEPPER_PINS(STEP_LOW)
     if (!interval) {
         TCCR1B = 0;
-    } else if (TIFR1 & 1 << OCF1A && dda.overruns < 255) {
-        dda.overruns++;  // the next tick is due already
+    } else if (TIFR1 & 1 << OCF1A && TCNT1 > LATE && dda.overruns < 255) {
+        dda.overruns++;
     }
 }
 

@@ -3,6 +3,9 @@
 #define STEPPERS 5
 #define SERVOS 4
 #define SWITCHES 6
+#define CLOCK 16000000UL
+#define UNIT_FACTOR 2  // 256 cycles are 2/125 ms
+#define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 128  // a power of two
 #define FRAME_MAX 240
 #define MIN_INTERVAL 576  // cycles between ticks: 27.8 kHz
@@ -33,3 +36,4 @@
     P(A, 2)            \
     P(C, 7)                   // D38 D56 D62 D24 D30
 #define ABORT_PIN(P) P(F, 3)  // A3 on AUX-1: A0 is the X driver's STEP here
+#define POWER_PIN(P) P(F, 4)  // A4 on AUX-1: high while the motors have power

@@ -4,6 +4,9 @@
 #define STEPPERS 4
 #define SERVOS 1
 #define SWITCHES 3
+#define CLOCK 16000000UL
+#define UNIT_FACTOR 2  // 256 cycles are 2/125 ms
+#define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 32  // a power of two
 #define FRAME_MAX 160
 #define MIN_INTERVAL 448  // cycles between ticks: 35.7 kHz
@@ -21,3 +24,4 @@
     P(2, B, 3)                      // D9 D10 D11: the X Y Z limits
 #define ENABLE_PINS(P) P(B, 0)      // D8, one for all
 #define ABORT_PIN(P) P(C, 0)        // A0
+#define POWER_PIN(P) P(C, 1)        // A1: high while the motors have power

@@ -3,8 +3,11 @@
 #define STEPPERS 0
 #define SERVOS 6
 #define SWITCHES 0
+#define CLOCK 16000000UL
+#define UNIT_FACTOR 2  // 256 cycles are 2/125 ms
+#define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 32  // a power of two
-#define FRAME_MAX 160
+#define FRAME_MAX 128
 #define MIN_INTERVAL 1600  // cycles between ticks: 10 kHz; a servo hears of its count every 20 ms
 
 #define STEPPER_PINS(P)
@@ -18,3 +21,4 @@
 #define SWITCH_PINS(P)
 #define ENABLE_PINS(P)
 #define ABORT_PIN(P) P(C, 0)  // A0
+#define POWER_PIN(P) P(C, 1)  // A1: high while the motors have power

@@ -3,22 +3,28 @@
 #include <string.h>
 
 #include "bytes.h"
+#include "inputs.h"
 #include "motion.h"
 
-enum { END = 1, WIDE = 2 };  // flags
-enum { HEAD = 6 };           // type, tag, mask, flags, n
+enum { END = 1, WIDE = 2 };            // flags
+enum { HEAD = 6 };                     // type, tag, mask, flags, n
+enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
 
-// The axes of the batch, in order: where each of them is while the segments are read, and what is asked of it at each.
-// Gathered once, as the loop over segments and lanes is what limits the board's segments per second.
-struct lane {
-    uint8_t axis;
-    axes_t bit;  // 1 << axis
-    uint16_t step_time;
-    int32_t lower, upper;
-    int32_t at;
+_Static_assert(MIN_INTERVAL > 128, "the reciprocal of an interval has 16 bits");
+
+// A segment's time in 1/256 of 50 ms, from units of 256 cycles.
+#define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
+enum { LONGEST = 255, LONGEST_BEND = 1 << 14 };
+
+// Velocities are rounded down in two places.
+static const uint32_t ROUNDING = 4 * ((1UL << 23) / MIN_INTERVAL);
+
+// What is the same for all axes of a segment.
+struct pace {
+    uint16_t first, last;  // 2^23 / interval
+    uint32_t time;         // 1/256 of 50 ms
+    uint8_t window;        // the same, rounded up, at most 255
 };
-static struct lane lanes[AXES];
-static uint8_t lane_count;
 
 static enum error check_axis(uint8_t i, int32_t start) {
     if (!(limits.used >> i & 1)) {
@@ -33,8 +39,7 @@ static enum error check_axis(uint8_t i, int32_t start) {
     return start == motion.plan[i] ? OK : E_START;
 }
 
-static enum error open_lanes(const uint8_t *starts, uint16_t mask, uint8_t *detail) {
-    struct lane *lane = lanes;
+static enum error check_start(const uint8_t *starts, uint16_t mask, uint8_t *detail) {
     for (uint8_t i = 0; mask; i++, mask >>= 1) {
         if (!(mask & 1)) {
             continue;
@@ -44,85 +49,130 @@ static enum error open_lanes(const uint8_t *starts, uint16_t mask, uint8_t *deta
         if (error) {
             return error;
         }
-        *lane++ = (struct lane){
-            .axis = i,
-            .bit = 1U << i,
-            .step_time = limits.step_time[i],
-            .lower = memory.image.axis[i].lower,
-            .upper = memory.image.axis[i].upper,
-            .at = motion.plan[i],
-        };
         starts += 4;
     }
-    lane_count = lane - lanes;
     *detail = 0;
     return OK;
 }
 
-// One segment from the frame into its slot. `time`: quarter cycles that it lasts at its fastest.
-static enum error read_segment(const uint8_t *p, bool wide, struct segment *s, uint32_t *time) {
-    memset(s, 0, sizeof *s);
+// `fine` may have bits of axes that there are not: nobody looks at them.
+static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     s->ticks = wide ? get16(p) : *p;
     p += wide ? 2 : 1;
     s->interval = get16(p);
-    s->add = (int16_t)get16(p + 2);
-    if (s->ticks == 0) {
+    if (!wide) {
+        s->add = (sfine_t)(int16_t)get16(p + 2) * 256;
+        return;
+    }
+    s->add = (sfine_t)(int16_t)get16(p + 3) * 256 + p[2];
+    s->bend = (int16_t)get16(p + 5);
+    s->fine = get16(p + 7);
+}
+
+// An interval one tick past the end must fit as well, as the interrupt has it ready; and it must not turn within the segment.
+static bool times_valid(const struct segment *s, int32_t *last) {
+    if (s->ticks == 0 || s->interval < MIN_INTERVAL) {
+        return false;
+    }
+    if (s->bend && s->ticks > LONGEST_BEND) {
+        return false;
+    }
+    const int32_t add = s->add + (s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6);
+    if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || (s->add == 0 && s->bend)) {
+        return false;
+    }
+    *last = motion_interval(s, s->ticks - 1);
+    return *last >= MIN_INTERVAL && *last <= 0xFFFF && motion_interval(s, s->ticks) <= 0xFFFF;
+}
+
+static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {
+    int32_t last;
+    read_times(p, wide, s);
+    if (!times_valid(s, &last)) {
         return E_INTERVAL;
     }
-    const int32_t last = s->interval + ((int32_t)s->add * (uint16_t)(s->ticks - 1) >> 8);
-    if (s->interval < MIN_INTERVAL || last < MIN_INTERVAL || last > 0xFFFF) {
-        return E_INTERVAL;
+    pace->first = pace->last = (1UL << 23) / s->interval;
+    if (s->add) {
+        pace->last = (1UL << 23) / (uint32_t)last;
     }
-    *time = (uint32_t)s->ticks * (last < s->interval ? (uint16_t)last : s->interval) >> 2;
+    const uint32_t units = motion_units(s);
+    pace->time = units < 65536 ? units * WINDOW >> 16 : ((units >> 8) * WINDOW >> 16) << 8;
+    pace->window = pace->time < LONGEST ? pace->time + 1 : LONGEST;
     return OK;
 }
 
-static enum error check_steps(const uint8_t *p, bool wide, struct segment *s, uint32_t time, uint8_t *detail) {
-    for (struct lane *lane = lanes; lane < lanes + lane_count; lane++) {
-        int16_t steps;
-        if (wide) {
-            steps = (int16_t)get16(p);
-            p += 2;
-        } else {
-            steps = (int8_t)*p++;
-        }
-        if (!steps) {
-            continue;
-        }
-        const uint16_t size = steps < 0 ? 0U - (uint16_t)steps : (uint16_t)steps;
-        const int32_t before = lane->at;
-        const int32_t after = before + steps;
-        enum error error = OK;
-        if (size > s->ticks) {
-            error = E_STEPS;
-        } else if ((uint32_t)(size - 1) * lane->step_time > time) {
-            error = E_RATE;
-        } else if (!within(lane->lower, lane->upper, before, after)) {
-            error = E_LIMIT;
-        }
-        if (error) {
-            *detail = lane->axis;
-            return error;
-        }
-        lane->at = after;
-        s->steps[lane->axis] = size;
-        s->back |= steps < 0 ? lane->bit : 0;
+static uint32_t distance(int32_t a, int32_t b) {
+    return a > b ? (uint32_t)a - (uint32_t)b : (uint32_t)b - (uint32_t)a;
+}
+
+static uint8_t longer(uint8_t a, uint8_t b) {
+    return a > b ? a : b;
+}
+
+static bool jumps(uint8_t axis, int32_t from, int32_t to, uint8_t window) {
+    return limits.jump[axis] < JUMP_MAX && distance(from, to) > limits.jump[axis] * window + ROUNDING;
+}
+
+// Within a segment, too, the velocity may change by no more than 5/4 of what max_accel allows.
+static bool bends(uint8_t axis, int32_t from, int32_t to, const struct pace *pace) {
+    if (pace->time < LONGEST) {
+        return jumps(axis, from, to, pace->window);
     }
+    const uint32_t windows = (pace->time >> 8) + 1;
+    return windows <= LONGEST && limits.jump[axis] < JUMP_MAX && distance(from, to) >> 8 > limits.jump[axis] * windows;
+}
+
+// A rate of the frame; the direction where it has one, else the one that the axis had.
+static enum error read_rate(const uint8_t *p, uint8_t axis, struct segment *s) {
+    const int16_t rate = (int16_t)get16(p);
+    if (rate == INT16_MIN) {
+        return E_STEPS;
+    }
+    const bool back = rate < 0 || (rate == 0 && motion.plan_fraction.back >> axis & 1);
+    s->back |= back ? 1U << axis : 0;
+    const uint16_t size = rate < 0 ? -rate : rate;
+    const bool greatest = size == 0x7FFF && !(s->fine >> axis & 1);
+    s->rate[axis] = size << 1 | greatest;
     return OK;
 }
 
-static void put_lanes(int32_t counts[AXES]) {
-    for (uint8_t n = 0; n < lane_count; n++) {
-        counts[lanes[n].axis] = lanes[n].at;
+static enum error check_rate(uint8_t axis, const struct segment *s, const struct pace *pace) {
+    const uint16_t rate = s->fine >> axis & 1 ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
+    int32_t first = (int32_t)((uint32_t)rate * pace->first);
+    int32_t last = pace->first == pace->last ? first : (int32_t)((uint32_t)rate * pace->last);
+    if ((uint32_t)first > limits.top[axis] || (uint32_t)last > limits.top[axis]) {
+        return E_RATE;
     }
+    if (s->back >> axis & 1) {
+        first = -first;
+        last = -last;
+    }
+    if (jumps(axis, motion.plan_speed[axis], first, longer(motion.plan_window, pace->window)) ||
+        (s->add && bends(axis, first, last, pace))) {
+        return E_ACCEL;
+    }
+    motion.plan_speed[axis] = last;
+    return OK;
+}
+
+// One axis of a segment from the frame into its slot; the plan goes on to its end.
+static enum error read_axis(const uint8_t *p, uint8_t axis, struct segment *s, const struct pace *pace) {
+    enum error error = read_rate(p, axis, s);
+    if (!error) {
+        error = check_rate(axis, s, pace);
+    }
+    if (error) {
+        return error;
+    }
+    const int32_t before = motion.plan[axis];
+    motion_advance(axis, s);
+    const struct axis_config *config = &memory.image.axis[axis];
+    return within(config->lower, config->upper, before, motion.plan[axis]) ? OK : E_LIMIT;
 }
 
 static enum error check_rows(int32_t before[ROWS], uint8_t *detail) {
-    int32_t counts[AXES];
-    memcpy(counts, motion.plan, sizeof counts);
-    put_lanes(counts);
     for (uint8_t r = 0; r < memory.image.rows; r++) {
-        const int32_t after = row_value(r, counts);
+        const int32_t after = row_value(r, motion.plan);
         if (row_known(r) && !within(memory.image.row[r].lower, memory.image.row[r].upper, before[r], after)) {
             *detail = r;
             return E_LIMIT_JOINT;
@@ -132,23 +182,43 @@ static enum error check_rows(int32_t before[ROWS], uint8_t *detail) {
     return OK;
 }
 
-static enum error check_segments(const uint8_t *p, uint8_t count, uint8_t flags, uint8_t *detail) {
-    const bool wide = flags & WIDE;
-    const uint8_t head = wide ? 6 : 5;
-    const uint8_t size = head + lane_count * (wide ? 2 : 1);
+static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, const struct pace *pace, uint8_t *detail) {
+    for (uint8_t i = 0; i < AXES; i++, mask >>= 1) {
+        enum error error = OK;
+        if (mask & 1) {
+            error = read_axis(p, i, s, pace);
+            p += 2;
+        } else if (motion.plan_speed[i] || motion.plan_fraction.back >> i & 1) {  // it was moving: from now on it stands
+            if (jumps(i, motion.plan_speed[i], 0, longer(motion.plan_window, pace->window))) {
+                error = E_ACCEL;
+            }
+            motion.plan_speed[i] = 0;
+            s->back |= motion.plan_fraction.back & 1U << i;
+        }
+        if (error) {
+            *detail = i;
+            return error;
+        }
+    }
+    motion.plan_window = pace->window;
+    return OK;
+}
+
+static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, uint8_t *detail) {
     int32_t rows[ROWS];
     for (uint8_t r = 0; r < memory.image.rows; r++) {
         rows[r] = row_value(r, motion.plan);
     }
     for (uint8_t n = 0; n < count; n++, p += size) {
         struct segment *s = motion_slot(n);
-        uint32_t time;
-        enum error error = read_segment(p, wide, s, &time);
+        struct pace pace;
+        memset(s, 0, sizeof *s);
+        enum error error = read_head(p, wide, s, &pace);
         if (error) {
             *detail = n;
             return error;
         }
-        error = check_steps(p + head, wide, s, time, detail);
+        error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, s, &pace, detail);
         if (!error && memory.image.rows) {
             error = check_rows(rows, detail);
         }
@@ -159,7 +229,45 @@ static enum error check_segments(const uint8_t *p, uint8_t count, uint8_t flags,
     return OK;
 }
 
-enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t *detail) {
+static enum error check_end(const uint8_t *ends, uint16_t mask, bool end, uint8_t *detail) {
+    for (uint8_t i = 0; i < AXES; i++) {
+        *detail = i;
+        if (end && jumps(i, motion.plan_speed[i], 0, motion.plan_window)) {
+            return E_ACCEL;
+        }
+        if (mask >> i & 1) {
+            if (motion.plan[i] != (int32_t)get32(ends)) {
+                return E_END;
+            }
+            ends += 4;
+        }
+    }
+    *detail = 0;
+    return OK;
+}
+
+static enum error read_batch(const uint8_t *payload, uint8_t axes, uint8_t segment, uint8_t *detail) {
+    const uint16_t mask = get16(payload + 2);
+    const uint8_t flags = payload[4], count = payload[5];
+    const uint8_t *starts = payload + HEAD, *ends = starts + 4 * axes;
+    enum error error = check_start(starts, mask, detail);
+    if (error) {
+        return error;
+    }
+    if (count > motion_free()) {
+        return E_CREDIT;
+    }
+    error = read_segments(ends + 4 * axes, count, mask, flags & WIDE, segment, detail);
+    if (!error) {
+        error = check_end(ends, mask, flags & END, detail);
+    }
+    if (!error && motion.state == IDLE) {
+        error = inputs_blocking(motion_slot(0), detail);
+    }
+    return error;
+}
+
+APART enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t *detail) {
     if (length < HEAD) {
         return E_LENGTH;
     }
@@ -169,39 +277,21 @@ enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t *detai
     for (uint8_t i = 0; i < 16; i++) {
         axes += mask >> i & 1;
     }
-    const uint16_t segment = flags & WIDE ? 6 + 2 * axes : 5 + axes;
+    const uint8_t segment = (flags & WIDE ? WIDE_SIZE : NARROW_SIZE) + 2 * axes;
     if (count == 0 || flags & ~(END | WIDE) || length != HEAD + 8 * axes + count * segment) {
         return E_LENGTH;
     }
-    if (!memory.config) {
-        return E_CONFIG_NONE;
+    enum error error = inputs_ready(motion.state == MOVING);
+    if (!error) {
+        error = read_batch(payload, axes, segment, detail);
     }
-    if (session.abort) {
-        return E_ABORT;
-    }
-    if (session.state != IDLE && session.state != MOVING) {
-        return E_BUSY;
-    }
-    const uint8_t *starts = payload + HEAD;
-    enum error error = open_lanes(starts, mask, detail);
     if (error) {
-        return error;
-    }
-    if (count > motion_free()) {
-        return E_CREDIT;
-    }
-    error = check_segments(starts + 8 * axes, count, flags, detail);
-    if (error) {
-        return error;
-    }
-    for (uint8_t n = 0; n < lane_count; n++) {
-        if (lanes[n].at != (int32_t)get32(starts + 4 * (axes + n))) {
-            *detail = lanes[n].axis;
-            return E_END;
+        if (motion.state == IDLE) {
+            motion_replan();  // what was read is void; a moving arm comes to rest first
         }
+        return error;
     }
-    put_lanes(motion.plan);
-    if (session.state == IDLE) {
+    if (motion.state == IDLE) {
         motion_begin(MOVING);
     }
     motion_append(count, flags & END);

@@ -1,5 +1,6 @@
 #include "config.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "crc.h"
@@ -56,13 +57,30 @@ static bool row_valid(uint8_t r) {
     return row->lower <= row->upper && largest < 1UL << 30;
 }
 
+static bool guard_valid(uint8_t n) {
+    const struct guard_config *guard = &memory.image.guard[n];
+    bool any = false;
+    for (uint8_t i = 0; i < AXES; i++) {
+        any |= guard->weight[i] != 0;
+        if (guard->weight[i] && !(memory.image.axis[i].flags & USED)) {
+            return false;
+        }
+    }
+    return !(guard->flags & ~(USED | CLOSED)) && any == !!(guard->flags & USED);
+}
+
 static bool image_valid(uint16_t length) {
     const struct image *image = &memory.image;
-    if (length < HEAD || image->layout != 1 || image->axes != AXES || image->rows > ROWS ||
-        length != HEAD + AXES * sizeof image->axis[0] + image->rows * sizeof image->row[0] ||
-        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH)) || image->step_high > 80 || image->step_low > 50 ||
-        image->dir_setup > 100) {
+    if (length < HEAD || image->layout != 2 || image->axes != AXES || image->rows > ROWS ||
+        length != offsetof(struct image, row) + image->rows * sizeof image->row[0] ||
+        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH | POWER_SENSED)) || image->step_high > 80 ||
+        image->step_low > 50 || image->dir_setup > 100) {
         return false;
+    }
+    for (uint8_t n = 0; n < SWITCHES; n++) {
+        if (!guard_valid(n)) {
+            return false;
+        }
     }
     for (uint8_t i = 0; i < AXES; i++) {
         if (!axis_valid(i)) {
@@ -86,6 +104,12 @@ enum error config_commit(uint16_t length, uint32_t crc) {
     return OK;
 }
 
+static const float PER_SECOND = (float)(1ULL << VELOCITY_BITS) / CLOCK;  // a step a second as a velocity
+
+static uint32_t fixed(float x, uint32_t most) {
+    return x < most ? (uint32_t)x : most;
+}
+
 void config_activate(void) {
     memset(&limits, 0, sizeof limits);
     for (uint8_t i = 0; i < AXES; i++) {
@@ -93,11 +117,11 @@ void config_activate(void) {
         if (!memory.config || !(axis->flags & USED)) {
             continue;
         }
-        const uint32_t cycles = CLOCK / 4 / axis->max_rate;
         limits.used |= 1U << i;
         limits.invert |= axis->flags & INVERT ? 1U << i : 0;
-        limits.step_time[i] = cycles > 0xFFFF ? 0xFFFF : cycles;
-        limits.stop_time[i] = 1e3F * CLOCK / axis->max_accel;
+        limits.top[i] = fixed(axis->max_rate * PER_SECOND, 0x7FFFFFFF);
+        limits.jump[i] = fixed(axis->max_accel * (5.0F / 4 * 0.05F / 256 * PER_SECOND), JUMP_MAX - 1) + 1;
+        limits.stop_time[i] = 1e3F * CLOCK / (1UL << 24) / axis->max_accel;
     }
     hal_configured();
 }

@@ -3,11 +3,16 @@
 #include "errors.h"
 #include "memory.h"
 
+// Velocities are compared in 2^-38 steps a cycle: that makes 31 bits of the fastest.
+#define VELOCITY_BITS 38
+#define JUMP_MAX (1UL << 23)  // from there on an axis's acceleration is not checked
+
 struct limits {
-    uint16_t used;             // axes
-    uint16_t invert;           // axes
-    uint16_t step_time[AXES];  // quarter cycles … of a step at max_rate: clock / (4 max_rate), at most 65535
-    float stop_time[AXES];     // ms · cycles: u = stop_time · steps / (ticks · interval)
+    uint16_t used;          // axes
+    uint16_t invert;        // axes
+    uint32_t top[AXES];     // max_rate as a velocity
+    uint32_t jump[AXES];    // change of velocity in 1/256 of 50 ms, at 5/4 of max_accel
+    float stop_time[AXES];  // ms · cycles: u = stop_time · rate / interval
 };
 extern struct limits limits;
 

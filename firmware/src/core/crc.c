@@ -1,13 +1,6 @@
 #include "crc.h"
 
-#ifdef __AVR__
-#include <avr/pgmspace.h>
-#define TABLE PROGMEM
-#define READ(address) pgm_read_dword_near(address)
-#else
-#define TABLE
-#define READ(address) (*(address))
-#endif
+#include "../chip.h"
 
 // The table is linear over XOR, so the entries of the eight single bits make all others.
 #define BIT(n, b, k) ((n) & (1 << (b)) ? k##UL : 0UL)
@@ -18,10 +11,10 @@
 #define SIXTEEN(n) FOUR(n), FOUR(n + 4), FOUR(n + 8), FOUR(n + 12)
 #define SIXTY_FOUR(n) SIXTEEN(n), SIXTEEN(n + 16), SIXTEEN(n + 32), SIXTEEN(n + 48)
 
-static const uint32_t table[256] TABLE = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_FOUR(128), SIXTY_FOUR(192)};
+static const uint32_t table[256] HAL_TABLE = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_FOUR(128), SIXTY_FOUR(192)};
 
 uint32_t crc_byte(uint32_t crc, uint8_t byte) {
-    return READ(&table[(uint8_t)crc ^ byte]) ^ (crc >> 8);
+    return HAL_READ32(&table[(uint8_t)crc ^ byte]) ^ (crc >> 8);
 }
 
 uint32_t crc_block(const void *data, uint16_t length) {

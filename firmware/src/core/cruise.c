@@ -1,21 +1,25 @@
 #include "cruise.h"
 
+#include <stddef.h>
 #include <string.h>
 
-enum { SLICES = 3, SLICE_MS = 8, LEAST_TICKS = 4 };
-static const uint32_t SLICE = CLOCK / 1000 * SLICE_MS;
+enum { SLICES = 3, SLICE_MS = 8 };
+#define SLICE (CLOCK / 1000 * SLICE_MS)  // cycles
+#define TICKS (SLICE / (MIN_INTERVAL + MIN_INTERVAL / 8))
+_Static_assert(TICKS >= 16 && SLICE / TICKS <= 0xFFFF, "a slice is one segment");
 static const float SECONDS = SLICE_MS / 1e3F;
 
 struct cruise cruise;
 static int32_t origin;  // of the leader
 
-static uint16_t size(int16_t x) {
-    return x < 0 ? 0U - (uint16_t)x : (uint16_t)x;
+static uint32_t size(int32_t x) {
+    return x < 0 ? 0U - (uint32_t)x : (uint32_t)x;
 }
 
-void cruise_vector(const int16_t rate[AXES], int8_t sign, bool bounded) {
+void cruise_vector(int8_t sign, bool bounded) {
+    const int32_t *rate = cruise.asked;
     float longest = 0;  // s to full speed
-    memset(&cruise, 0, sizeof cruise);
+    memset(&cruise, 0, offsetof(struct cruise, asked));
     for (uint8_t i = 0; i < AXES; i++) {
         if (!rate[i]) {
             continue;
@@ -89,20 +93,18 @@ static void slice(void) {
         }
     }
     struct segment *s = motion_slot(0);
-    const float slices = (cruise.share + next) / 2;
-    uint16_t most = LEAST_TICKS;
+    const float part = (cruise.share + next) / 2 * (SECONDS / TICKS * (1UL << 16));
     memset(s, 0, sizeof *s);
+    s->ticks = TICKS;
+    s->interval = SLICE / TICKS;
     for (uint8_t i = 0; i < AXES; i++) {
-        const float steps = cruise.rate[i] * slices * SECONDS + cruise.carry[i];
-        const int16_t whole = (int16_t)steps;
-        cruise.carry[i] = steps - whole;
-        s->back |= whole < 0 ? 1U << i : 0;
-        s->steps[i] = size(whole);
-        motion.plan[i] += whole;
-        most = s->steps[i] > most ? s->steps[i] : most;
+        const float rate = size(cruise.rate[i]) * part;
+        const bool fine = rate < 256;
+        s->rate[i] = fine ? (uint16_t)(rate * 128) * 2 : rate < 0xFFFE ? (uint16_t)(rate / 2) * 2 : 0xFFFE;
+        s->fine |= fine ? 1U << i : 0;
+        s->back |= cruise.rate[i] < 0 ? 1U << i : 0;
+        motion_advance(i, s);
     }
-    s->ticks = most;
-    s->interval = SLICE / most;
     cruise.share = next;
     motion_append(1, false);
 }

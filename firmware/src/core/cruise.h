@@ -6,18 +6,18 @@
 #include "motion.h"
 
 struct cruise {
-    int16_t rate[AXES];  // counts/s
+    int32_t rate[AXES];  // counts/s
     float share;         // 0 … 1 of the rates
     float target;        // where the share is going
     float slope;         // a slice
-    float carry[AXES];   // fractions of a step not yet made
     uint16_t axes;       // with a rate
     uint8_t leader;
     bool bounded;        // stop at the limits of known axes and rows
+    int32_t asked[AXES]; // what HOME or JOG wants, kept from vector to vector
 };
 extern struct cruise cruise;
 
-void cruise_vector(const int16_t rate[AXES], int8_t sign, bool bounded);  // at rest; keeps target 0
+void cruise_vector(int8_t sign, bool bounded);  // at rest: along `asked` or against it; keeps target 0
 void cruise_poll(void);        // feeds the queue
 bool cruise_resting(void);     // target and share are 0 and the queue is done
 int32_t cruise_covered(void);  // leader counts since cruise_vector(), by the plan

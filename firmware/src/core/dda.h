@@ -1,42 +1,59 @@
-// The stepping itself: what the tick interrupt does, chip-free and inline so that it costs no call.
+// The stepping itself: what the tick interrupt does, inline so that it costs no call.
 //
 // Each tick puts out the step bits that the tick before computed, so that the edges do not wait for the arithmetic;
-// then dda_next() computes the next ones. Counts are not kept here: Bresenham is exact, so motion.c tells them from the
-// number of ticks.
+// then dda_next() computes the next ones. Each axis has a phase, a fraction of a step that each tick moves on by the
+// segment's rate; where it overflows, there is a step. Phases go on from segment to segment. Counts are not kept here: the sum is
+// exact, so motion.c tells them from the number of ticks.
+//
+// The interval between ticks changes by `add` with each tick, and `add` by `bend` with every 16th: 1 / (v + a t) to second order,
+// so that a ramp of constant acceleration takes few segments.
 #pragma once
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "../board.h"
+#include "../chip.h"
 
-// One bit an axis.
-#if AXES <= 8
+// One bit an axis, and one for LAST.
+#if AXES <= 7
 typedef uint8_t axes_t;
 #else
 typedef uint16_t axes_t;
 #endif
 
+enum { LAST = 1 << (8 * sizeof(axes_t) - 1) };  // in `back`: the motion may rest after this segment
+_Static_assert(AXES < 8 * sizeof(axes_t), "one bit is LAST");
+
+
+enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
+
+// Phases and rates: 2^-24 step. At rest a phase is half a step. An axis that turns round goes on from the other side.
+#define PHASE_MASK 0xFFFFFFUL
+#define PHASE_HALF 0x800000UL
+#define PHASE_TURN 0xFFFFFEUL  // even stays even: the protocol's unit is 2^-23 step
+
 struct segment {
     uint16_t ticks;
-    uint16_t interval;     // cycles to the first tick
-    int16_t add;           // 1/256 cycle a tick
-    axes_t back;           // axes that count down
-    uint16_t steps[AXES];  // magnitudes
-    uint8_t last;          // the motion may rest after this one
+    uint16_t interval;    // cycles to the first tick
+    sfine_t add;          // 2^-16 cycle a tick
+    int16_t bend;         // 2^-22 cycle a tick, with every 16th
+    axes_t back;          // axes that count down; LAST
+    axes_t fine;          // axes whose rate is in the small unit
+    uint16_t rate[AXES];  // 2^-24 step (fine) or 2^-16
 };
 
-// 1/256 cycle: 24 bits are enough, and quicker than 32.
-#ifdef __AVR__
-typedef __uint24 fine_t;
-#else
-typedef uint32_t fine_t;
-#endif
+// A tick's part of a step.
+static inline fine_t segment_rate(const struct segment *s, uint8_t axis) {
+    return s->fine >> axis & 1 ? (fine_t)s->rate[axis] : (fine_t)s->rate[axis] << 8;
+}
 
 struct dda {
     const struct segment *now;  // null: no motion
     uint16_t left;              // ticks of `now` still to compute
-    fine_t interval;            // to the next tick, as planned
-    uint16_t error[STEPPERS + 1];
+    uint32_t interval;          // to the next tick, as planned; 2^-16 cycle
+    int32_t add;                // 2^-24 cycle a tick
+    fine_t phase[STEPPERS + 1], rate[STEPPERS + 1];
+    axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
     uint8_t overruns;
 
@@ -57,37 +74,27 @@ static inline struct segment *queue_slot(uint8_t index) {
     return &queue[index % QUEUE_SLOTS];
 }
 
-// Sets the DIR pins, one interval before the next step.
-#ifdef __AVR__
-#include "../avr/direction.h"
-#else
-void dda_direction(uint16_t back);
-#endif
-
 // Takes up the segment at the tail. False: there is none.
-static inline bool dda_load(void) {
-    const uint8_t tail = queue_tail;
-    if (tail == queue_head) {
-        dda.now = 0;
-        return false;
-    }
-    const struct segment *s = queue_slot(tail);
-    dda.now = s;
-    dda.left = s->ticks;
-    dda.interval = (fine_t)s->interval << 8;
-    const uint16_t half = s->ticks >> 1;
+bool dda_load(void);
+
+// At rest every axis is in the middle between two steps.
+static inline void dda_rest(void) {
     for (uint8_t i = 0; i < STEPPERS; i++) {
-        dda.error[i] = half;
+        dda.phase[i] = PHASE_HALF;
     }
-    dda_direction(s->back);
-    return true;
+    dda.back = 0;
 }
+
+// After each block of ticks.
+void dda_bend(void);
 
 // Cycles to the next tick; dda_load() must have found a segment. Advances the plan to the tick after it.
 static inline uint16_t dda_interval(void) {
-    const fine_t fine = dda.interval;
-    const uint16_t planned = fine >> 8;
-    dda.interval = fine + dda.now->add;
+    uint16_t planned;
+    DDA_ADVANCE(planned)
+    if ((uint8_t)dda.left % BLOCK == 0) {
+        dda_bend();
+    }
     if (dda.stretch == 256) {
         return planned;
     }
@@ -95,41 +102,8 @@ static inline uint16_t dda_interval(void) {
     return longer > 0xFFFF ? 0xFFFF : longer;
 }
 
-// One axis of Bresenham: exact, and its edge lies in the middle of its share of ticks. True: step.
-static inline bool dda_axis(uint16_t *error, uint16_t steps, uint16_t ticks) {
-    if (*error < steps) {
-        *error += ticks - steps;
-        return true;
-    }
-    *error -= steps;
-    return false;
-}
-
-#ifdef __AVR__
-// The same: gcc does not see that the subtraction's borrow is the comparison. It saves a fifth of the interrupt.
-#define DDA_AXIS(i, ...)                                   \
-    {                                                      \
-        uint16_t error = dda.error[i];                     \
-        __asm__("sub %A0, %A2\n\t"                         \
-                "sbc %B0, %B2\n\t"                         \
-                "brcc 1f\n\t"                              \
-                "add %A0, %A3\n\t"                         \
-                "adc %B0, %B3\n\t"                         \
-                "ori %1, %4\n"                             \
-                "1:"                                       \
-                : "+r"(error), "+d"(bits)                  \
-                : "r"(s->steps[i]), "r"(ticks), "M"(1 << (i))); \
-        dda.error[i] = error;                              \
-    }
-#else
-#define DDA_AXIS(i, ...) bits |= dda_axis(&dda.error[i], s->steps[i], ticks) << (i);
-#endif
-
 static inline void dda_bits(void) {
     uint8_t bits = 0;
-    const struct segment *s = dda.now;
-    const uint16_t ticks = s->ticks;
-    (void)ticks;
     STEPPER_PINS(DDA_AXIS)
     dda.bits = bits;
 }

@@ -1,4 +1,4 @@
-// PROTOCOL.md, section 10.
+// PROTOCOL.md, section 11.
 #pragma once
 
 enum error {
@@ -30,4 +30,8 @@ enum error {
     E_SWITCH,
     E_TRAVEL,
     E_TIME,
+    E_SPILL,
+    E_ACCEL,
+    E_POWER,
+    E_LIMIT_SWITCH,
 };

@@ -25,7 +25,7 @@ static void enter(enum phase to, int8_t sign, float share) {
     phase = to;
     reached = false;
     steady = 0;
-    cruise_vector(home.rate, sign, false);
+    cruise_vector(sign, false);
     cruise.target = share;
     HAL_LOCK();
     dda.pressed = false;
@@ -37,7 +37,7 @@ static void enter(enum phase to, int8_t sign, float share) {
 void home_begin(void) {
     uint16_t axes = 0;
     for (uint8_t i = 0; i < AXES; i++) {
-        axes |= home.rate[i] ? 1U << i : 0;
+        axes |= cruise.asked[i] ? 1U << i : 0;
     }
     motion_lose(axes);
     home_finished = false;
@@ -51,19 +51,19 @@ void home_begin(void) {
 }
 
 // Where each phase ends: `reached` if it went well.
-static void look(void) {
+static enum error look(void) {
     const uint32_t covered = cruise_covered();
     switch (phase) {
-        case RELEASE:
+        case RELEASE:  // a switch that stays pressed for two back-offs is stuck
             reached = steady >= DEBOUNCE_MS;
-            if (!reached && covered > home.travel) {
-                session_end(E_SWITCH, 0);
+            if (!reached && covered > 2 * home.backoff) {
+                return E_SWITCH;
             }
             break;
         case APPROACH:
             reached = steady >= DEBOUNCE_MS;
             if (!reached && covered > home.travel) {
-                session_end(E_TRAVEL, 0);
+                return E_TRAVEL;
             }
             break;
         case BACK_OFF:
@@ -71,17 +71,18 @@ static void look(void) {
             break;
         case TOUCH:
             reached = steady >= DEBOUNCE_MS;
-            if (!reached && covered > 2 * (uint32_t)home.backoff) {
-                session_end(E_SWITCH, 0);
+            if (!reached && covered > 2 * home.backoff) {
+                return E_SWITCH;
             }
             break;
     }
     if (reached) {
         cruise.target = 0;
     }
+    return OK;
 }
 
-static void next_phase(void) {
+static enum error next_phase(void) {
     switch (phase) {
         case RELEASE:
             enter(APPROACH, 1, 1);
@@ -94,30 +95,29 @@ static void next_phase(void) {
         }
         case BACK_OFF:
             if (pressed()) {
-                session_end(E_SWITCH, 0);
-            } else {
-                enter(TOUCH, 1, home.slow / 256.0F);
+                return E_SWITCH;
             }
+            enter(TOUCH, 1, home.slow / 256.0F);
             break;
         case TOUCH:
             home_finished = true;
             motion_rest();
             break;
     }
+    return OK;
 }
 
-void home_poll(void) {
-    if (!reached) {
-        look();
+enum error home_poll(void) {
+    const enum error error = reached ? OK : look();
+    if (error) {
+        return error;
     }
     cruise_poll();
-    if (reached && cruise_resting() && session.state == HOMING) {
-        next_phase();
-    }
+    return reached && cruise_resting() ? next_phase() : OK;
 }
 
 // The tick interrupt latches the first tick at which the switch reads pressed and stays so; it counts after 4 ms.
-void home_millisecond(void) {
+enum error home_millisecond(void) {
     if (phase == RELEASE) {
         steady = pressed() ? 0 : steady + 1;
     } else if (dda.probe && !reached) {
@@ -136,9 +136,9 @@ void home_millisecond(void) {
             dda.probe = false;  // the latch stands, bounces on the way to rest do not matter
         }
     }
-    if (home.time) {
-        home.time--;
-    } else {
-        session_end(E_TIME, 0);
+    if (home.time == 0) {
+        return E_TIME;
     }
+    home.time--;
+    return OK;
 }

@@ -6,15 +6,14 @@ struct home {
     uint8_t input;
     bool closed;        // pressed is high
     uint8_t slow;       // 1/256
-    uint16_t backoff;   // leader counts
+    uint32_t backoff;   // leader counts
     uint32_t travel;    // leader counts
     uint32_t time;      // ms left
-    int16_t rate[AXES];
 };
 extern struct home home;
 
 extern bool home_finished;  // the latch is that of a finished HOME
 
-void home_begin(void);
-void home_poll(void);
-void home_millisecond(void);
+void home_begin(void);  // along cruise.asked
+enum error home_poll(void);  // what goes wrong ends the session
+enum error home_millisecond(void);

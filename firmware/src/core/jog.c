@@ -6,31 +6,30 @@
 
 enum { DEAD_MAN_MS = 250 };
 
-static int16_t wanted[AXES];
 static uint8_t left;  // ms
 
-void jog(const int16_t rate[AXES]) {
-    if (session.state == IDLE) {
+void jog(const int32_t rate[AXES]) {
+    if (motion.state == IDLE) {
         memset(&cruise, 0, sizeof cruise);
         motion_begin(JOGGING);
     }
-    memcpy(wanted, rate, sizeof wanted);
+    memcpy(cruise.asked, rate, sizeof cruise.asked);
     left = DEAD_MAN_MS;
 }
 
 void jog_poll(void) {
-    if (left == 0 || memcmp(wanted, cruise.rate, sizeof wanted) != 0) {
+    if (left == 0 || memcmp(cruise.asked, cruise.rate, sizeof cruise.rate) != 0) {
         cruise.target = 0;
     }
     cruise_poll();
     if (!cruise_resting()) {
         return;
     }
-    if (left == 0 || memcmp(wanted, cruise.rate, sizeof wanted) == 0) {
+    if (left == 0 || memcmp(cruise.asked, cruise.rate, sizeof cruise.rate) == 0) {
         motion_rest();
         return;
     }
-    cruise_vector(wanted, 1, true);
+    cruise_vector(1, true);
     cruise.target = cruise.axes ? 1 : 0;
 }
 

@@ -2,6 +2,6 @@
 #pragma once
 #include "motion.h"
 
-void jog(const int16_t rate[AXES]);  // checked by the caller
+void jog(const int32_t rate[AXES]);  // checked by the caller
 void jog_poll(void);
 void jog_millisecond(void);

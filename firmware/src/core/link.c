@@ -32,23 +32,27 @@ static void decoded(uint8_t byte) {
     crc = crc_byte(crc, byte);
 }
 
-static void end_of_frame(void) {
+static uint8_t end_of_frame(void) {
     const bool whole = !broken && block == 0 && length >= CRC_SIZE + 2 && crc == CRC_GOOD;
     const bool empty = !started;
     const uint8_t size = length - CRC_SIZE;
     started = broken = false;
     length = 0;
-    if (whole) {
-        frame_received(frame, size);
-    } else if (!empty) {
+    if (!whole && !empty) {
         drop();
     }
+    return whole ? size : 0;
 }
 
-void link_byte(uint8_t byte) {
+const uint8_t *link_frame(void) {
+    return frame;
+}
+
+uint8_t link_byte(uint8_t byte) {
     if (byte == 0) {
-        end_of_frame();
-    } else if (!started) {
+        return end_of_frame();
+    }
+    if (!started) {
         started = true;
         crc = CRC_START;
         block = byte - 1;
@@ -59,10 +63,10 @@ void link_byte(uint8_t byte) {
         decoded(0);  // each code but the first stands for the zero that ended its block
         block = byte - 1;
     }
+    return 0;
 }
 
-
-void link_send(const uint8_t *payload, uint8_t size) {
+APART void link_send(const uint8_t *payload, uint8_t size) {
     if (hal_send_room() < size + CRC_SIZE + 2) {
         return;
     }

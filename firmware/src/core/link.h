@@ -2,8 +2,8 @@
 #pragma once
 #include <stdint.h>
 
-void link_byte(uint8_t byte);                            // from the line; calls frame_received()
+// A byte from the line. Not 0: a frame is whole, link_frame() has its payload of that length until the next byte.
+uint8_t link_byte(uint8_t byte);
+const uint8_t *link_frame(void);
 void link_send(const uint8_t *payload, uint8_t length);  // dropped if the line is full: the host asks again
 extern uint8_t link_bad;                                 // frames dropped, saturating
-
-void frame_received(const uint8_t *payload, uint8_t length);  // the protocol's

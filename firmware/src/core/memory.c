@@ -5,10 +5,7 @@
 
 #include "crc.h"
 
-#ifdef __AVR__
-__attribute__((section(".noinit")))
-#endif
-struct memory memory;
+HAL_NOINIT struct memory memory;
 
 enum { POWER_ON = 1, BROWN_OUT = 4 };         // MCUSR
 enum { STANDING = 0x5A, MOVING = 0xA5 };      // far from what decayed memory holds
@@ -25,15 +22,18 @@ bool memory_restore(uint8_t cause) {
         memset(&memory, 0, sizeof memory);
     }
     memory.boots = boots + 1;
+    memory.known &= STEPPER_AXES;  // a servo without pulses holds nothing
     memory_save();
     return retained && memory.known;
 }
 
 void memory_save(void) {
     memory.check = sum();
+    HAL_BARRIER();
     memory.moving = STANDING;
 }
 
 void memory_moving(void) {
     memory.moving = MOVING;
+    HAL_BARRIER();
 }

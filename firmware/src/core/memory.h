@@ -4,14 +4,20 @@
 #include <stdint.h>
 
 #include "../board.h"
+#include "../chip.h"
 
 #define PACKED __attribute__((packed))
 
 struct PACKED axis_config {
     uint8_t flags;
     int32_t lower, upper, home;
-    uint16_t max_rate;
-    uint32_t max_accel;
+    uint32_t max_rate, max_accel;
+};
+
+// A limit switch: while it is pressed, nothing moves with a positive sum of weight · rate.
+struct PACKED guard_config {
+    uint8_t flags;
+    int8_t weight[AXES];
 };
 
 struct PACKED row_config {
@@ -24,11 +30,12 @@ struct PACKED image {
     uint8_t layout, axes, rows, flags, step_high, step_low, dir_setup, wake;
     uint32_t meaning;
     struct axis_config axis[AXES];
+    struct guard_config guard[SWITCHES];
     struct row_config row[ROWS];
 };
 
-enum { ABORT_CLOSED = 1, ENABLE_HIGH = 2 };  // image flags
-enum { USED = 1, INVERT = 2 };               // axis flags
+enum { ABORT_CLOSED = 1, ENABLE_HIGH = 2, POWER_SENSED = 4 };  // image flags
+enum { USED = 1, INVERT = 2, CLOSED = 2 };                     // axis and guard flags
 
 struct memory {
     struct image image;

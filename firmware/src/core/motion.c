@@ -9,49 +9,134 @@ volatile uint8_t queue_head, queue_tail;
 struct dda dda;
 struct motion motion;
 
-static uint8_t settled;        // segments before this one are in memory.counts
-static uint32_t queued_units;  // of the segments from `settled` on
+static uint8_t settled;               // segments before this one are in memory.counts
+static struct fraction settled_fraction;
+static uint32_t queued_units;         // of the segments from `settled` on
 static uint16_t latched_left;
 static uint8_t latched_slot;
 static float speed;       // u: ms that the arm needs to stop, as last looked at
 static float hold_speed;  // u that the hold allows
 static uint8_t pace;
 
-static const float STANDING = 1.0F;       // ms: u at which a hold stands still
-static const float TOO_FAST = 30.0F;      // ms: u from which an abrupt stop loses steps
+static const float STANDING = 1.0F;   // ms: u at which a hold stands still
+static const float TOO_FAST = 30.0F;  // ms: u from which an abrupt stop loses steps
 static const float UNIT_MS = 256e3F / CLOCK;
 
 #define SHARED(x) (*(volatile __typeof__(x) *)&(x))  // the interrupt changes it
 
+// Not inlined into the interrupt, which would have to save more registers with every tick.
+__attribute__((noinline, optimize("O2"))) bool dda_load(void) {
+    const uint8_t tail = queue_tail;
+    if (tail == queue_head) {
+        dda.now = 0;
+        return false;
+    }
+    const struct segment *s = queue_slot(tail);
+    HAL_NEAR(s);
+    dda.now = s;
+    dda.left = s->ticks;
+    dda.interval = (uint32_t)s->interval << 16;
+    dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
+    if (dda.back & LAST) {
+        dda_rest();
+    }
+    const axes_t turned = dda.back ^ s->back, fine = s->fine;
+    (void)turned;
+    (void)fine;
+#define LOAD(i, ...)                          \
+    if (fine & 1 << (i)) {                    \
+        dda.rate[i] = s->rate[i];             \
+    } else {                                  \
+        dda.rate[i] = (fine_t)s->rate[i] << 8; \
+    }                                         \
+    if (turned & 1 << (i)) {                  \
+        dda.phase[i] ^= PHASE_TURN;           \
+    }
+    STEPPER_PINS(LOAD)
+    dda.back = s->back;
+    dda_direction(s->back);
+    return true;
+}
+
+__attribute__((noinline)) void dda_bend(void) {
+    dda.add += (int32_t)dda.now->bend * 4;
+}
+
+// Cycles between ticks after `ticks` of them, not rounded from tick to tick.
+int32_t motion_interval(const struct segment *s, uint16_t ticks) {
+    if (!s->add) {
+        return s->interval;
+    }
+    const uint32_t coarse = (uint32_t)(int32_t)(s->add >> 8) * ticks, fine = (uint32_t)(uint8_t)s->add * ticks >> 8;
+    int32_t change = (int32_t)(coarse + fine) >> 8;
+    if (s->bend) {
+        const uint8_t first = (s->ticks - 1) % BLOCK + 1;  // ticks of the first block
+        const uint32_t more = ticks > first ? ticks - first : 0;
+        const uint32_t blocks = more / BLOCK, rest = more % BLOCK;
+        const uint32_t bends = (BLOCK / 2 * blocks + rest) * (blocks + 1);  // of all ticks so far
+        change += s->bend * (int32_t)(bends >> 8) >> 14;
+    }
+    return s->interval + change;
+}
+
 static uint16_t last_interval(const struct segment *s) {
-    return s->interval + ((int32_t)s->add * (uint16_t)(s->ticks - 1) >> 8);
+    return motion_interval(s, s->ticks - 1);
 }
 
 static uint32_t span(uint16_t ticks, uint16_t first, uint16_t last) {
     return ticks * (((uint32_t)first + last) >> 1) >> 8;
 }
 
-static uint32_t units(const struct segment *s) {
+uint32_t motion_units(const struct segment *s) {
     return span(s->ticks, s->interval, last_interval(s));
 }
 
-// Steps of one axis that `ticks` of its segment have put out (PROTOCOL.md, section 6).
-static uint16_t done(const struct segment *s, uint8_t axis, uint16_t ticks) {
-    return ((uint32_t)ticks * s->steps[axis] + (s->ticks - 1 - (s->ticks >> 1))) / s->ticks;
+// Steps that an axis makes in so many ticks; moves its phase on. 24 by 16 bits, in parts that a small chip is quick with.
+static uint16_t steps_in(fine_t *phase, fine_t rate, uint16_t ticks) {
+    const uint32_t low = (uint32_t)(uint16_t)rate * ticks;
+    const uint32_t high = (uint32_t)(uint8_t)(rate >> 16) * ticks;
+    uint32_t sum = (uint32_t)*phase + (low & PHASE_MASK);
+    uint16_t steps = (low >> 24) + (sum >> 24);
+    sum = (sum & PHASE_MASK) + ((high & 0xFF) << 16);
+    steps += (high >> 8) + (sum >> 24);
+    *phase = sum & PHASE_MASK;
+    return steps;
 }
 
-static void add_steps(int32_t counts[AXES], const struct segment *s, uint16_t ticks) {
-    axes_t back = s->back;
-    for (uint8_t i = 0; i < AXES; i++, back >>= 1) {
-        if (s->steps[i]) {
-            const uint16_t n = ticks == s->ticks ? s->steps[i] : done(s, i, ticks);
-            counts[i] += back & 1 ? -(int32_t)n : (int32_t)n;
-        }
+static void advance(int32_t *count, struct fraction *f, uint8_t i, const struct segment *s, uint16_t ticks) {
+    const bool back = s->back >> i & 1;
+    if ((f->back >> i & 1) != back) {
+        f->phase[i] ^= PHASE_TURN;
+        f->back ^= 1U << i;
+    }
+    if (s->rate[i]) {
+        const uint16_t n = steps_in(&f->phase[i], segment_rate(s, i), ticks);
+        *count += back ? -(int32_t)n : (int32_t)n;
     }
 }
 
+static void at_rest(struct fraction *f) {
+    for (uint8_t i = 0; i < AXES; i++) {
+        f->phase[i] = PHASE_HALF;
+    }
+    f->back = 0;
+}
+
+static void advance_all(int32_t counts[AXES], struct fraction *f, const struct segment *s, uint16_t ticks) {
+    for (uint8_t i = 0; i < AXES; i++) {
+        advance(&counts[i], f, i, s, ticks);
+    }
+    if (s->back & LAST && ticks == s->ticks) {
+        at_rest(f);
+    }
+}
+
+void motion_advance(uint8_t axis, const struct segment *s) {
+    advance(&motion.plan[axis], &motion.plan_fraction, axis, s, s->ticks);
+}
+
 // The interrupt notes ticks, not counts: turn them into counts while their segment is still there.
-static void take_latch(void) {
+APART static void take_latch(void) {
     bool pressed;
     uint8_t slot;
     uint16_t left;
@@ -67,12 +152,13 @@ static void take_latch(void) {
     motion.latched = true;
     latched_slot = slot;
     latched_left = left;
+    struct fraction f = settled_fraction;
     memcpy(motion.latch, memory.counts, sizeof motion.latch);
     for (uint8_t at = settled; at != slot; at++) {
-        add_steps(motion.latch, queue_slot(at), queue_slot(at)->ticks);
+        advance_all(motion.latch, &f, queue_slot(at), queue_slot(at)->ticks);
     }
     const struct segment *s = queue_slot(slot);
-    add_steps(motion.latch, s, s->ticks - left);
+    advance_all(motion.latch, &f, s, s->ticks - left);
 }
 
 // Counts what has been done up to the segment at `tail`. (Read the tail before: what is latched later lies behind it.)
@@ -82,8 +168,8 @@ static void settle_to(uint8_t tail) {
     }
     while (settled != tail) {
         const struct segment *s = queue_slot(settled);
-        add_steps(memory.counts, s, s->ticks);
-        queued_units -= units(s);
+        advance_all(memory.counts, &settled_fraction, s, s->ticks);
+        queued_units -= motion_units(s);
         settled++;
     }
 }
@@ -100,10 +186,15 @@ static const struct segment *running(uint16_t *left, uint16_t *interval) {
     tail = queue_tail;
     s = SHARED(dda.now);
     *left = SHARED(dda.left);
-    *interval = SHARED(dda.interval) >> 8;
+    *interval = SHARED(dda.interval) >> 16;
     HAL_UNLOCK();
     settle_to(tail);
     return s;
+}
+
+const struct segment *motion_running(void) {
+    uint16_t left, interval;
+    return running(&left, &interval);
 }
 
 void motion_counts(int32_t counts[AXES]) {
@@ -111,7 +202,8 @@ void motion_counts(int32_t counts[AXES]) {
     const struct segment *s = running(&left, &interval);
     memcpy(counts, memory.counts, sizeof memory.counts);
     if (s) {
-        add_steps(counts, s, s->ticks - left - 1);  // the bits of one tick are computed, not yet out
+        struct fraction f = settled_fraction;
+        advance_all(counts, &f, s, s->ticks - left - 1);  // the bits of one tick are computed, not yet out
     }
 }
 
@@ -120,7 +212,10 @@ uint8_t motion_free(void) {
 }
 
 uint16_t motion_queued(void) {
-    const uint32_t ms = queued_units * 2 / 125;  // 256 cycles = 2/125 ms
+    // a segment has less than 2^24 units
+    const bool fits = (uint64_t)QUEUE_SLOTS * UNIT_FACTOR <= 256;
+    const uint32_t ms = fits ? queued_units * UNIT_FACTOR / UNIT_DIVISOR
+                             : (uint32_t)((uint64_t)queued_units * UNIT_FACTOR / UNIT_DIVISOR);
     return ms > 0xFFFF ? 0xFFFF : ms;
 }
 
@@ -132,13 +227,22 @@ struct segment *motion_slot(uint8_t ahead) {
     return queue_slot(queue_head + ahead);
 }
 
+static void plan_rest(void) {
+    memset(motion.plan_speed, 0, sizeof motion.plan_speed);
+    motion.plan_window = 0;
+    at_rest(&motion.plan_fraction);
+}
+
 void motion_append(uint8_t segments, bool end) {
     for (uint8_t n = 0; n < segments; n++) {
-        struct segment *s = motion_slot(n);
-        s->last = end && n + 1 == segments;
-        queued_units += units(s);
+        queued_units += motion_units(motion_slot(n));
+    }
+    if (end) {
+        motion_slot(segments - 1)->back |= LAST;
+        plan_rest();
     }
     motion.ended = end;
+    HAL_BARRIER();
     queue_head += segments;
 }
 
@@ -149,16 +253,23 @@ static void flush(void) {
 
 void motion_begin(enum state state) {
     memory_moving();
-    session.state = state;
+    motion.state = state;
     motion.cruising = state != MOVING;
     speed = 0;
+}
+
+void motion_replan(void) {
+    memcpy(motion.plan, memory.counts, sizeof motion.plan);
+    plan_rest();
 }
 
 void motion_rest(void) {
     dda.stretch = 256;
     dda.probe = false;
-    memcpy(motion.plan, memory.counts, sizeof motion.plan);
-    session.state = IDLE;
+    dda_rest();
+    at_rest(&settled_fraction);
+    motion_replan();
+    motion.state = IDLE;
     motion.cruising = false;
     memory_save();
 }
@@ -174,12 +285,12 @@ void motion_lose(uint16_t axes) {
 static float stop_time(const struct segment *s, uint16_t interval) {
     float most = 0;
     for (uint8_t i = 0; i < AXES; i++) {
-        if (s->steps[i]) {
-            const float one = s->steps[i] * limits.stop_time[i];
+        if (s->rate[i]) {
+            const float one = (float)(uint32_t)segment_rate(s, i) * limits.stop_time[i];
             most = one > most ? one : most;
         }
     }
-    return most / ((float)s->ticks * interval);
+    return most / interval;
 }
 
 static void stand_still(void) {
@@ -187,17 +298,17 @@ static void stand_still(void) {
     settle();
     const struct segment *s = dda.now;
     if (s) {
-        add_steps(memory.counts, s, s->ticks - dda.left - 1);
+        advance_all(memory.counts, &settled_fraction, s, s->ticks - dda.left - 1);
     }
     dda.now = 0;
     flush();
     motion_rest();
 }
 
-void motion_hold(void) {
+void motion_stop(void) {
     uint16_t left, interval;
     const struct segment *s = running(&left, &interval);
-    session.state = HOLDING;
+    motion.state = HOLDING;
     if (!s) {
         stand_still();
         return;
@@ -221,78 +332,67 @@ static void hold_millisecond(const struct segment *s, uint16_t interval) {
     HAL_UNLOCK();
 }
 
-// The queue must always hold the path that a stop needs.
-static void watch_queue(const struct segment *s, uint16_t left, uint16_t interval) {
+// The queue must always hold the time that a stop takes: on a path that slows down by itself, a stop takes all of it.
+static enum error watch_queue(const struct segment *s, uint16_t left, uint16_t interval) {
     speed = stop_time(s, interval);
     if (motion.ended) {
-        return;
+        return OK;
     }
-    // The way to a stop takes u / 2 of this speed, and longer on a path that slows down by itself.
-    const uint32_t rest = queued_units - units(s) + span(left, interval, last_interval(s));
-    const struct segment *last = queue_slot(queue_head - 1);
-    const float end = stop_time(last, last_interval(last));
-    const float need = speed > 0 ? speed * speed / (speed + end) : 0;
-    if (rest * UNIT_MS < need + speed / 32 + 2.0F) {
-        session_end(E_DRY, 0);
-    }
+    const uint32_t rest = queued_units - motion_units(s) + span(left, interval, last_interval(s));
+    return rest * UNIT_MS < speed + speed / 32 + 2.0F ? E_DRY : OK;
 }
 
-void motion_millisecond(void) {
+APART enum error motion_millisecond(void) {
     uint16_t left, interval;
     if (motion.wake) {
         motion.wake--;
     }
-    if (motion.cruising || (session.state != MOVING && session.state != HOLDING)) {
-        return;
+    if (motion.cruising || (motion.state != MOVING && motion.state != HOLDING)) {
+        return OK;
     }
     const struct segment *s = running(&left, &interval);
     if (!s) {
-        return;
+        return OK;
     }
-    if (session.state == HOLDING) {
+    if (motion.state == HOLDING) {
         hold_millisecond(s, interval);
     } else if (++pace % 4 == 0) {
-        watch_queue(s, left, interval);
+        return watch_queue(s, left, interval);
     }
+    return OK;
 }
 
 // All of the queue is done.
-static void arrive(void) {
+static enum error arrive(void) {
     const struct segment *s = queue_slot(settled - 1);  // nothing has been written over it yet
-    if (!s->last) {
-        if (speed > TOO_FAST) {
-            for (uint8_t i = 0; i < AXES; i++) {
-                motion_lose(s->steps[i] ? 1U << i : 0);
-            }
-        }
-        if (session.state == MOVING) {
-            session.state = HOLDING;  // no path is left to decelerate on
-            session_end(E_DRY, 0);
+    const bool dry = !(s->back & LAST);
+    const bool moving = motion.state == MOVING;
+    if (dry && speed > TOO_FAST) {
+        for (uint8_t i = 0; i < AXES; i++) {
+            motion_lose(s->rate[i] ? 1U << i : 0);
         }
     }
     motion_rest();
+    return dry && moving ? E_DRY : OK;  // no path was left to decelerate on
 }
 
-void motion_poll(void) {
+APART enum error motion_poll(void) {
     settle();
-    if (SHARED(dda.overruns) && session.state == MOVING) {
-        session_end(E_OVERRUN, 0);
-    }
     if (SHARED(dda.now)) {
-        return;
+        return SHARED(dda.overruns) && motion.state == MOVING ? E_OVERRUN : OK;
     }
     settle();  // what ended between the two looks
     if (motion_queue_empty()) {
-        if (!motion.cruising && session.state != IDLE) {
-            arrive();
-        }
-    } else if (!motion.wake) {
+        return motion.cruising || motion.state == IDLE ? OK : arrive();
+    }
+    if (!motion.wake) {
         dda_load();
         dda.left--;
         const uint16_t interval = dda_interval();
         dda_bits();
         hal_timer_start(interval);
     }
+    return OK;
 }
 
 void motion_start(bool retained) {
@@ -301,7 +401,7 @@ void motion_start(bool retained) {
     dda = (struct dda){.stretch = 256};
     motion = (struct motion){0};
     motion.retained = retained;
-    memcpy(motion.plan, memory.counts, sizeof motion.plan);
     config_activate();
     hal_drivers(memory.drivers);
+    motion_rest();
 }

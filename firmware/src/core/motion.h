@@ -2,13 +2,26 @@
 #pragma once
 #include "config.h"
 #include "dda.h"
-#include "session.h"
+
+enum state { IDLE, MOVING, HOLDING, HOMING, JOGGING };
+
+// How far the axes are beyond their counts, and which way they were going.
+struct fraction {
+    fine_t phase[AXES];
+    axes_t back;
+};
 
 struct motion {
-    int32_t plan[AXES];   // counts at the end of the queue
+    uint8_t state;
+    // at the end of the queue:
+    int32_t plan[AXES];
+    struct fraction plan_fraction;
+    int32_t plan_speed[AXES];  // VELOCITY units; 0 at rest
+    uint8_t plan_window;       // the last segment's, see batch.c
+    bool ended;                // it ends with END
+
     int32_t latch[AXES];  // counts when the probed switch was pressed
     bool latched;         // dda.pressed has been taken into `latch`
-    bool ended;           // the queue ends with END
     bool retained;        // the position was known through a reset
     bool pulses;          // servo pulses on
     bool cruising;        // the board plans by itself: HOME, JOG
@@ -17,18 +30,25 @@ struct motion {
 extern struct motion motion;
 
 void motion_start(bool retained);  // once, after the reset
-void motion_poll(void);            // as often as possible
-void motion_millisecond(void);
+// What goes wrong is returned; whoever calls them ends the session and calls motion_stop().
+enum error motion_poll(void);         // as often as possible
+enum error motion_millisecond(void);
+void motion_stop(void);               // MOVING: come to rest along the path
+
 void motion_counts(int32_t counts[AXES]);  // steps made until now
+const struct segment *motion_running(void);  // null at rest
 uint8_t motion_free(void);
 uint16_t motion_queued(void);  // ms
 
-// Appending: write segments into motion_slot(0), (1), … up to motion_free(), move motion.plan on, then publish them all at once.
+// Appending: write segments into motion_slot(0), (1), … up to motion_free(), each with motion_advance(); then publish them all at once.
 struct segment *motion_slot(uint8_t ahead);
+void motion_advance(uint8_t axis, const struct segment *s);  // motion.plan of one axis to the end of a segment
 void motion_append(uint8_t segments, bool end);
+uint32_t motion_units(const struct segment *s);  // its time, 256 cycles
+int32_t motion_interval(const struct segment *s, uint16_t ticks);  // cycles to the tick after so many
 
 void motion_begin(enum state state);  // leave IDLE: from here on a reset loses the position
 void motion_rest(void);               // back to IDLE: the counts are final
-void motion_hold(void);
+void motion_replan(void);             // at rest: the plan begins where the arm stands
 bool motion_queue_empty(void);
 void motion_lose(uint16_t axes);  // their positions are not known any more

@@ -4,8 +4,10 @@
 
 #include "batch.h"
 #include "bytes.h"
+#include "cruise.h"
 #include "hal.h"
 #include "home.h"
+#include "inputs.h"
 #include "jog.h"
 
 enum { CONFIG = 0x10, COMMIT, ENABLE, SET_POSITION, MOTION, HOME, JOG };
@@ -21,11 +23,11 @@ static enum error fault(enum error error, uint8_t about) {
     return error;
 }
 
-static enum error config_frame(const uint8_t *p, uint8_t length) {
+APART static enum error config_frame(const uint8_t *p, uint8_t length) {
     if (length < 5) {
         return E_LENGTH;
     }
-    if (session.state != IDLE) {
+    if (motion.state != IDLE) {
         return E_BUSY;
     }
     const enum error error = config_write(get16(p + 2), p + 4, length - 4);
@@ -40,11 +42,11 @@ static enum error config_frame(const uint8_t *p, uint8_t length) {
     return OK;
 }
 
-static enum error commit_frame(const uint8_t *p, uint8_t length) {
+APART static enum error commit_frame(const uint8_t *p, uint8_t length) {
     if (length != 8) {
         return E_LENGTH;
     }
-    if (session.state != IDLE) {
+    if (motion.state != IDLE) {
         return E_BUSY;
     }
     const enum error error = config_commit(get16(p + 2), get32(p + 4));
@@ -65,7 +67,7 @@ static enum error enable_frame(const uint8_t *p, uint8_t length) {
     if (!memory.config) {
         return E_CONFIG_NONE;
     }
-    if (session.state != IDLE) {
+    if (motion.state != IDLE) {
         return E_BUSY;
     }
     const bool drivers = p[2] & DRIVERS, pulses = p[2] & PULSES;
@@ -88,7 +90,7 @@ static bool possible(uint8_t axis, int32_t count) {
     return count >= memory.image.axis[axis].lower && count <= memory.image.axis[axis].upper;
 }
 
-static enum error position_frame(const uint8_t *p, uint8_t length) {
+APART static enum error position_frame(const uint8_t *p, uint8_t length) {
     if (length < 4) {
         return E_LENGTH;
     }
@@ -103,7 +105,10 @@ static enum error position_frame(const uint8_t *p, uint8_t length) {
     if (!memory.config) {
         return E_CONFIG_NONE;
     }
-    if (session.state != IDLE) {
+    if (inputs.power_cut) {
+        return E_POWER;
+    }
+    if (motion.state != IDLE) {
         return E_BUSY;
     }
     next = counts;
@@ -132,14 +137,14 @@ static enum error position_frame(const uint8_t *p, uint8_t length) {
     return OK;
 }
 
-static void get_rates(const uint8_t *p, int16_t rate[AXES]) {
+static void get_rates(const uint8_t *p, int32_t rate[AXES]) {
     for (uint8_t i = 0; i < AXES; i++) {
-        rate[i] = (int16_t)get16(p + 2 * i);
+        rate[i] = (int32_t)get32(p + 4 * i);
     }
 }
 
 // What HOME and JOG ask of a vector of rates.
-static enum error check_rates(const int16_t rate[AXES], bool jogging) {
+static enum error check_rates(const int32_t rate[AXES], bool jogging) {
     uint16_t axes = 0;
     for (uint8_t i = 0; i < AXES; i++) {
         axes |= rate[i] ? 1U << i : 0;
@@ -158,9 +163,9 @@ static enum error check_rates(const int16_t rate[AXES], bool jogging) {
         if (i < STEPPERS ? !memory.drivers : !motion.pulses) {
             return fault(E_DISABLED, i);
         }
-        const uint16_t most = memory.image.axis[i].max_rate;
-        const uint16_t slow = most / SLOW_WHILE_LOST ? most / SLOW_WHILE_LOST : 1;
-        const uint16_t size = rate[i] < 0 ? 0U - (uint16_t)rate[i] : (uint16_t)rate[i];
+        const uint32_t most = memory.image.axis[i].max_rate;
+        const uint32_t slow = most / SLOW_WHILE_LOST ? most / SLOW_WHILE_LOST : 1;
+        const uint32_t size = rate[i] < 0 ? 0U - (uint32_t)rate[i] : (uint32_t)rate[i];
         if (size > (jogging && lost ? slow : most)) {
             return fault(E_RATE, i);
         }
@@ -168,30 +173,26 @@ static enum error check_rates(const int16_t rate[AXES], bool jogging) {
     return OK;
 }
 
-static enum error home_frame(const uint8_t *p, uint8_t length) {
-    if (length != 13 + 2 * AXES) {
+APART static enum error home_frame(const uint8_t *p, uint8_t length) {
+    if (length != 15 + 4 * AXES) {
         return E_LENGTH;
     }
-    if (!memory.config) {
-        return E_CONFIG_NONE;
+    enum error error = inputs_ready(false);
+    if (error) {
+        return error;
     }
-    if (session.abort) {
-        return E_ABORT;
-    }
-    if (session.state != IDLE) {
-        return E_BUSY;
-    }
-    int16_t rate[AXES];
+    int32_t rate[AXES];
     bool any = false;
-    get_rates(p + 13, rate);
+    get_rates(p + 15, rate);
     for (uint8_t i = 0; i < AXES; i++) {
         any |= rate[i] != 0;
     }
-    const uint16_t backoff = get16(p + 5);
-    if (!any || p[2] >= SWITCHES || p[3] > 1 || p[4] == 0 || backoff == 0) {
+    const uint32_t backoff = get32(p + 5), travel = get32(p + 9);
+    if (!any || p[2] >= SWITCHES || p[3] > 1 || p[4] == 0 || backoff == 0 || backoff > (uint32_t)FARTHEST ||
+        travel > (uint32_t)FARTHEST) {
         return E_VALUE;
     }
-    const enum error error = check_rates(rate, false);
+    error = check_rates(rate, false);
     if (error) {
         return error;
     }
@@ -199,29 +200,23 @@ static enum error home_frame(const uint8_t *p, uint8_t length) {
     home.closed = p[3];
     home.slow = p[4];
     home.backoff = backoff;
-    home.travel = get32(p + 7);
-    home.time = 100UL * get16(p + 11);
-    memcpy(home.rate, rate, sizeof rate);
+    home.travel = travel;
+    home.time = 100UL * get16(p + 13);
+    memcpy(cruise.asked, rate, sizeof rate);
     home_begin();
     return OK;
 }
 
-static enum error jog_frame(const uint8_t *p, uint8_t length) {
-    if (length != 2 + 2 * AXES) {
+APART static enum error jog_frame(const uint8_t *p, uint8_t length) {
+    if (length != 2 + 4 * AXES) {
         return E_LENGTH;
     }
-    if (!memory.config) {
-        return E_CONFIG_NONE;
+    int32_t rate[AXES];
+    enum error error = inputs_ready(motion.state == JOGGING);
+    if (!error) {
+        get_rates(p + 2, rate);
+        error = check_rates(rate, true);
     }
-    if (session.abort) {
-        return E_ABORT;
-    }
-    if (session.state != IDLE && session.state != JOGGING) {
-        return E_BUSY;
-    }
-    int16_t rate[AXES];
-    get_rates(p + 2, rate);
-    const enum error error = check_rates(rate, true);
     if (!error) {
         jog(rate);
     }
@@ -249,7 +244,7 @@ static enum error carry_out(const uint8_t *p, uint8_t length) {
     }
 }
 
-enum error order_received(const uint8_t *payload, uint8_t length, uint8_t *about) {
+APART enum error order_received(const uint8_t *payload, uint8_t length, uint8_t *about) {
     detail = 0;
     const enum error error = carry_out(payload, length);
     *about = detail;

@@ -6,6 +6,7 @@
 #include "cruise.h"
 #include "hal.h"
 #include "home.h"
+#include "inputs.h"
 #include "jog.h"
 #include "link.h"
 #include "orders.h"
@@ -13,26 +14,29 @@
 enum { HELLO = 0x01, STATUS_ASK, HOLD };
 enum { ACK = 0x80, INFO, STATUS, CREDIT };
 enum { SEQUENCED = 0x10, REPLIES = 0x80 };
-enum { SILENCE_MS = 500, ABORT_MS = 3 };
-enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32 };  // flags
+enum { SILENCE_MS = 500, NO_SWITCH = 255 };
+enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32, CUT = 64 };  // flags
 
 struct session session;
 
 static uint32_t nonce;
 static bool greeted;  // `nonce` is of a HELLO
 static uint8_t cause;
-static uint8_t abort_steady;
 static uint8_t told_free;  // credit that the host knows of
 
-void session_end(enum error error, uint8_t detail) {
+// Ends the session (the first cause stays) and brings the board to rest.
+static void end(enum error error, uint8_t detail) {
+    if (!error) {
+        return;
+    }
     if (!session.error) {
         session.error = error;
         session.detail = detail;
     }
-    if (session.state == MOVING) {
-        motion_hold();
-    } else if (session.state == HOMING || session.state == JOGGING) {
-        session.state = HOLDING;
+    if (motion.state == MOVING) {
+        motion_stop();
+    } else if (motion.state == HOMING || motion.state == JOGGING) {
+        motion.state = HOLDING;
         cruise.target = 0;
     }
 }
@@ -43,7 +47,7 @@ static uint8_t *put_head(uint8_t *p) {
     *p++ = session.next;
     *p++ = session.error;
     *p++ = session.detail;
-    *p++ = session.state;
+    *p++ = motion.state;
     return p;
 }
 
@@ -52,19 +56,20 @@ static uint8_t *put_credit(uint8_t *p) {
     return put16(p, motion_queued());
 }
 
-static void send_ack(uint8_t type) {
-    uint8_t reply[8] = {type};
-    put_credit(put_head(reply + 1));
+APART static void send_ack(uint8_t type) {
+    uint8_t reply[10] = {type};
+    put16(put_credit(put_head(reply + 1)), session.digest);
     link_send(reply, sizeof reply);
 }
 
 static uint8_t flags(void) {
     return (memory.drivers ? DRIVERS : 0) | (motion.pulses ? PULSES : 0) | (memory.config ? CONFIGURED : 0) |
-           (motion.retained ? RETAINED : 0) | (session.abort ? ABORTED : 0) | (home_finished ? LATCH : 0);
+           (motion.retained ? RETAINED : 0) | (inputs.abort ? ABORTED : 0) | (home_finished ? LATCH : 0) |
+           (inputs.power_cut ? CUT : 0);
 }
 
-static void send_info(uint8_t tag, uint32_t said) {
-    uint8_t reply[33] = {INFO, tag, PROTOCOL_VERSION, FIRMWARE_MAJOR, FIRMWARE_MINOR};
+APART static void send_info(uint8_t tag, uint32_t said) {
+    uint8_t reply[35] = {INFO, tag, PROTOCOL_VERSION, FIRMWARE_MAJOR, FIRMWARE_MINOR};
     uint8_t *p = put32(reply + 5, said);
     *p++ = BOARD_ID;
     *p++ = AXES;
@@ -73,6 +78,7 @@ static void send_info(uint8_t tag, uint32_t said) {
     *p++ = ROWS;
     *p++ = QUEUE_SLOTS;
     *p++ = FRAME_MAX;
+    p = put16(p, HAL_RECEIVE);
     p = put16(p, MIN_INTERVAL);
     p = put32(p, CLOCK);
     p = put32(p, memory.config);
@@ -83,8 +89,8 @@ static void send_info(uint8_t tag, uint32_t said) {
     link_send(reply, sizeof reply);
 }
 
-static void send_status(uint8_t tag, uint8_t page) {
-    uint8_t reply[16 + 4 * AXES] = {STATUS, tag};
+APART static void send_status(uint8_t tag, uint8_t page) {
+    uint8_t reply[18 + 4 * AXES] = {STATUS, tag};
     int32_t counts[AXES];
     if (page == 1) {
         memcpy(counts, motion.latch, sizeof counts);
@@ -99,6 +105,7 @@ static void send_status(uint8_t tag, uint8_t page) {
     *p++ = dda.overruns;
     *p++ = link_bad;
     *p++ = page == 1;
+    p = put16(p, session.digest);
     for (uint8_t i = 0; i < AXES; i++) {
         p = put32(p, counts[i]);
     }
@@ -111,11 +118,8 @@ static void in_sequence(const uint8_t *p, uint8_t length) {
     if (session.error == OK && p[1] == session.next) {
         uint8_t detail = 0;
         const enum error error = order_received(p, length, &detail);
-        if (error) {
-            session_end(error, detail);
-        } else {
-            session.next++;
-        }
+        end(error, detail);
+        session.next += error == OK;
     }
     send_ack(ACK);
 }
@@ -125,10 +129,11 @@ static void in_sequence(const uint8_t *p, uint8_t length) {
 static void hello(const uint8_t *p) {
     const uint32_t said = get32(p + 3);
     if (p[2] != PROTOCOL_VERSION) {
-        session_end(E_VERSION, 0);
+        end(E_VERSION, 0);
     } else if (!greeted || said != nonce) {
-        session_end(E_HELD, 0);  // whatever the former host had moving
+        end(E_HELD, 0);  // whatever the former host had moving
         session.next = session.error = session.detail = 0;
+        session.digest = said;
         dda.overruns = link_bad = 0;
         nonce = said;
         greeted = true;
@@ -136,7 +141,7 @@ static void hello(const uint8_t *p) {
     send_info(p[1], said);
 }
 
-void frame_received(const uint8_t *payload, uint8_t length) {
+static void frame_received(const uint8_t *payload, uint8_t length) {
     if (payload[0] >= SEQUENCED && payload[0] < REPLIES) {
         session.silent = 0;
         in_sequence(payload, length);
@@ -148,50 +153,56 @@ void frame_received(const uint8_t *payload, uint8_t length) {
         send_status(payload[1], payload[2]);
     } else if (payload[0] == HOLD && length == 2) {
         session.silent = 0;
-        session_end(E_HELD, 0);
+        end(E_HELD, 0);
         send_ack(ACK);
+    }
+}
+
+APART void protocol_byte(uint8_t byte) {
+    const uint8_t length = link_byte(byte);
+    if (length) {
+        frame_received(link_frame(), length);
     }
 }
 
 // ---- time
 
-static void watch_abort(void) {
-    const bool closed = memory.image.flags & ABORT_CLOSED;
-    const bool active = memory.config && hal_abort_level() == closed;
-    if (active == session.abort) {
-        abort_steady = 0;
-    } else if (++abort_steady >= ABORT_MS) {
-        session.abort = active;
-        abort_steady = 0;
+APART void protocol_millisecond(void) {
+    const uint8_t state = motion.state;
+    uint8_t detail = 0;
+    const enum error error = inputs_millisecond(state == HOMING ? home.input : NO_SWITCH, &detail);
+    end(error, detail);
+    if ((state == MOVING || state == HOMING) && ++session.silent >= SILENCE_MS) {
+        end(E_SILENCE, 0);
     }
-    if (session.abort && session.state != IDLE) {
-        session_end(E_ABORT, 0);
-    }
-}
-
-void protocol_millisecond(void) {
-    watch_abort();
-    if ((session.state == MOVING || session.state == HOMING) && ++session.silent >= SILENCE_MS) {
-        session_end(E_SILENCE, 0);
-    }
-    motion_millisecond();
-    if (session.state == HOMING) {
-        home_millisecond();
-    } else if (session.state == JOGGING) {
+    end(motion_millisecond(), 0);
+    if (motion.state == HOMING) {
+        end(home_millisecond(), 0);
+    } else if (motion.state == JOGGING) {
         jog_millisecond();
     }
 }
 
-void protocol_poll(void) {
-    motion_poll();
-    if (session.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4) {
+// Bytes were lost because more of them waited than the host may send: it hears of it at once, and goes back.
+static void watch_line(void) {
+    if (hal_spilled() && !session.error) {
+        session.detail = E_SPILL;
+        send_ack(CREDIT);
+        session.detail = 0;
+    }
+}
+
+APART void protocol_poll(void) {
+    watch_line();
+    end(motion_poll(), 0);
+    if (motion.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4) {
         send_ack(CREDIT);
     }
-    if (session.state == HOMING) {
-        home_poll();
-    } else if (session.state == JOGGING) {
+    if (motion.state == HOMING) {
+        end(home_poll(), 0);
+    } else if (motion.state == JOGGING) {
         jog_poll();
-    } else if (session.state == HOLDING && motion.cruising) {
+    } else if (motion.state == HOLDING && motion.cruising) {
         cruise_poll();
         if (cruise_resting()) {
             motion_rest();
@@ -199,10 +210,11 @@ void protocol_poll(void) {
     }
 }
 
-void protocol_start(uint8_t reset_cause) {
+APART void protocol_start(uint8_t reset_cause) {
     cause = reset_cause;
     session = (struct session){.error = E_NO_SESSION};
     greeted = false;
     home_finished = false;
+    inputs_start();
     motion_start(memory_restore(cause));
 }

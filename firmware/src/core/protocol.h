@@ -2,10 +2,21 @@
 #pragma once
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 1
-#define FIRMWARE_MAJOR 1
+#define PROTOCOL_VERSION 2
+#define FIRMWARE_MAJOR 2
 #define FIRMWARE_MINOR 0
 
+// The session: what PROTOCOL.md, section 3, says about errors. Only protocol.c ends it.
+struct session {
+    uint8_t next;     // sequence number awaited
+    uint8_t error;    // what ended the session; OK: it is open
+    uint8_t detail;
+    uint16_t digest;  // of the nonce, 0: there was no HELLO
+    uint16_t silent;  // ms since the last valid frame
+};
+extern struct session session;
+
 void protocol_start(uint8_t cause);  // MCUSR of the reset, 0: hidden
+void protocol_byte(uint8_t byte);    // from the line
 void protocol_poll(void);            // as often as possible
 void protocol_millisecond(void);

@@ -50,6 +50,7 @@ class Arm:
     held: tuple[str, ...] = ()  # names of joints that `lock` has folded into the links
     motors: tuple[Motor, ...] = ()  # in the order of the pulses; () for an arm without a robot file
     homing: tuple[Homing | None, ...] = ()  # of every joint
+    hard_limits: tuple[bool, ...] = ()  # of every joint: whether its switch stops every motion into it
     gripper: Gripper | None = None
     board: Board | None = None
     path: str = ""  # of the robot file, as given
@@ -121,7 +122,7 @@ def from_links(
 ) -> Arm:
     """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the rest optional.
 
-    rest: what is no array: motors, homing, gripper, board, path, sha256, description, source, file.
+    rest: what is no array: motors, homing, hard_limits, gripper, board, path, sha256, description, source, file.
     """
     n = len(prismatic)
     links = _frozen(link)
@@ -152,6 +153,7 @@ def from_links(
         pose_names=tuple(poses or ()),
         pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
         homing=rest.pop("homing", (None,) * n),
+        hard_limits=rest.pop("hard_limits", (False,) * n),
         **rest,
     )
 

@@ -72,6 +72,7 @@ def build(file: RobotFile) -> Arm:
         poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
         motors=file.motor_list(),
         homing=tuple(j.homing for j in file.joints),
+        hard_limits=tuple(j.homing is not None and j.hard_limits is not False for j in file.joints),
         gripper=file.gripper,
         board=file.board,
         path=file.path,

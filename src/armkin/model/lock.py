@@ -67,6 +67,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
         motor_gain=arm.motor_gain[:, kept],
         pose_joints=arm.pose_joints[:, kept],
         homing=tuple(arm.homing[i] for i in kept),
+        hard_limits=tuple(arm.hard_limits[i] for i in kept),
         held=(*arm.held, *held),
         **rest,
     )

@@ -347,7 +347,11 @@ def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
         for key in ("driver", "enable"):
             if getattr(settings, key) is not None:
                 yield ("board", key), f"{settings.kind} has no stepper drivers; remove it"
+    if settings.power not in (None, board.power):
+        yield ("board", "power"), f"{settings.kind} senses the motors' power at {board.power}, not {settings.power}"
     for i, joint in enumerate(robot.joints):
+        if joint.hard_limits and joint.homing is None:
+            yield ("joints", i, "hard_limits"), "the joint has no limit switch; add homing:, which names it"
         if joint.homing is not None and joint.homing.switch not in board.switches:
             what = f"{settings.kind} has no limit input {joint.homing.switch}"
             message = f"{what}; it has {', '.join(board.switches) or 'none at all'}"

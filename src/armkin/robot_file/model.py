@@ -216,6 +216,10 @@ class Board(_Model):
     abort: Literal["open", "closed"] | None = Field(
         None, description="The abort input when it is not pressed: open (default), or closed to ground."
     )
+    power: Literal["A1", "A4"] | None = Field(
+        None,
+        description="Input that is high while the motors have power (Uno A1, RAMPS A4): without it the position is lost.",
+    )
 
 
 class Joint(_Model):
@@ -236,6 +240,9 @@ class Joint(_Model):
     max_jerk: Rate | None = Field(None, description="deg/s3 or mm/s3; absent: acceleration may change at once.")
     drive: Drive | None = Field(None, description="The joint's own motor; coupled joints use motors.")
     homing: Homing | None = Field(None, description="The limit switch; absent: `armkin home` refuses.")
+    hard_limits: bool | None = Field(
+        None, description="Whether the limit switch stops every motion into it; true where homing is, unless said."
+    )
 
     def twist(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Screw axis (w, v) without the rounding of printed tables.

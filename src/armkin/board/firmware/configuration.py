@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.protocol import AxisImage, Image, RowImage
+from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
 from armkin.errors import UsageError
 from armkin.hardware import BOARDS, DRIVERS, FOREIGN, Board, Driver
 from armkin.motion.plan import missing_rates, rate_lines
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from armkin.robot_file import Gripper
 
 _FAR = 2**30  # counts: an axis without a limit
+_SLACK = 1.02  # of a motor's rate: whole cycles and rates of 15 bits make a segment that much faster
 _SERVO_RANGE = (400, 2600)  # [us] that the boards can make
 
 
@@ -114,8 +115,10 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     image = Image(
         tuple(images),
         _rows(arm, board, axes, low, high),
+        _guards(arm, board, axes),
         abort_closed=arm.board is not None and arm.board.abort == "closed",
         enable_high=arm.board is not None and arm.board.enable == "high",
+        power_sensed=arm.board is not None and arm.board.power is not None,
         step_high=driver.step_high,
         step_low=driver.step_low,
         dir_setup=driver.dir_setup,
@@ -249,6 +252,31 @@ def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int
     return RowImage(bounds[0], bounds[1], tuple(weights))
 
 
+def _guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[GuardImage, ...]:
+    """What every switch input of the board guards: the joint that it homes, in the switch's direction."""
+    guards = [GuardImage() for _ in board.switches]
+    per_count = np.linalg.pinv(arm.motor_gain)
+    for j, (homing, guarded) in enumerate(zip(arm.homing, arm.hard_limits, strict=True)):
+        if homing is None or not guarded:
+            continue
+        toward = per_count[j] * homing.direction
+        toward[np.abs(toward) < 1e-12 * np.abs(toward).max()] = 0.0
+        weights = [0] * len(board.axes)
+        for axis, w in zip(axes, _bytes(toward), strict=True):
+            weights[axis] = w
+        guards[board.switches.index(homing.switch)] = GuardImage(homing.normally == "closed", tuple(weights))
+    return tuple(guards)
+
+
+def _bytes(weights: Array) -> list[int]:
+    """Weights as signed bytes: exact where they are small whole multiples of the least, else to 1/127."""
+    least = np.abs(weights[weights != 0]).min()
+    whole = weights / least
+    if np.abs(whole).max() > 127 or np.abs(whole - np.rint(whole)).max() > 1e-9:
+        whole = weights * (127 / np.abs(weights).max())
+    return [int(w) for w in np.rint(whole)]
+
+
 def _check_servo(what: str, low: int, high: int) -> None:
     least, most = _SERVO_RANGE
     if low < least or high > most:
@@ -257,7 +285,7 @@ def _check_servo(what: str, low: int, high: int) -> None:
 
 def _rate(board: Board, rate: float) -> int:
     fastest = board.clock // board.min_interval
-    return max(1, min(math.ceil(rate - 1e-9), fastest, 65535))
+    return max(1, min(math.ceil(rate * _SLACK - 1e-9), fastest))
 
 
 def _accel(accel: float) -> int:

@@ -1,14 +1,12 @@
 """Any stretch of a trajectory as device segments: straight lines in counts with a ramp of speed, made as asked for.
 
 A segment spans so little time that its chord leaves the curve by at most the tolerance, and that its speed changes
-by about an eighth near a rest; at least 10 ms, and so much that the board's queue always reaches to a stop. Its steps
-are differences of rounded counts: their sums are exact. Its ramp follows the speed along the way, and no motor is
-faster in its fastest tick than its greatest rate: the board checks that of every segment.
+by about an eighth near a rest; at least 10 ms, and so much that the board's queue always reaches to a stop. It ends
+where the motors are then, fractions of a step included (`Cutter`); its ramp follows the speed along the way.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware.protocol import Segment
-from armkin.board.firmware.segments import Counts, cycles_of
+from armkin.board.firmware.segments import Counts, Cutter, changing
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
-from armkin.motors import motor_accel, pulses
+from armkin.motors import motor_accel, places
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -28,8 +26,6 @@ if TYPE_CHECKING:
 _LEAST, _MOST = 0.010, 0.050  # [s] a segment
 _GROWTH = 0.12  # of the time since the start, or to the end
 _FINE = 0.005  # [s] between the samples from which the spans are chosen
-_TICK = 1300  # [cycles] slower segments are oversampled down to about this
-_LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
 _QUEUED = 25  # segments that are surely in the board's queue
 _BLOCK = 512  # segments that are made at once
 
@@ -49,22 +45,15 @@ class CurveSegments:
     def __iter__(self) -> Iterator[Segment]:
         """The segments in order."""
         bounds = self.bounds()
-        fastest = np.abs(self.arm.motor_gain) @ self.arm.max_speed
-        per_step = [self.clock // (4 * max(1, math.ceil(rate - 1e-9))) for rate in fastest.tolist()]
-        carry, at = 0.0, self.start
+        cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
         for first in range(0, len(bounds) - 1, _BLOCK):
             t = bounds[first : first + _BLOCK + 1]
-            counts = pulses(self.arm, self.stretch.at(t))
+            at = places(self.arm, self.stretch.at(t))
             if first + _BLOCK >= len(bounds) - 1:
-                counts[-1] = self.end
-            speed = np.linalg.norm(self.stretch.at(t, 1) @ self.arm.motor_gain.T, axis=1)
+                at[-1] = self.end
+            speed = np.linalg.norm(self.stretch.at(t, 1) @ self.arm.motor_gain.T, axis=1).tolist()
             for k in range(len(t) - 1):
-                steps = [int(b - a) for a, b in zip(at, counts[k + 1], strict=True)]
-                exact = float(t[k + 1] - t[k]) * self.clock + carry
-                one = self._segment(steps, exact, float(speed[k]), float(speed[k + 1]), per_step)
-                carry = exact - cycles_of(one)
-                at = counts[k + 1]
-                yield one
+                yield cutter.piece(float(t[k + 1] - t[k]), at[k + 1].tolist(), changing(speed[k], speed[k + 1]))
 
     def __len__(self) -> int:
         return len(self.bounds()) - 1
@@ -93,31 +82,6 @@ class CurveSegments:
         across = np.linalg.norm(bend - along * (along * bend).sum(axis=1, keepdims=True), axis=1)
         stop = (np.abs(qd @ self.arm.motor_gain.T) / motor_accel(self.arm)).max(axis=1)
         return np.sqrt(8 * self.tolerance / np.maximum(across, 1e-9)), stop
-
-    def _segment(self, steps: list[int], exact: float, v0: float, v1: float, per_step: list[int]) -> Segment:
-        """One segment of about `exact` cycles, its speed going from v0 to v1 (only their ratio counts)."""
-        n = max(map(abs, steps))
-        cycles = max(exact, float(self.min_interval))
-        over = max(1, int(cycles / (_TICK * max(n, 1))))
-        if n and n <= 127:
-            over = min(over, max(255 // n, 1))
-        over = max(over, math.ceil(1.6 * cycles / (_LONGEST * max(n, 1))))
-        ticks = over * max(n, 1)
-        mean = cycles / ticks
-        # The fastest tick: right for the speed there, and slow enough for every motor.
-        share = (v0 + v1) / 2 / max(v0, v1, 1e-12)
-        needed = max(
-            (math.ceil((4 * (abs(s) - 1) * per + 4) / ticks) for s, per in zip(steps, per_step, strict=True) if s),
-            default=0,
-        )
-        fast = max(mean * share, float(min(needed, mean)), float(self.min_interval))
-        fast = min(fast, mean)
-        change = 2 * (mean - fast)
-        add = round(256 * (change if v0 > v1 else -change) / ticks)
-        interval = round(mean - add * (ticks - 1) / 512 + (0.5 if add else 0.0))
-        last = (256 * interval + (ticks - 1) * add) >> 8
-        interval += max(0, max(self.min_interval, needed) - min(interval, last))
-        return Segment(ticks, interval, add, tuple(steps))
 
 
 def _reaching(stop: Array, step: float) -> Array:

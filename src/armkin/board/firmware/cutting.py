@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, line
+from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, along
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.plan import check_limits, check_rates
 from armkin.motion.plan import plan as plan_joints
 from armkin.motion.trajectory import Straight
 from armkin.motors import joints as joints_of
-from armkin.motors import motor_accel, motor_names, pulses
+from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -70,20 +70,11 @@ class Cut:
             at = end
 
     def _move(self, stretch: Stretch, start: Counts, end: Counts) -> Move:
+        if isinstance(stretch, Straight) and stretch.law.length and (start != end).any():
+            return along(start.tolist(), end.tolist(), stretch.law, clock=self.clock, min_interval=self.min_interval)
         arm = self.trajectory.arm
-        if not (isinstance(stretch, Straight) and (stretch.law.is_trapezoid or stretch.duration == 0)):
-            parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
-            return Move(start, end, parts, round(stretch.duration * self.clock), 0.0)
-        brakes = motor_accel(arm)
-        return line(
-            start.tolist(),
-            end.tolist(),
-            stretch.law.peak,
-            stretch.law.accel,
-            brakes=brakes,
-            clock=self.clock,
-            min_interval=self.min_interval,
-        )
+        parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
+        return Move(start, end, parts if stretch.duration else (), round(stretch.duration * self.clock), curve=True)
 
 
 def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> Cut:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _SLOW = 26  # /256: the second approach runs at a tenth
 _GENTLE = 0.25  # of max_speed, on the way to the home pose
+_MOST = 2**30  # of counts and counts/s
 _MARGIN = 1.25  # of the joint's range: how far a switch may be
 
 
@@ -186,13 +187,13 @@ def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
         rate[axis] = int(np.rint(value))
     leader = float(np.abs(gain).max())
     fastest, slowest = max(map(abs, rate)), min((abs(r) for r in rate if r), default=0)
-    if fastest > 32767 or slowest < 1:
+    if fastest > _MOST or slowest < 1:
         raise UsageError(
-            f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to 32767 can be"
+            f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to {_MOST} can be"
         )
     backoff = math.ceil(leader * homing.backoff * unit)
-    if backoff > 65535:
-        raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; 65535 can be")
+    if backoff > _MOST:
+        raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; {_MOST} can be")
     span = float(arm.upper[j] - arm.lower[j])
     if not math.isfinite(span):
         if arm.prismatic[j]:

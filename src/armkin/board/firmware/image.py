@@ -7,6 +7,10 @@ import zlib
 from dataclasses import dataclass
 
 
+_LAYOUT = 2
+_AXIS = 21  # bytes
+
+
 @dataclass(frozen=True)
 class AxisImage:
     """One axis of the configuration image; an unused one is all zero."""
@@ -18,6 +22,20 @@ class AxisImage:
     home: int = 0
     max_rate: int = 0
     max_accel: int = 0
+
+
+@dataclass(frozen=True)
+class GuardImage:
+    """A limit switch: while it is pressed, nothing moves with a positive sum of weight x rate."""
+
+    closed: bool = False  # normally closed
+    weight: tuple[int, ...] = ()  # a byte each; all 0: the switch guards nothing
+
+    def pack(self, axes: int) -> bytes:
+        """Its bytes, for so many axes."""
+        weight = self.weight or (0,) * axes
+        used = any(weight)
+        return struct.pack(f"<B{axes}b", used | (used and self.closed) << 1, *weight)
 
 
 @dataclass(frozen=True)
@@ -35,8 +53,10 @@ class Image:
 
     axes: tuple[AxisImage, ...]
     rows: tuple[RowImage, ...] = ()
+    guards: tuple[GuardImage, ...] = ()  # one for every switch input of the board
     abort_closed: bool = False
     enable_high: bool = False
+    power_sensed: bool = False
     step_high: int = 10
     step_low: int = 10
     dir_setup: int = 2
@@ -46,35 +66,47 @@ class Image:
     def pack(self) -> bytes:
         """The image's bytes."""
         n = len(self.axes)
-        flags = self.abort_closed | self.enable_high << 1
+        flags = self.abort_closed | self.enable_high << 1 | self.power_sensed << 2
         times = (self.step_high, self.step_low, self.dir_setup, self.wake)
-        out = struct.pack("<8BI", 1, n, len(self.rows), flags, *times, self.meaning)
+        out = struct.pack("<8BI", _LAYOUT, n, len(self.rows), flags, *times, self.meaning)
         for a in self.axes:
             marks = a.used | a.invert << 1
-            out += struct.pack("<BiiiHI", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
+            out += struct.pack("<BiiiII", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
+        out += b"".join(guard.pack(n) for guard in self.guards)
         for r in self.rows:
             out += struct.pack(f"<ii{n}h", r.lower, r.upper, *r.weight)
         return out
 
     @classmethod
-    def unpack(cls, data: bytes) -> Image | None:
+    def unpack(cls, data: bytes, switches: int) -> Image | None:
         """The image of its bytes; None if layout or length are wrong (ranges are the board's to check)."""
         if len(data) < 12:
             return None
         layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", data)
-        if layout != 1 or flags > 3 or len(data) != 12 + 19 * n + (8 + 2 * n) * rows:
+        at = 12
+        if layout != _LAYOUT or flags > 7 or len(data) != at + _AXIS * n + (1 + n) * switches + (8 + 2 * n) * rows:
             return None
         axes = []
-        for i in range(n):
-            marks, *fields = struct.unpack_from("<BiiiHI", data, 12 + 19 * i)
+        for _ in range(n):
+            marks, *fields = struct.unpack_from("<BiiiII", data, at)
+            at += _AXIS
             if marks > 3:
                 return None
             axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))
+        guards = []
+        for _ in range(switches):
+            marks, *weight = struct.unpack_from(f"<B{n}b", data, at)
+            at += 1 + n
+            if marks > 3 or any(weight) != bool(marks & 1):
+                return None
+            guards.append(GuardImage(bool(marks & 2), tuple(weight)))
         limits = []
-        for i in range(rows):
-            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", data, 12 + 19 * n + (8 + 2 * n) * i)
+        for _ in range(rows):
+            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", data, at)
+            at += 8 + 2 * n
             limits.append(RowImage(lower, upper, tuple(weight)))
-        return cls(tuple(axes), tuple(limits), bool(flags & 1), bool(flags & 2), high, low, setup, wake, meaning)
+        bits = (bool(flags >> bit & 1) for bit in range(3))
+        return cls(tuple(axes), tuple(limits), tuple(guards), *bits, high, low, setup, wake, meaning)
 
     def crc(self) -> int:
         """What INFO's `config` says while this image is in force."""

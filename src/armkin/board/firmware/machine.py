@@ -48,6 +48,9 @@ _WHY = {
     Error.TRAVEL: "no switch was met on the whole way: is it wired, is homing.direction right?",
     Error.TIME: "homing took too long",
     Error.LOST: "its position is lost",
+    Error.POWER: "the motors have no power",
+    Error.LIMIT_SWITCH: "a limit switch is pressed: move away from it",
+    Error.SPILL: "more was sent than the board could keep",
 }
 
 
@@ -291,7 +294,8 @@ class Machine:
         moving = sorted(move.moving, key=lambda k: axes[k])
         at = [int(move.start[k]) for k in moving]
         room = self.info.frame - 4
-        source = (Segment(s.ticks, s.interval, s.add, tuple(s.steps[k] for k in moving)) for s in move.segments)
+        places = [count * protocol.STEP + protocol.HALF for count in at]
+        source = (s.of(moving) for s in move.segments)
         todo: list[Segment] = []
         if move.segments and self.session.state == State.IDLE and not self.session.under_way:
             lead = _LEAD[self.session.damaged]
@@ -308,7 +312,8 @@ class Machine:
             part, todo = todo[:n], todo[n:]
             if not todo:
                 todo = list(islice(source, 1))
-            end = [a + sum(s.steps[i] for s in part) for i, a in enumerate(at)]
+            places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
+            end = [p // protocol.STEP for p in places]
             yield _Batch([axes[k] for k in moving], at, end, part, not todo, clock)
             at = end
 

@@ -1,21 +1,17 @@
-"""Straight lines in counts, from rest to rest, as exact device segments.
+"""Motion in counts as exact device segments (firmware/PROTOCOL.md, section 6).
 
-All motors follow one trapezoid (speed up, cruise, slow down) over the line's parameter, so they start and
-stop together. The motor with the most steps, the *leader*, sets the ticks:
+    counts over time  --pieces of constant acceleration-->  segments {ticks, interval, add, bend, rates[]}
 
-    trapezoid t(n), n = leader steps  --cut-->  segments {ticks, interval, add, steps[]}
-
-Segments end on whole leader steps, and their steps are differences of one rounded line: their sums are
-exact by construction. A segment's ticks are evenly spaced up to a linear change of the interval, which the
-device adds up (firmware/PROTOCOL.md, section 6). Within a ramp a segment spans 12 % of the time since (or
-until) standstill: so few that a 32-segment queue always holds the way to a stop, so many that no step is
-farther than a count or so from the trapezoid.
+A segment is a straight line in counts. Its motors are wherever the motion is at its end, to a fraction of a step, and
+go on from there: `Places` follows them as the device does, so that no step is early or late because a segment ends.
+The interval between ticks is a parabola in the number of ticks, 1 / (v + a t) to second order: where the speed changes by
+12 % over a segment, the acceleration is right to 1.5 %.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -23,22 +19,27 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.firmware.protocol import Segment
+from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment, nearest_rate
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.motion.profile import Profile, trapezoid
 
 Counts = NDArray[np.int64]
 
 CLOCK = 16_000_000  # [1/s] of every board so far
-MIN_INTERVAL = 400  # [cycles] between ticks
+MIN_INTERVAL = 448  # [cycles] between ticks
 
-_GROWTH = 1.12  # the least: time at a ramp segment's end over time at its start, seen from standstill
-_SHORTEST = (0.002, 0.02)  # [s] a ramp segment's time at least: as long as its steps stay where they belong
-_RAMP = 24  # segments that a ramp has, about, at most
-_AHEAD = 26  # segments that the board's queue surely holds (32, but for those under way)
-_CRUISE = 0.05  # [s] a cruise segment's time at least
-_TICK = 1300  # [cycles] slower segments are oversampled down to about this
-_LONGEST = 60_000  # [cycles] of an interval; the device takes 65535
+# Speed at a segment's fast end over that at its slow end, from a ramp's top down: so few that the board's queue (32) holds
+# all of the last ramp.
+_RATIOS = (1.13,) * 22 + (1.25, 1.35, 1.5, 1.8, 2.2)
+_FIRST = 0.002  # [s] a ramp's first segment at least
+_CRUISE = (0.2, 0.4)  # [s] a cruise segment
+_JERK = 0.02  # [s] a segment in which the acceleration changes
+_TICK = 1.12  # shortest intervals that a tick lasts
+_FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
+_FEWEST = 32  # ticks of a segment, where the board can make them
+_LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
+_MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
 
 
 class Segments(Protocol):
@@ -51,23 +52,128 @@ class Segments(Protocol):
 
 @dataclass(frozen=True)
 class Move:
-    """One straight line from rest to rest."""
+    """A motion from rest to rest."""
 
     start: Counts  # (motors,)
     end: Counts  # (motors,)
     segments: Segments
     cycles: int  # of the clock, all segments together
-    peak: float  # [1/s] greatest speed, in lines per second; 0: not a line
+    curve: bool = False
 
     @property
     def moving(self) -> list[int]:
         """Motors that take part: on a line those that end elsewhere, on a curve all."""
-        return [k for k in range(len(self.start)) if self.peak == 0 or self.start[k] != self.end[k]]
+        return [k for k in range(len(self.start)) if self.curve or self.start[k] != self.end[k]]
 
-    @property
-    def leader(self) -> int:
-        """Steps of the motor with the most steps."""
-        return int(np.abs(self.end - self.start).max(initial=0))
+
+def cycles_of(segment: Segment) -> int:
+    """Clock cycles of a segment, exactly as the device counts them."""
+    return segment.ticks * segment.interval + _added(segment.ticks, segment.add, segment.bend)
+
+
+def _added(ticks: int, add: int, bend: int) -> int:
+    """Cycles that `add` and `bend` give to all intervals together."""
+    if add == 0:
+        return 0
+    blocks = (np.arange(ticks - 1) + BLOCK - 1 - (ticks - 1) % BLOCK) // BLOCK  # counted from the end
+    adds = (add * 256 + 4 * bend * blocks) >> 8
+    return int((np.cumsum(adds) >> 16).sum())
+
+
+class Cutter:
+    """Cuts a motion from rest: where every motor is, to 2^-23 step, and what rounding has done to the time."""
+
+    def __init__(self, start: Sequence[int], clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> None:
+        self.clock, self.min_interval = clock, min_interval
+        self.places = [int(count) * STEP + HALF for count in start]
+        self._late = 0.0  # [cycles] that the segments so far should have lasted longer
+
+    def piece(self, seconds: float, counts: Sequence[float], change: float = 0.0) -> Segment:
+        """A straight line to `counts` (motors,), fractions included, in so many seconds.
+
+        change: speed at its end less that at its beginning, over the mean: -2 to 2. The speed changes evenly.
+        """
+        left = [round(c * STEP) + HALF - p for c, p in zip(counts, self.places, strict=True)]
+        most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
+        exact = seconds * self.clock + self._late
+        ticks = self._ticks(exact, most)
+        add, bend = _parabola(exact / ticks, ticks, change)
+        slack = _added(ticks, add, bend)
+        interval = round((exact - slack) / ticks)
+        segment = Segment(ticks, interval, add, tuple(nearest_rate(x / ticks) for x in left), bend)
+        short = self.min_interval - min(segment.interval, segment.last_interval)
+        if short > 0:
+            segment = Segment(ticks, interval + short, add, segment.rates, bend)
+        self.places = [p + ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
+        self._late = min(exact - cycles_of(segment), float(ticks))  # what the shortest interval costs is not made up for
+        return segment
+
+    def _ticks(self, cycles: float, steps: float) -> int:
+        """How many ticks a piece has: whole ones for each step of its fastest motor, if it makes many."""
+        least = _TICK * self.min_interval
+        each = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
+        tick = max(least, min(each / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
+        over = int(each / tick) if each < math.inf else 0
+        if 1 <= over <= _FINE:
+            tick = each / over
+        elif over == 0 and each < math.inf:
+            tick = each
+        return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
+
+
+def _parabola(mean: float, ticks: int, change: float) -> tuple[int, int]:
+    """`add` and `bend` of a segment whose speed changes evenly: mean interval [cycles], ticks, see `Cutter.piece`."""
+    if abs(change) < 1e-9 or ticks < 2:
+        return 0, 0
+    slow, fast = 1 - change / 2, 1 + change / 2  # speeds at its ends, in means
+    c = (fast / slow) ** 2 - 1  # interval(x) = I / sqrt(1 + c x), x from 0 to 1 over the ticks
+    first = mean / slow
+    # Its slope, made linear: right at the two points where the error of a line is least (Chebyshev's).
+    x = np.array([0.5 - math.sqrt(0.125), 0.5 + math.sqrt(0.125)])
+    slope = -first * c / 2 * (1 + c * x) ** -1.5
+    curve = (slope[1] - slope[0]) / (x[1] - x[0])
+    at = slope[0] - curve * x[0]
+    bend = max(-32767, min(32767, round(curve * BLOCK / ticks**2 * 2**22)))
+    if ticks <= BLOCK:
+        bend = 0
+    middle = at + curve / 2  # mean slope: what rounding `bend` changes is taken from `add`
+    blocks = (ticks - 1) // BLOCK
+    add = round(middle / ticks * 65536 - bend * blocks / 128)
+    last = add * 256 + 4 * bend * blocks
+    return (add, bend) if add * last > 0 else (round(middle / ticks * 65536), 0)
+
+
+def along(
+    start: Sequence[int],
+    end: Sequence[int],
+    law: Profile,
+    *,
+    clock: int = CLOCK,
+    min_interval: int = MIN_INTERVAL,
+) -> Move:
+    """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length."""
+    first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
+    span = last - first
+    if not span.any():
+        return Move(first, last, (), 0)
+    cutter = Cutter(first.tolist(), clock, min_interval)
+    bounds = _on_steps(law, list(_bounds(law)), int(np.abs(span).max()))
+    times = np.array(bounds)
+    done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
+    made = []
+    for k, (a, b) in enumerate(pairwise(bounds)):
+        share = 1.0 if k + 2 == len(bounds) else done[k + 1]
+        made.append(cutter.piece(b - a, (first + span * share).tolist(), changing(float(speed[k]), float(speed[k + 1]))))
+    if [p // STEP for p in cutter.places] != last.tolist():
+        raise AssertionError("a line's rates do not lead to its end")
+    return Move(first, last, tuple(made), sum(map(cycles_of, made)))
+
+
+def changing(begin: float, end: float) -> float:
+    """`Cutter.piece`'s change of speed, from `begin` to `end`; next to rest a piece has one speed."""
+    if min(begin, end) < (begin + end) / 8:
+        return 0.0
+    return max(-1.0, min(1.0, 2 * (end - begin) / (begin + end)))
 
 
 def line(
@@ -76,197 +182,52 @@ def line(
     top: float,
     accel: float,
     *,
-    brakes: Array | None = None,
     clock: int = CLOCK,
     min_interval: int = MIN_INTERVAL,
 ) -> Move:
-    """The segments of a straight line in counts, from rest to rest.
+    """A straight line in counts from rest to rest: `top` [1/s] and `accel` [1/s^2] at most, both in lines."""
+    return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
-    top: [1/s] greatest speed, accel: [1/s^2] greatest acceleration, both in lines. brakes: [counts/s^2] of
-    every motor's hold, see `_holds`. The leader's rate must be within the device's: `clock` / `min_interval`.
-    """
-    first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
-    n = int(np.abs(last - first).max(initial=0))
-    if n == 0:
-        return Move(first, last, (), 0, 0.0)
-    low, high = _SHORTEST
-    shortest = min(max(low, math.sqrt(4 / (accel * n))), high)
-    for coarse in (1, 2, 4, 8):
-        ramp = _Trapezoid(n, top * n, accel * n, shortest * coarse)
-        segments, total = _cut(ramp, last - first, clock, min_interval)
-        if brakes is None or _holds(segments, brakes, clock):
+
+def _bounds(law: Profile) -> Iterable[float]:
+    """When segments end: the speed changes by 12 % in each, cruises have long ones."""
+    yield 0.0
+    ramp = law.peak / max(law.accel, 1e-12)
+    for k, (t0, t1) in enumerate(pairwise(law.times.tolist())):
+        accel, jerk = float(law.states[k, 2]), float(law.jerk[k])
+        if t1 - t0 < 1e-9:
+            continue
+        if jerk == 0.0 and accel != 0.0:
+            yield from _ramp(law, t0, t1, accel)
+            continue
+        longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
+        parts = math.ceil((t1 - t0) / longest)
+        yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1))
+
+
+def _ramp(law: Profile, t0: float, t1: float, accel: float) -> list[float]:
+    """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
+    v0, v1 = (float(v) for v in law.at(np.array([t0, t1]), 1))
+    if accel < 0:
+        v1 = max(0.0, v0 + accel * (t1 - t0))
+    low, high = min(v0, v1), max(v0, v1)
+    least, speeds = max(low, abs(accel) * _FIRST), [high]
+    for ratio in _RATIOS:
+        if speeds[-1] / ratio < least * 1.05:
             break
-    return Move(first, last, tuple(segments), total, ramp.peak / n)
+        speeds.append(speeds[-1] / ratio)
+    speeds = speeds[1:]
+    times = sorted(t0 + (v - v0) / accel for v in speeds)
+    return [t for t in times if t0 + 1e-6 < t < t1 - 1e-6] + [t1]
 
 
-def cycles_of(segment: Segment) -> int:
-    """Clock cycles of a segment, exactly as the device counts them."""
-    if segment.add == 0:
-        return segment.ticks * segment.interval
-    return segment.ticks * segment.interval + int(((np.arange(segment.ticks) * segment.add) >> 8).sum())
-
-
-def progress(move: Move, cycles: Array) -> Array:
-    """How far along its line a move is (0 to 1) after so many clock cycles: (T,) -> (T,)."""
-    if not move.segments:
-        return np.ones_like(cycles)
-    ends = np.cumsum([cycles_of(s) for s in move.segments])
-    steps = np.array([max(abs(x) for x in s.steps) for s in move.segments])
-    which = np.minimum(np.searchsorted(ends, cycles, side="left"), len(ends) - 1)
-    first = np.array([s.interval for s in move.segments], dtype=float)[which]
-    slope = np.array([s.add for s in move.segments], dtype=float)[which] / 256
-    ticks = np.array([s.ticks for s in move.segments], dtype=float)[which]
-    # time of tick j: j first + j (j - 1) / 2 slope; its inverse in the form that slope 0 allows
-    b = first - slope / 2
-    begin = np.concatenate([[0], ends[:-1]])[which]
-    whole = ticks * (b + ticks * slope / 2)  # the device's is up to a cycle a tick shorter
-    t = (cycles - begin) * whole / (ends[which] - begin)
-    j = 2 * t / (b + np.sqrt(np.maximum(b * b + 2 * slope * t, 0.0)))
-    before = np.concatenate([[0], np.cumsum(steps)[:-1]])[which]
-    done = before + steps[which] * np.minimum(j / ticks, 1.0)
-    return np.asarray(np.minimum(done / steps.sum(), 1.0))
-
-
-def _holds(segments: list[Segment], brakes: Array, clock: int) -> bool:
-    """Whether the queue always holds the way to a stop, as the board sees it.
-
-    To the board a motor with one step in a short segment is fast, however seldom its steps are; so its
-    time to a stop, u, may be far above the plan's. It holds when the queued time falls to
-    u^2 / (u + e) + u / 32 + 2 ms, e being u at the queue's end (firmware/PROTOCOL.md, section 7).
-    """
-    if len(segments) <= _AHEAD:
-        return True
-    ends = np.cumsum([cycles_of(s) for s in segments]) / clock
-    steps = np.abs([s.steps for s in segments]) / (brakes / clock)
-    ticks = np.array([s.ticks for s in segments])[:, None]
-    first, last = (np.array(x)[:, None] for x in zip(*((s.interval, s.last_interval) for s in segments), strict=True))
-    begins = np.concatenate([[0.0], ends[:-1]])
-    u = (steps / (ticks * first)).max(axis=1)[:-_AHEAD]
-    e = (steps / (ticks * last)).max(axis=1)[_AHEAD - 1 : -1]
-    queued = ends[_AHEAD - 1 : -1] - begins[:-_AHEAD]
-    return bool(np.all(queued > u * u / np.maximum(u + e, 1e-9) + u / 32 + 0.004))
-
-
-def _cut(ramp: _Trapezoid, span: Counts, clock: int, min_interval: int) -> tuple[list[Segment], int]:
-    """A trapezoid's segments and their cycles."""
-    n = ramp.n
-    segments: list[Segment] = []
-    total, carry = 0, 0.0
-    bounds = list(ramp.bounds())
-    for a, b in pairwise(bounds):
-        steps = _rounded(span, b, n) - _rounded(span, a, n)
-        exact = (ramp.time(b) - ramp.time(a)) * clock
-        ticks, interval, add = _spacing(ramp, a, b, exact + carry, clock, min_interval)
-        segments.append(Segment(ticks, interval, add, tuple(int(s) for s in steps)))
-        cycles = cycles_of(segments[-1])
-        # What rounding took or gave is made up for by the next segment; time lost to a speed limit is not.
-        carry = min(exact + carry - cycles, 0.0) if cycles > exact + carry + ticks else exact + carry - cycles
-        if ramp.cruising(a, b):
-            carry = 0.0
-        total += cycles
-    return segments, total
-
-
-@dataclass(frozen=True)
-class _Trapezoid:
-    """Speed up, cruise, slow down over n leader steps; speeds in steps/s."""
-
-    n: int
-    top: float
-    accel: float
-    shortest: float  # [s] a ramp's segment
-
-    @property
-    def peak(self) -> float:
-        """Greatest speed that is reached."""
-        return min(self.top, math.sqrt(self.accel * self.n))
-
-    @property
-    def way(self) -> float:
-        """Steps of one ramp."""
-        return float(self.peak**2 / (2 * self.accel))
-
-    def time(self, at: float) -> float:
-        """Seconds from standstill to step `at`."""
-        rise = self.peak / self.accel
-        if at <= self.way:
-            return math.sqrt(2 * at / self.accel)
-        if at < self.n - self.way:
-            return rise + (at - self.way) / self.peak
-        whole = 2 * rise + (self.n - 2 * self.way) / self.peak
-        return whole - math.sqrt(2 * (self.n - at) / self.accel)
-
-    def speed(self, at: float) -> float:
-        """Speed [steps/s] at step `at`."""
-        return min(self.peak, math.sqrt(2 * self.accel * max(min(at, self.n - at), 0.0)))
-
-    def cruising(self, a: int, b: int) -> bool:
-        """Whether a segment has no part of a ramp."""
-        return a >= self.way and b <= self.n - self.way
-
-    @property
-    def growth(self) -> float:
-        """Time at a ramp segment's end over time at its start: the whole ramp is in the queue before it begins."""
-        ramp = self.peak / self.accel
-        for growth in (_GROWTH, 1.14, 1.17, 1.2, 1.25, 1.3, 1.4):
-            geometric = max(ramp * (growth - 1) / self.shortest, 1.0)
-            if 1 / (growth - 1) + math.log(geometric) / math.log(growth) <= _RAMP:
-                return growth
-        return 1.5
-
-    def bounds(self) -> Iterator[int]:
-        """Leader steps where segments end: geometric in the ramps, even between them."""
-        rise, growth = [0], self.growth
-        whole = min(int(self.way), self.n // 2)
-        while rise[-1] < whole:
-            t = self.time(rise[-1])
-            t = max(t * growth, t + self.shortest)
-            at = max(int(self.accel * t * t / 2), rise[-1] + 1)
-            rise.append(whole if at + (at - rise[-1]) // 2 > whole else at)
-        middle = self.n - 2 * whole
-        if len(rise) > 1 and 2 * middle < rise[-1] - rise[-2]:
-            # Too short for a segment of its own: the way up takes it along.
-            yield from (*rise[:-1], whole + middle)
-            rise.pop()
-        else:
-            yield from rise
-            longest = max(_CRUISE, (growth - 1) * self.peak / self.accel)
-            parts = min(max(1, math.ceil(middle / (self.peak * longest))), middle)
-            parts = max(parts, math.ceil(middle / 30_000))
-            yield from (whole + middle * i // parts for i in range(1, parts))
-            if middle == 0:
-                rise.pop()
-        yield from (self.n - at for at in reversed(rise))
-
-
-def _spacing(ramp: _Trapezoid, a: int, b: int, cycles: float, clock: int, min_interval: int) -> tuple[int, int, int]:
-    """Ticks, interval and add that take a segment from leader step a to b in about `cycles`."""
-    steps = b - a
-    over = max(1, int(cycles / (_TICK * steps)))
-    if steps <= 127:
-        over = min(over, 255 // steps)  # as the short form has it
-    over = max(over, math.ceil(1.6 * cycles / (_LONGEST * steps)))
-    ticks = over * steps
-    if ticks > 65535:
-        raise UsageError("this motion is slower than the device can time; choose a higher speed")
-    mean = cycles / ticks
-    # Intervals at the two ends: right at the faster one, and at the other such that the time is right.
-    fast = mean
-    inner = (b - a) * 0.2  # a corner of the trapezoid nearer than that to an end changes nothing
-    corner = any(a + inner < at < b - inner for at in (ramp.way, ramp.n - ramp.way))
-    if not corner and ramp.speed(a) != ramp.speed(b):
-        fast = min(clock / (over * max(ramp.speed(a), ramp.speed(b))), mean)
-    slow = 2 * mean - fast
-    change = fast - slow if ramp.speed(b) > ramp.speed(a) else slow - fast
-    add = round(256 * change / ticks)
-    interval = round(mean - add * (ticks - 1) / 512 + (0.5 if add else 0.0))
-    # Rounding must not make any tick faster than the plan's top speed, nor than the device.
-    floor = max(min_interval, math.ceil(clock / (over * ramp.peak) - 1e-9))
-    last = (256 * interval + (ticks - 1) * add) >> 8
-    interval += max(0, floor - min(interval, last))
-    return ticks, interval, add
-
-
-def _rounded(span: Counts, at: int, n: int) -> Counts:
-    """span * at / n rounded half away from zero, in whole numbers."""
-    return np.asarray(np.sign(span) * ((2 * np.abs(span) * at + n) // (2 * n)))
+def _on_steps(law: Profile, bounds: list[float], steps: int) -> list[float]:
+    """Bounds moved to where the motor with the most steps has made whole ones, where it makes several between them."""
+    if len(bounds) < 3:
+        return bounds
+    times = np.array(bounds)
+    at, speed = law.at(times) / law.length * steps, law.at(times, 1) / law.length * steps
+    near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
+    inner = np.where((near > 4) & (speed[1:-1] > 0), (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9), 0.0)
+    times[1:-1] += inner
+    return [float(t) for t in times]

@@ -30,6 +30,7 @@ _LATE = 0.03  # [s] an answer may take
 _PROBES = 8
 _UNDER_WAY = 16  # frames
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
+_QUESTION = 12  # [bytes] of a STATUS? on the line
 
 
 class DeviceError(LinkError):
@@ -39,6 +40,10 @@ class DeviceError(LinkError):
         self.error = Error(error) if error in Error._value2member_map_ else Error.OK
         self.detail, self.state = detail, state
         super().__init__(f"the board refused: {self.error.name} ({error}), detail {detail}")
+
+
+class ReplacedError(LinkError):
+    """Another program has opened a session with the board: this one is over."""
 
 
 @dataclass
@@ -65,6 +70,7 @@ class Session:
         self._free = 0
         self._queue = 0
         self._tag = 0
+        self._digest = 0
         self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
         self.latest: Status | None = None  # as last heard
         self._status: Status | None = None
@@ -110,25 +116,34 @@ class Session:
         raise self._silent()
 
     def _hello(self, timeout: float) -> Info | None:
-        nonce, self._tag = secrets.randbits(32), (self._tag + 1) & 255
+        # the low half is the session's digest, and 0 means none
+        nonce, self._tag = secrets.randbits(16) << 16 | 1 + secrets.randbelow(65535), (self._tag + 1) & 255
         self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)))
         end = self.port.now() + timeout
         while self.port.now() < end:
             for payload in self._splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
                 version = protocol.info_version(payload)
                 if version is not None and version != protocol.VERSION:
-                    raise LinkError(
-                        f"the board's firmware speaks protocol {version}, this armkin {protocol.VERSION}: "
-                        "flash the firmware that came with it (make -C firmware flash PORT=...)"
-                    )
+                    raise self._other_version(version)
                 info = protocol.parse(payload)
                 if isinstance(info, Info) and info.nonce == nonce:
                     self._begin(info)
                     return info
         return None
 
+    def _other_version(self, version: int) -> LinkError:
+        return LinkError(
+            f"the firmware of the board on {self.port.name} speaks protocol {version}, this armkin "
+            f"{protocol.VERSION}: nothing was moved\n"
+            "flash the firmware that came with this armkin: make -C firmware flash BOARD=... PORT=...",
+            port=self.port.name,
+            board_protocol=version,
+            protocol=protocol.VERSION,
+        )
+
     def _begin(self, info: Info) -> None:
         self.info = info
+        self._digest = info.nonce & 0xFFFF
         self._waiting.clear()
         self._sent.clear()
         self._next, self._free, self._queue = 0, info.queue, info.queue
@@ -203,35 +218,50 @@ class Session:
         self.port.write(data)
         self._clear = max(self._clear, self.port.now()) + len(data) * 10 / self.port.baud
 
-    def _write_frame(self, data: bytes) -> None:
+    def _write_frame(self, data: bytes, room: int) -> int:
+        """Write a frame, on a bad line as often as `room` bytes allow; the bytes written."""
         self._written += 1
-        self._write(data * (_COPIES if self.noisy else 1))  # a copy too many moves nothing
+        copies = max(1, min(_COPIES, room // len(data))) if self.noisy else 1
+        self._write(data * copies)  # a copy too many moves nothing
+        return copies * len(data)
+
+    def _room(self, size: int, first: int) -> int:
+        """Bytes that may be sent when `size` are under way, of which the first frame has `first`.
+
+        What follows the frame that the board is busy with must fit into its receive buffer, a STATUS? included.
+        """
+        assert self.info is not None
+        return min(self._bytes, first + self.info.receive - _QUESTION) - size
 
     def _fill(self) -> None:
         """Send new frames as far as credit and window allow."""
         credit = self._free - sum(frame.segments for frame, _ in self._sent)
         size = sum(len(data) for _, data in self._sent)
-        while self._waiting and len(self._sent) < _UNDER_WAY and size < self._bytes:
+        while self._waiting and len(self._sent) < _UNDER_WAY:
             if self._waiting[0].segments > credit:
                 return
+            data = protocol.wire(self._waiting[0].make((self._next + len(self._sent)) & 255))
+            first = len(self._sent[0][1]) if self._sent else len(data)
+            room = self._room(size, first)
+            if self._sent and len(data) > room:
+                return
             frame = self._waiting.popleft()
-            data = protocol.wire(frame.make((self._next + len(self._sent)) & 255))
             self._sent.append((frame, data))
-            credit, size = credit - frame.segments, size + len(data)
-            self._write_frame(data)
+            credit -= frame.segments
+            size += self._write_frame(data, room)
 
     def _again(self) -> None:
         """Go back to the first frame that was not acknowledged."""
         self._gap = False
         self._bytes = _BYTES[0] if self.noisy else max(_BYTES[0], self._bytes // 2)
         self._write(b"\0")
-        size = 0
+        size, first = 0, len(self._sent[0][1])
         for _, data in self._sent:
-            if size >= self._bytes:
+            room = self._room(size, first)
+            if size and len(data) > room:
                 break  # what follows it would wait for it
-            size += len(data)
             self.resent += 1
-            self._write_frame(data)
+            size += self._write_frame(data, room)
 
     def _ask(self, page: int = 0) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
@@ -246,13 +276,25 @@ class Session:
                 continue
             self._heard = self.port.now()
             if isinstance(reply, Info):
+                self._same(reply.nonce & 0xFFFF)
                 continue  # of a HELLO that was repeated
+            if reply.error != Error.NO_SESSION:  # after a reset there is no session
+                self._same(reply.session)
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 self._measure(reply.tag)
             self._acknowledge(reply)
+
+    def _same(self, digest: int) -> None:
+        """Raise ReplacedError if a reply belongs to another session than this one."""
+        if digest != self._digest:
+            raise ReplacedError(
+                f"another program has taken over the board on {self.port.name}: this one has ended\n"
+                "only one program may move an arm; armkin status tells where it stands",
+                port=self.port.name,
+            )
 
     def _measure(self, tag: int) -> None:
         """Wait as long as an answer was late: so long the line is behind what was written already."""
@@ -273,7 +315,7 @@ class Session:
             if done:
                 self._clear, self._gap = max(self._clear, self.port.now()), False
                 self._bytes = _BYTES[0] if self.noisy else min(_BYTES[1], self._bytes + 20)
-            elif self._sent and isinstance(reply, Ack) and not isinstance(reply, Credit):
+            elif self._sent and isinstance(reply, Ack) and (not isinstance(reply, Credit) or reply.detail == Error.SPILL):
                 self._gap = True  # something behind the first frame has arrived, the first has not
         if reply.error and self._error is None:
             self._error = reply

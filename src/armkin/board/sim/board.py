@@ -15,6 +15,7 @@ from armkin.board.firmware.protocol import AxisImage, Error, Flag, Image, Info, 
 from armkin.board.sim.frames import RefusedError, axes_of, image_valid
 from armkin.board.sim.frames import batch as read_batch
 from armkin.board.sim.motors import Motors, row_value, within
+from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.hardware import Board
 
 _SILENCE = 0.5  # [s]
@@ -30,6 +31,7 @@ class SimBoard:
     def __init__(self, board: Board, switch: Callable[[int, Sequence[int]], bool] | None = None) -> None:
         self.board = board
         self.abort_level = True  # of the abort input, pulled up
+        self.power_level = True  # of the motors' supply
         self.hidden_cause = True
         self._switch = switch or (lambda number, net: True)
         self._boots = 0
@@ -61,10 +63,11 @@ class SimBoard:
             step = min(seconds, 0.001)
             seconds -= step
             self._silent += step
+            self._sense()
             if self.motors.state in (State.MOVING, State.HOMING) and self._silent >= _SILENCE:
                 self._end(Error.SILENCE)
-            if self.motors.state != State.IDLE and self._aborted():
-                self._end(Error.ABORT)
+            if self.motors.state != State.IDLE:
+                self._watch()
             self.motors.advance(step)
 
     def reset(self, power: bool = False) -> None:
@@ -73,9 +76,9 @@ class SimBoard:
         still = motors.state == State.IDLE
         motors.cut()
         self._net = motors.net
-        keep = still and not power and bool(motors.known)
+        keep = still and not power
         image = self._image.pack() if self._config else b""
-        self._retained = (image, motors.known, motors.base, self._drivers) if keep else None
+        self._retained = (image, motors.known & ~self.board.servo_mask, motors.base, self._drivers) if keep else None
         self._boots = 0 if power else self._boots
         self._power_up(cause=0 if self.hidden_cause else 1 if power else 2)
 
@@ -83,11 +86,14 @@ class SimBoard:
         board = self.board
         self._splitter = protocol.Splitter(board.frame)
         self._error, self._detail, self._next, self._nonce = Error.NO_SESSION, 0, 0, -1
+        self._digest = 0
         self._cause, self._boots = cause, self._boots + 1
-        self._image_bytes = bytearray(12 + 19 * len(board.axes) + (8 + 2 * len(board.axes)) * board.rows)
+        n = len(board.axes)
+        self._image_bytes = bytearray(12 + 21 * n + (1 + n) * len(board.switches) + (8 + 2 * n) * board.rows)
         self._image = Image(tuple(AxisImage() for _ in board.axes))
         self._config, self._drivers, self._pulses, self._silent = 0, False, False, 0.0
         self._was_retained = False
+        self._velocity = Velocity(board, self._image)
         self.motors = Motors(len(board.axes), board.clock, board.queue, self._level)
         self.motors.fault = self._end
         self.motors.net = list(self._net)
@@ -95,13 +101,42 @@ class SimBoard:
             image, known, counts, self._drivers = self._retained
             if image:
                 self._image_bytes[: len(image)] = image
-                self._image = self.motors.image = Image.unpack(image) or self._image
+                self._image = self.motors.image = Image.unpack(image, len(board.switches)) or self._image
                 self._config = zlib.crc32(image)
-            self.motors.known, self.motors.base, self.motors.plan = known, list(counts), list(counts)
+            self.motors.known = known
+            self.motors.rest_at(counts)
             self._was_retained = True
 
     def _level(self, number: int) -> bool:
         return self._switch(number, self.net)
+
+    def _sense(self) -> None:
+        if self._power_cut():
+            self.motors.known = 0
+
+    def _power_cut(self) -> bool:
+        return bool(self._config) and self._image.power_sensed and not self.power_level
+
+    def _pressed(self) -> list[int]:
+        """Switches that guard and are pressed."""
+        if not self._config:
+            return []
+        guards = enumerate(self._image.guards)
+        return [n for n, guard in guards if any(guard.weight) and self._level(n) == guard.closed]
+
+    def _watch(self) -> None:
+        """End the session if an input says so."""
+        if self._aborted():
+            self._end(Error.ABORT)
+        if self._power_cut():
+            self._end(Error.POWER)
+        for n in self._pressed():
+            if n != self.motors.homing and self._toward(n, self.motors.velocity()):
+                self._end(Error.LIMIT_SWITCH, n)
+
+    def _toward(self, switch: int, rates: Sequence[float]) -> bool:
+        parts = [w * r for w, r in zip(self._image.guards[switch].weight, rates, strict=True)]
+        return sum(parts) > max(map(abs, parts)) / 64
 
     def _aborted(self) -> bool:
         return bool(self._config) and self.abort_level == self._image.abort_closed
@@ -144,7 +179,7 @@ class SimBoard:
 
     def _ack(self) -> None:
         m = self.motors
-        ack = protocol.Ack(self._next, self._error, self._detail, m.state, m.free, m.queued())
+        ack = protocol.Ack(self._next, self._error, self._detail, m.state, m.free, m.queued(), self._digest)
         self._send(protocol.pack_ack(ack))
 
     def _hello(self, tag: int, version: int, nonce: int) -> None:
@@ -153,11 +188,12 @@ class SimBoard:
         elif nonce != self._nonce:
             self._end(Error.HELD)
             self._error, self._detail, self._next, self._nonce = Error.OK, 0, 0, nonce
+            self._digest = nonce & 0xFFFF
             self._splitter.bad = 0
         b = self.board
         info = Info(
-            tag, protocol.VERSION, (1, 0), nonce, b.number, len(b.axes), b.servo_mask, len(b.switches),
-            b.rows, b.queue, b.frame, b.min_interval, b.clock, self._config, self.motors.known, self._flags(),
+            tag, protocol.VERSION, (2, 0), nonce, b.number, len(b.axes), b.servo_mask, len(b.switches),
+            b.rows, b.queue, b.frame, b.receive, b.min_interval, b.clock, self._config, self.motors.known, self._flags(),
             self._boots, self._cause,
         )  # fmt: skip
         self._send(protocol.pack_info(info))
@@ -170,6 +206,7 @@ class SimBoard:
             (Flag.RETAINED, self._was_retained and self.motors.known),
             (Flag.ABORT, self._aborted()),
             (Flag.LATCH, self.motors.latched),
+            (Flag.POWER_CUT, self._power_cut()),
         )
         return sum(flag for flag, on in pairs if on)
 
@@ -180,7 +217,7 @@ class SimBoard:
         counts = tuple(m.latch if page else m.counts())
         status = Status(
             tag, self._next, self._error, self._detail, m.state, self._flags(), m.free, m.queued(), m.known,
-            switches, 0, min(self._splitter.bad, 255), page, counts,
+            switches, 0, min(self._splitter.bad, 255), page, self._digest, counts,
         )  # fmt: skip
         self._send(protocol.pack_status(status))
 
@@ -203,6 +240,8 @@ class SimBoard:
             raise RefusedError(Error.CONFIG_NONE)
         if abort and self._aborted():
             raise RefusedError(Error.ABORT)
+        if abort and self._power_cut():
+            raise RefusedError(Error.POWER)
         if self.motors.state not in states:
             raise RefusedError(Error.BUSY)
 
@@ -223,7 +262,7 @@ class SimBoard:
         self._needs(State.IDLE, config=False)
         length, crc = struct.unpack_from("<HI", payload, 2)
         data = bytes(self._image_bytes[:length])
-        image = Image.unpack(data)
+        image = Image.unpack(data, len(self.board.switches))
         if image is None or len(data) != length or zlib.crc32(data) != crc or not image_valid(image, self.board):
             raise RefusedError(Error.CONFIG_BAD)
         self._image = self.motors.image = image
@@ -247,6 +286,8 @@ class SimBoard:
         axes = axes_of(struct.unpack_from("<H", payload, 2)[0])
         if len(payload) != 4 + 4 * len(axes):
             raise RefusedError(Error.LENGTH)
+        if self._config and self._power_cut():
+            raise RefusedError(Error.POWER)
         self._needs(State.IDLE)
         counts = dict(zip(axes, struct.unpack_from(f"<{len(axes)}i", payload, 4), strict=True))
         for i, count in counts.items():
@@ -278,37 +319,48 @@ class SimBoard:
         plan = list(self.motors.plan)
         for axis, start in zip(batch.axes, batch.start, strict=True):
             self._ready(axis)
-            if plan[axis] != start:
+            if plan[axis] >> 23 != start:
                 raise RefusedError(Error.START, axis)
         if len(batch.segments) > self.motors.free:
             raise RefusedError(Error.CREDIT)
-        whole = [self._checked(i, segment, batch.axes, plan) for i, segment in enumerate(batch.segments)]
-        for axis, end in zip(batch.axes, batch.end, strict=True):
-            if plan[axis] != end:
+        idle = self.motors.state == State.IDLE
+        speed = Velocity(self.board, self._image) if idle else self._velocity.copy()
+        segments = [self._checked(i, s, batch.axes, plan, speed) for i, s in enumerate(batch.segments)]
+        ends = dict(zip(batch.axes, batch.end, strict=True))
+        for axis in range(len(plan)):
+            if batch.at_rest:
+                speed.check_rest(axis)
+            if axis in ends and plan[axis] >> 23 != ends[axis]:
                 raise RefusedError(Error.END, axis)
-        self.motors.append(whole, batch.at_rest)
+        for n in self._pressed() if idle else ():
+            if self._toward(n, segments[0].rates):
+                raise RefusedError(Error.LIMIT_SWITCH, n)
+        self._velocity = Velocity(self.board, self._image) if batch.at_rest else speed
+        self.motors.append(segments, batch.at_rest)
 
-    def _checked(self, number: int, s: Segment, axes: list[int], plan: list[int]) -> Segment:
-        """A batch's segment with a step for every axis; moves `plan` to its end."""
-        fastest = min(s.interval, s.last_interval)
-        if s.ticks == 0 or fastest < self.board.min_interval or max(s.interval, s.last_interval) > 65535:
+    def _checked(self, number: int, s: Segment, axes: list[int], plan: list[int], speed: Velocity) -> Segment:
+        """A batch's segment with a rate for every axis; moves `plan` to its end."""
+        if not times_valid(s, self.board.min_interval):
             raise RefusedError(Error.INTERVAL, number)
-        steps, before = [0] * len(plan), list(plan)
-        for axis, n in zip(axes, s.steps, strict=True):
-            image = self._image.axes[axis]
-            if abs(n) > s.ticks:
+        rates, before = [0] * len(plan), [p >> 23 for p in plan]
+        given = dict(zip(axes, s.rates, strict=True))
+        speed.begin(s)
+        for axis in range(len(plan)):
+            rate = given.get(axis, 0)
+            if rate == -protocol.STEP:
                 raise RefusedError(Error.STEPS, axis)
-            if n and (abs(n) - 1) * min(65535, self.board.clock // (4 * image.max_rate)) > s.ticks * fastest // 4:
-                raise RefusedError(Error.RATE, axis)
-            steps[axis] = n
-            plan[axis] += n
-            if not within(image.lower, image.upper, before[axis], plan[axis]):
+            speed.check(axis, rate)
+            rates[axis] = rate
+            plan[axis] += s.ticks * rate
+            image, after = self._image.axes[axis], plan[axis] >> 23
+            if axis in given and not within(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
+        counts = [p >> 23 for p in plan]
         for r, row in enumerate(self._image.rows):
             known = all(self.motors.known >> i & 1 for i, w in enumerate(row.weight) if w)
-            if known and not within(row.lower, row.upper, row_value(row, before), row_value(row, plan)):
+            if known and not within(row.lower, row.upper, row_value(row, before), row_value(row, counts)):
                 raise RefusedError(Error.LIMIT_JOINT, r)
-        return Segment(s.ticks, s.interval, s.add, tuple(steps))
+        return Segment(s.ticks, s.interval, s.add, tuple(rates))
 
     def _rates(self, rate: tuple[int, ...], *, jogging: bool) -> None:
         moving = [i for i, r in enumerate(rate) if r]
@@ -327,20 +379,21 @@ class SimBoard:
 
     def _home(self, payload: bytes) -> None:
         n = len(self.board.axes)
-        if len(payload) != 13 + 2 * n:
+        if len(payload) != 15 + 4 * n:
             raise RefusedError(Error.LENGTH)
         self._needs(State.IDLE, abort=True)
-        switch, flags, slow, backoff, travel, time, *rate = struct.unpack_from(f"<BBBHIH{n}h", payload, 2)
-        if not any(rate) or switch >= len(self.board.switches) or flags > 1 or not slow or not backoff:
+        switch, flags, slow, backoff, travel, time, *rate = struct.unpack_from(f"<BBBIIH{n}i", payload, 2)
+        far = backoff > 2**30 or travel > 2**30
+        if not any(rate) or switch >= len(self.board.switches) or flags > 1 or not slow or not backoff or far:
             raise RefusedError(Error.VALUE)
         self._rates(tuple(rate), jogging=False)
         self.motors.home(switch, bool(flags), slow / 256, backoff, travel, time / 10, rate)
 
     def _jog(self, payload: bytes) -> None:
         n = len(self.board.axes)
-        if len(payload) != 2 + 2 * n:
+        if len(payload) != 2 + 4 * n:
             raise RefusedError(Error.LENGTH)
         self._needs(State.IDLE, State.JOGGING, abort=True)
-        rate = struct.unpack_from(f"<{n}h", payload, 2)
+        rate = struct.unpack_from(f"<{n}i", payload, 2)
         self._rates(rate, jogging=True)
         self.motors.jog(list(rate))

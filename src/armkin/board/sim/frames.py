@@ -37,15 +37,13 @@ def batch(payload: bytes) -> Batch:
     axes = axes_of(mask)
     k = len(axes)
     wide = bool(flags & protocol.MOTION_WIDE)
-    form = struct.Struct(f"<HHh{k}h" if wide else f"<BHh{k}b")
+    size = protocol.segment_size(k, wide=wide)
     known_flags = protocol.MOTION_END | protocol.MOTION_WIDE
-    if n == 0 or flags & ~known_flags or len(payload) != 6 + 8 * k + n * form.size:
+    if n == 0 or flags & ~known_flags or len(payload) != 6 + 8 * k + n * size:
         raise RefusedError(Error.LENGTH)
     ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
-    segments = []
-    for i in range(n):
-        ticks, interval, add, *steps = form.unpack_from(payload, 6 + 8 * k + i * form.size)
-        segments.append(Segment(ticks, interval, add, tuple(steps)))
+    pieces = (payload[at : at + size] for at in range(6 + 8 * k, len(payload), size))
+    segments = [protocol.read_segment(piece, axes, wide=wide) for piece in pieces]
     return Batch(axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END))
 
 
@@ -69,6 +67,9 @@ def image_valid(image: Image, board: Board) -> bool:
             and 0 < axis.max_accel < 2**24
             and (not servo or 400 <= axis.lower <= axis.upper <= 2600)
         ):
+            return False
+    for guard in image.guards:
+        if any(w and not axis.used for w, axis in zip(guard.weight, image.axes, strict=True)):
             return False
     for row in image.rows:
         if any(w and not axis.used for w, axis in zip(row.weight, image.axes, strict=True)):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from armkin.board.firmware.protocol import AxisImage, Error, Image, RowImage, Segment, State
+from armkin.board.firmware.protocol import BLOCK, HALF, STEP, AxisImage, Error, Image, RowImage, Segment, State
 
 _STANDING = 0.001  # [s] time to a stop at which a hold stands still
 _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
@@ -31,6 +31,16 @@ def row_value(row: RowImage, counts: list[int]) -> int:
     return sum(w * c for w, c in zip(row.weight, counts, strict=True))
 
 
+def intervals(s: Segment) -> Iterator[int]:
+    """Cycles before every tick, as the device adds them up."""
+    interval, add = s.interval << 16, s.add * 256
+    for tick in range(1, s.ticks + 1):
+        yield interval >> 16
+        interval += add >> 8
+        if (s.ticks - tick) % BLOCK == 0:
+            add += s.bend * 4
+
+
 @dataclass
 class Queued:
     """A segment with a step for every axis of the board."""
@@ -42,7 +52,7 @@ class Queued:
     def start(self) -> None:
         """Get ready to run."""
         s = self.segment
-        self.times = list(accumulate((256 * s.interval + j * s.add) >> 8 for j in range(s.ticks)))
+        self.times = list(accumulate(intervals(s)))
 
 
 class Motors:
@@ -54,8 +64,9 @@ class Motors:
         self.state = State.IDLE
         self.known = 0
         self.base = [0] * axes  # counts at the running segment's start
+        self._fraction = [HALF] * axes  # and how far the axes are beyond them, 2^-23 step
         self.net = [0] * axes  # steps since power-on: what the arm feels
-        self.plan = [0] * axes  # counts where the queue ends
+        self.plan = [HALF] * axes  # places where the queue ends, 2^-23 step
         self.latch = [0] * axes
         self.latched = False  # page 1 holds the latch of a finished HOME
         self._switch = switch  # level of an input
@@ -64,6 +75,7 @@ class Motors:
         self._hold = 0.0  # [s] time to a stop that the hold allows
         self._cruise: Iterator[None] | None = None  # homing or jogging, a step a millisecond
         self._rate = [0] * axes
+        self._homed = -1
         self._share = 0.0
         self._jog_until = 0.0
         self._wanted: list[int] = []
@@ -82,11 +94,17 @@ class Motors:
         units = sum(q.segment.units() for q in self._queue)
         return min(units * 256 * 1000 // self.clock, 65535)
 
+    def plan_counts(self) -> list[int]:
+        """Counts where the queue ends."""
+        return [p >> 23 for p in self.plan]
+
     def append(self, segments: list[Segment], at_rest: bool) -> None:
         """Queue segments (a step for every axis), the last one ending at rest or not."""
         for i, segment in enumerate(segments):
             self._queue.append(Queued(segment, at_rest and i + 1 == len(segments)))
-            self.plan = [p + s for p, s in zip(self.plan, segment.steps, strict=True)]
+            self.plan = [p + segment.ticks * r for p, r in zip(self.plan, segment.rates, strict=True)]
+        if at_rest:
+            self.plan = [p // STEP * STEP + HALF for p in self.plan]
         if self.state == State.IDLE:
             self.state = State.MOVING
             self._begin()
@@ -98,8 +116,24 @@ class Motors:
     def place(self, counts: dict[int, int]) -> None:
         """Say what counts are, at rest."""
         for axis, count in counts.items():
-            self.base[axis] = self.plan[axis] = count
+            self.base[axis], self.plan[axis] = count, count * STEP + HALF
             self.known |= 1 << axis
+
+    def rest_at(self, counts: list[int]) -> None:
+        """Stand there."""
+        self.base = list(counts)
+        self._rest()
+
+    @property
+    def homing(self) -> int:
+        """The switch that homing looks for, -1 if it is not homing."""
+        return self._homed if self.state == State.HOMING else -1
+
+    def velocity(self) -> list[float]:
+        """Every axis's velocity just now, in any unit."""
+        if self._cruise is not None:
+            return [r * self._share for r in self._rate]
+        return [float(r) for r in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.base)
 
     def stop(self) -> None:
         """Come to rest along the path, or along the vector of homing and jogging."""
@@ -144,8 +178,7 @@ class Motors:
         if not self._queue or not self._queue[0].times:
             return [0] * len(self.base)
         s, ticks = self._queue[0].segment, bisect_right(self._queue[0].times, self._at)
-        half = s.ticks - 1 - s.ticks // 2
-        return [(1 if n > 0 else -1) * ((ticks * abs(n) + half) // s.ticks) for n in s.steps]
+        return [(f + ticks * r) >> 23 for f, r in zip(self._fraction, s.rates, strict=True)]
 
     def _settle(self, made: list[int]) -> None:
         self.base = [b + m for b, m in zip(self.base, made, strict=True)]
@@ -156,7 +189,9 @@ class Motors:
         while self._queue and self._at >= self._queue[0].times[-1]:
             fast = self._stop_time()
             last = self._queue.popleft()
-            self._settle(list(last.segment.steps))
+            places = [f + last.segment.ticks * r for f, r in zip(self._fraction, last.segment.rates, strict=True)]
+            self._settle([p >> 23 for p in places])
+            self._fraction = [HALF if last.end else p % STEP for p in places]
             rest = self._at - last.times[-1]
             self._begin()
             self._at = rest
@@ -166,7 +201,7 @@ class Motors:
     def _arrive(self, last: Queued, fast: float) -> None:
         if not last.end:
             if fast > _TOO_FAST:
-                self.known &= ~sum(1 << i for i, n in enumerate(last.segment.steps) if n)
+                self.known &= ~sum(1 << i for i, r in enumerate(last.segment.rates) if r)
             if self.state == State.MOVING:
                 self.state = State.HOLDING
                 self.fault(Error.DRY)
@@ -177,7 +212,8 @@ class Motors:
         self._at = 0.0
         self._cruise = None
         self._share = 0.0
-        self.plan = list(self.base)
+        self._fraction = [HALF] * len(self.base)
+        self.plan = [count * STEP + HALF for count in self.base]
         self.state = State.IDLE
 
     def _stop_time(self) -> float:
@@ -190,17 +226,16 @@ class Motors:
         return self._brake(now.segment, interval)
 
     def _brake(self, segment: Segment, interval: int) -> float:
-        rate = self.clock / (segment.ticks * interval)
-        limits = zip(segment.steps, self.image.axes, strict=True)
+        rate = self.clock / (STEP * interval)
+        limits = zip(segment.rates, self.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
     def _dry(self) -> bool:
         if not self._queue or self._queue[-1].end:
             return False
         rest = sum(q.segment.units() * 256 for q in self._queue) - self._at
-        u, last = self._stop_time(), self._queue[-1].segment
-        e = self._brake(last, last.last_interval)
-        return rest / self.clock < (u * u / (u + e) if u else 0.0) + u / 32 + 0.002
+        u = self._stop_time()
+        return rest / self.clock < u + u / 32 + 0.002
 
     # Homing and jogging: a vector of rates, of which a share between 0 and 1 is run
 
@@ -216,7 +251,7 @@ class Motors:
     ) -> None:
         """Look for a switch along this vector."""
         self.known &= ~sum(1 << i for i, r in enumerate(rate) if r)
-        self.state, self.latched = State.HOMING, False
+        self.state, self.latched, self._homed = State.HOMING, False, switch
         self._cruise = self._homing(switch, closed, slow, backoff, travel, self._now + time, rate)
 
     def _vector(self, rate: list[int]) -> None:
@@ -321,7 +356,7 @@ class Motors:
 
         phases: list[tuple[list[int], float, Callable[[], bool], int, Error]] = []
         if pressed():
-            phases.append((back, slow, debounced(False), travel, Error.SWITCH))
+            phases.append((back, slow, debounced(False), 2 * backoff, Error.SWITCH))
         phases.append((rate, 1.0, debounced(True), travel, Error.TRAVEL))
         phases.append((back, 1.0, braking, 2**31, Error.SWITCH))
         phases.append((rate, slow, debounced(True), 2 * backoff, Error.SWITCH))

@@ -1,0 +1,23 @@
+// What differs from chip to chip and must be known at compile time: src/avr/chip.h, or the PC's for the tests.
+//
+// A chip's header defines
+//   HAL_LOCK() … HAL_UNLOCK()  a block that the tick interrupt stays out of; also a memory barrier both ways
+//   HAL_BARRIER()              what was written before is in memory before what is written after
+//   HAL_NOINIT                 attribute of variables that a reset leaves as they are
+//   HAL_TABLE, HAL_READ32(p)   a constant table where it costs no RAM, and how to read it
+//   HAL_RECEIVE                bytes that the serial line keeps while the core is busy (INFO's `receive`)
+//   fine_t, sfine_t            an unsigned and a signed integer of at least 24 bits
+//   DDA_ADVANCE(planned)       planned = dda.interval >> 16, dda.interval += dda.add >> 8
+//   HAL_NEAR(pointer)          keep it in a register that its fields are reached from, or nothing
+//   DDA_AXIS(i, …)             one axis of the tick, see core/dda.h
+//   dda_direction(back)        sets the DIR pins, inline where a call would cost too much
+#pragma once
+
+// Not inlined: its variables take up stack only while it runs.
+#define APART __attribute__((noinline))
+
+#ifdef __AVR__
+#include "avr/chip.h"
+#else
+#include "pc/chip.h"
+#endif
