@@ -10,7 +10,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 AXES = 5  # uno_cnc_shield: X Y Z A and a servo
 BOARDS = {  # id, axes, servos, switches, rows, queue, frame
-    "uno_cnc_shield": (1, 5, 0x10, 3, 4, 32, 160),
+    "uno_cnc_shield": (1, 5, 0x10, 3, 4, 32, 152),
     "uno_servos": (3, 6, 0x3F, 0, 6, 32, 128),
 }
 RECEIVE = 127

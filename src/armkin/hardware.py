@@ -43,7 +43,7 @@ class Board:
 BOARDS = {
     board.kind: board
     for board in (
-        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 160, 448),
+        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 152, 448),
         Board(
             "mega_ramps14",
             2,

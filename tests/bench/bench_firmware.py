@@ -50,12 +50,12 @@ def main() -> None:
     row("DIR set-up, STEP high, STEP low, shortest", f"{setup:.1f}, {high:.1f}, {low:.1f} us", "0.375 us set-up")
     row("first step after the first batch", f"{measure.first_step_ms():.2f} ms", "2.3 ... 3.6 ms")
     for baud, rates, grbl in (
-        (115_200, (600, 700, 750, 800, 850), "325 ... 372"),
-        (250_000, (1500, 1520, 1550, 1600, 1650), ""),
+        (115_200, (500, 550, 600, 650), "325 ... 372"),
+        (250_000, (700, 750, 800, 850, 900), ""),
     ):
         best = 0.0
         for rate in rates:
-            got_rate, exact = measure.segments_per_second(baud, rate, batch=10)
+            got_rate, exact = measure.segments_per_second(baud, rate, batch=8)
             if not exact:
                 break
             best = got_rate

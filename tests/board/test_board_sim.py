@@ -86,7 +86,8 @@ class Host:
         return status
 
     def move(self, axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], at_rest: bool) -> Error:
-        ends = [a + sum(s.steps[i] for s in segments) for i, a in enumerate(start)]
+        plan = [self.board.motors.plan[axis] for axis in axes]  # 2^-23 step
+        ends = [(p + sum(s.ticks * s.rates[i] for s in segments)) >> 23 for i, p in enumerate(plan)]
         return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest))
 
 
@@ -267,7 +268,7 @@ def test_a_planned_line_runs_to_its_count() -> None:
         for s in segments[done : done + free]:
             done += 1
             assert host.move([0, 1, 2], at, [s], at_rest=done == len(segments)) == Error.OK
-            at = list(host.board.motors.plan_counts())
+            at = host.board.motors.plan_counts()[:3]
         host.board.advance(0.01)
     while host.status().state == State.MOVING:
         host.board.advance(0.1)

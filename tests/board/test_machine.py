@@ -16,7 +16,7 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import State
-from armkin.board.firmware.session import StoppedError
+from armkin.board.firmware.session import ReplacedError, StoppedError
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.errors import LinkError, UsageError
@@ -143,7 +143,9 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     with pytest.raises(LinkError, match="configured for another arm"):
         changed.prepare()
     assert machine(three_dof, port).position() == "retained"  # nothing was changed by asking
-    assert changed.prepare(assume_home=True)
+    with pytest.raises(ReplacedError, match="another program has taken over the board"):
+        changed.prepare(assume_home=True)
+    assert machine(other, port).prepare(assume_home=True)
     assert machine(three_dof, port).position() == "lost"
 
 
@@ -155,8 +157,8 @@ def test_another_board_is_refused(three_dof: Arm, wrist: Arm) -> None:
 def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
     configuration = configure(three_dof)
     x, y, z, a, servo = configuration.image.axes
-    assert (x.lower, x.upper, x.max_rate, x.max_accel) == (-4267, 4267, 2134, 4267)
-    assert (y.lower, y.upper, y.max_rate) == (-13127, 3580, 7161)
+    assert (x.lower, x.upper, x.max_rate, x.max_accel) == (-4267, 4267, 2176, 4267)
+    assert (y.lower, y.upper, y.max_rate) == (-13127, 3580, 7304)
     assert (z.lower, z.upper) == (-2000, 14000)
     assert not a.used
     assert (servo.lower, servo.upper, servo.home) == (833, 1833, 833)

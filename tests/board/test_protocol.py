@@ -64,7 +64,7 @@ def built(name: str, field: dict[str, str]) -> bytes:
         segments = []
         for text in field["segments"].split(";"):
             ticks, interval, add, steps = text.split("/")
-            segments.append(protocol.Segment(int(ticks), int(interval), int(add), integers(steps)))
+            segments.append(protocol.Segment(int(ticks), int(interval), 256 * int(add), integers(steps)))
         flags = int(field["flags"])
         return protocol.motion(
             tag,

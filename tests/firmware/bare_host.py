@@ -147,10 +147,12 @@ class BareHost:
         slice_s: float = 0.5e-3,
         resend: float = 0.03,
         window: int = 100,
+        bytes_ahead: int = 0,
     ) -> Status:
         """Go back N with credit until all is acknowledged and the board is at rest (or the session has ended).
 
-        `poll`: [s] between STATUS?; `resend`: [s] without progress until all is sent again; `window`: frames.
+        `poll`: [s] between STATUS?; `resend`: [s] without progress until all is sent again; `window`: frames;
+        `bytes_ahead`: that may follow the oldest frame without an answer (what the board promises to keep).
         """
         first = self.sequence
         done = sent = 0  # batches
@@ -177,7 +179,7 @@ class BareHost:
                 sent = done
                 last_progress = self.time
             under_way = sum(len(b.segments) for b in work[done:sent])
-            room = RECEIVE[self.board.board] - 12 - sum(map(size, range(done + 1, sent)))
+            room = (bytes_ahead or RECEIVE[self.board.board] - 12) - sum(map(size, range(done + 1, sent)))
             while (
                 sent < len(work)
                 and sent - done < window

@@ -113,14 +113,14 @@ def segments_per_second(baud: int, rate: float, batch: int, count: int = 1500, t
         interval = round(CLOCK / rate / ticks)
         work += [whole(ticks, interval, 0, (ticks // 2 + i % 3, -ticks // 2, ticks // 3, -1)) for i in range(count)]
         plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
-        status = host.stream(plan, slice_s=0.25e-3)
+        status = host.stream(plan, slice_s=0.25e-3, bytes_ahead=300)  # more than it promises, but it keeps up
         x = emulated.stats()["axes"]["X"]
         seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / CLOCK
         exact = status.error == 0 and status.counts[:4] == plan[-1].end
         return count / seconds, exact
 
 
-def first_step_ms(batch: int = 8) -> float:
+def first_step_ms(batch: int = 6) -> float:
     """From the end of the first batch's last byte to the first step's edge, at rest."""
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
         host = BareHost(emulated)

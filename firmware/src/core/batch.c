@@ -110,7 +110,8 @@ static uint8_t longer(uint8_t a, uint8_t b) {
 }
 
 static bool jumps(uint8_t axis, int32_t from, int32_t to, uint8_t window) {
-    return limits.jump[axis] < JUMP_MAX && distance(from, to) > limits.jump[axis] * window + ROUNDING;
+    const uint32_t change = distance(from, to), jump = limits.jump[axis];
+    return change > ROUNDING && jump < JUMP_MAX && change > jump * window + ROUNDING;
 }
 
 // Within a segment, too, the velocity may change by no more than 5/4 of what max_accel allows.
@@ -123,27 +124,26 @@ static bool bends(uint8_t axis, int32_t from, int32_t to, const struct pace *pac
 }
 
 // A rate of the frame; the direction where it has one, else the one that the axis had.
-static enum error read_rate(const uint8_t *p, uint8_t axis, struct segment *s) {
+static enum error read_rate(const uint8_t *p, uint8_t axis, axes_t bit, struct segment *s) {
     const int16_t rate = (int16_t)get16(p);
     if (rate == INT16_MIN) {
         return E_STEPS;
     }
-    const bool back = rate < 0 || (rate == 0 && motion.plan_fraction.back >> axis & 1);
-    s->back |= back ? 1U << axis : 0;
+    s->back |= rate < 0 ? bit : rate ? 0 : motion.plan_fraction.back & bit;
     const uint16_t size = rate < 0 ? -rate : rate;
-    const bool greatest = size == 0x7FFF && !(s->fine >> axis & 1);
+    const bool greatest = size == 0x7FFF && !(s->fine & bit);
     s->rate[axis] = size << 1 | greatest;
     return OK;
 }
 
-static enum error check_rate(uint8_t axis, const struct segment *s, const struct pace *pace) {
-    const uint16_t rate = s->fine >> axis & 1 ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
+static enum error check_rate(uint8_t axis, axes_t bit, const struct segment *s, const struct pace *pace) {
+    const uint16_t rate = s->fine & bit ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
     int32_t first = (int32_t)((uint32_t)rate * pace->first);
     int32_t last = pace->first == pace->last ? first : (int32_t)((uint32_t)rate * pace->last);
     if ((uint32_t)first > limits.top[axis] || (uint32_t)last > limits.top[axis]) {
         return E_RATE;
     }
-    if (s->back >> axis & 1) {
+    if (s->back & bit) {
         first = -first;
         last = -last;
     }
@@ -156,44 +156,58 @@ static enum error check_rate(uint8_t axis, const struct segment *s, const struct
 }
 
 // One axis of a segment from the frame into its slot; the plan goes on to its end.
-static enum error read_axis(const uint8_t *p, uint8_t axis, struct segment *s, const struct pace *pace) {
-    enum error error = read_rate(p, axis, s);
+static enum error read_axis(const uint8_t *p, uint8_t axis, axes_t bit, struct segment *s, const struct pace *pace) {
+    enum error error = read_rate(p, axis, bit, s);
     if (!error) {
-        error = check_rate(axis, s, pace);
+        error = check_rate(axis, bit, s, pace);
     }
     if (error) {
         return error;
     }
     const int32_t before = motion.plan[axis];
-    motion_advance(axis, s);
+    motion_advance(axis, bit, s);
     const struct axis_config *config = &memory.image.axis[axis];
     return within(config->lower, config->upper, before, motion.plan[axis]) ? OK : E_LIMIT;
 }
 
-static enum error check_rows(int32_t before[ROWS], uint8_t *detail) {
+static int32_t nearest[ROWS];  // a row's value nearest to its limits since the motion began
+
+static void begin_rows(void) {
     for (uint8_t r = 0; r < memory.image.rows; r++) {
+        nearest[r] = row_value(r, motion.plan);
+    }
+}
+
+// Coupled motors do not reach their counts together: on the way back from outside of a limit a joint may be off by one count of each.
+static enum error check_rows(uint8_t *detail) {
+    for (uint8_t r = 0; r < memory.image.rows; r++) {
+        const struct row_config *row = &memory.image.row[r];
         const int32_t after = row_value(r, motion.plan);
-        if (row_known(r) && !within(memory.image.row[r].lower, memory.image.row[r].upper, before[r], after)) {
+        const int32_t slack = row_slack(r);
+        if (row_known(r) && (after < row->lower ? after < nearest[r] - slack : after > row->upper && after > nearest[r] + slack)) {
             *detail = r;
             return E_LIMIT_JOINT;
         }
-        before[r] = after;
+        if (after < row->lower ? after > nearest[r] : after <= row->upper || after < nearest[r]) {
+            nearest[r] = after;
+        }
     }
     return OK;
 }
 
 static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, const struct pace *pace, uint8_t *detail) {
-    for (uint8_t i = 0; i < AXES; i++, mask >>= 1) {
+    axes_t bit = 1;
+    for (uint8_t i = 0; i < AXES; i++, mask >>= 1, bit <<= 1) {
         enum error error = OK;
         if (mask & 1) {
-            error = read_axis(p, i, s, pace);
+            error = read_axis(p, i, bit, s, pace);
             p += 2;
-        } else if (motion.plan_speed[i] || motion.plan_fraction.back >> i & 1) {  // it was moving: from now on it stands
+        } else if (motion.plan_speed[i] || motion.plan_fraction.back & bit) {  // it was moving: from now on it stands
             if (jumps(i, motion.plan_speed[i], 0, longer(motion.plan_window, pace->window))) {
                 error = E_ACCEL;
             }
             motion.plan_speed[i] = 0;
-            s->back |= motion.plan_fraction.back & 1U << i;
+            s->back |= motion.plan_fraction.back & bit;
         }
         if (error) {
             *detail = i;
@@ -205,9 +219,8 @@ static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, 
 }
 
 static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, uint8_t *detail) {
-    int32_t rows[ROWS];
-    for (uint8_t r = 0; r < memory.image.rows; r++) {
-        rows[r] = row_value(r, motion.plan);
+    if (motion.state == IDLE) {
+        begin_rows();
     }
     for (uint8_t n = 0; n < count; n++, p += size) {
         struct segment *s = motion_slot(n);
@@ -219,8 +232,8 @@ static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, 
             return error;
         }
         error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, s, &pace, detail);
-        if (!error && memory.image.rows) {
-            error = check_rows(rows, detail);
+        if (!error) {
+            error = check_rows(detail);
         }
         if (error) {
             return error;

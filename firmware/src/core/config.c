@@ -141,6 +141,14 @@ int32_t row_value(uint8_t row, const int32_t counts[AXES]) {
     return (int32_t)sum;
 }
 
+int32_t row_slack(uint8_t row) {
+    uint32_t sum = 0;
+    for (uint8_t i = 0; i < AXES; i++) {
+        sum += magnitude(memory.image.row[row].weight[i]);
+    }
+    return (int32_t)sum;
+}
+
 bool row_known(uint8_t row) {
     for (uint8_t i = 0; i < AXES; i++) {
         if (memory.image.row[row].weight[i] && !(memory.known >> i & 1)) {

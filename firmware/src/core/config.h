@@ -24,4 +24,5 @@ void config_activate(void);  // derives `limits` from memory.image
 bool within(int32_t lower, int32_t upper, int32_t before, int32_t after);
 
 int32_t row_value(uint8_t row, const int32_t counts[AXES]);
+int32_t row_slack(uint8_t row);  // what one count of each of its axes makes
 bool row_known(uint8_t row);  // all its axes are where we think

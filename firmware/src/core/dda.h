@@ -43,8 +43,8 @@ struct segment {
 };
 
 // A tick's part of a step.
-static inline fine_t segment_rate(const struct segment *s, uint8_t axis) {
-    return s->fine >> axis & 1 ? (fine_t)s->rate[axis] : (fine_t)s->rate[axis] << 8;
+static inline fine_t segment_rate(const struct segment *s, uint8_t axis, axes_t bit) {  // bit: 1 << axis, as shifting costs
+    return s->fine & bit ? (fine_t)s->rate[axis] : (fine_t)s->rate[axis] << 8;
 }
 
 struct dda {

@@ -44,12 +44,12 @@ static uint8_t pressed_now(void) {
 static bool toward(uint8_t n, const struct segment *s) {
     float sum = 0, most = 0;
     for (uint8_t i = 0; i < AXES; i++) {
-        const float part = (float)memory.image.guard[n].weight[i] * (uint32_t)segment_rate(s, i);
+        const float part = (float)memory.image.guard[n].weight[i] * (uint32_t)segment_rate(s, i, 1U << i);
         const float size = part < 0 ? -part : part;
         most = size > most ? size : most;
         sum += s->back >> i & 1 ? -part : part;
     }
-    return sum > most / 64;
+    return sum > most / 16;
 }
 
 enum error inputs_blocking(const struct segment *s, uint8_t *detail) {
@@ -75,7 +75,7 @@ enum error inputs_ready(bool moving) {
     return motion.state == IDLE || moving ? OK : E_BUSY;
 }
 
-APART enum error inputs_millisecond(uint8_t homing, uint8_t *detail) {
+APART enum error inputs_millisecond(uint8_t *detail) {
     const uint8_t flags = memory.image.flags;
     const bool abort = memory.config && hal_abort_level() == !!(flags & ABORT_CLOSED);
     const bool cut = memory.config && flags & POWER_SENSED && !hal_power_level();
@@ -101,12 +101,5 @@ APART enum error inputs_millisecond(uint8_t homing, uint8_t *detail) {
     if (inputs.abort || inputs.power_cut) {
         return motion.state == IDLE ? OK : inputs.abort ? E_ABORT : E_POWER;
     }
-    if (!s || !inputs.pressed) {
-        return OK;
-    }
-    const uint8_t all = inputs.pressed;
-    inputs.pressed = homing < SWITCHES ? all & ~(1U << homing) : all;
-    const enum error error = inputs_blocking(s, detail);
-    inputs.pressed = all;
-    return error;
+    return s && motion.state != HOMING ? inputs_blocking(s, detail) : OK;
 }

@@ -11,8 +11,8 @@ struct inputs {
 extern struct inputs inputs;
 
 void inputs_start(void);
-// What stops a motion; `detail`: the switch. `homing`: the switch that HOME looks for, else 255.
-enum error inputs_millisecond(uint8_t homing, uint8_t *detail);
+// What stops a motion; `detail`: the switch. HOME looks after its own.
+enum error inputs_millisecond(uint8_t *detail);
 
 // May MOTION (`moving`: also while it runs), HOME or JOG begin?
 enum error inputs_ready(bool moving);

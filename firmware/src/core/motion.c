@@ -103,14 +103,14 @@ static uint16_t steps_in(fine_t *phase, fine_t rate, uint16_t ticks) {
     return steps;
 }
 
-static void advance(int32_t *count, struct fraction *f, uint8_t i, const struct segment *s, uint16_t ticks) {
-    const bool back = s->back >> i & 1;
-    if ((f->back >> i & 1) != back) {
+static void advance(int32_t *count, struct fraction *f, uint8_t i, axes_t bit, const struct segment *s, uint16_t ticks) {
+    const axes_t back = s->back & bit;
+    if ((f->back ^ back) & bit) {
         f->phase[i] ^= PHASE_TURN;
-        f->back ^= 1U << i;
+        f->back ^= bit;
     }
     if (s->rate[i]) {
-        const uint16_t n = steps_in(&f->phase[i], segment_rate(s, i), ticks);
+        const uint16_t n = steps_in(&f->phase[i], segment_rate(s, i, bit), ticks);
         *count += back ? -(int32_t)n : (int32_t)n;
     }
 }
@@ -123,16 +123,17 @@ static void at_rest(struct fraction *f) {
 }
 
 static void advance_all(int32_t counts[AXES], struct fraction *f, const struct segment *s, uint16_t ticks) {
-    for (uint8_t i = 0; i < AXES; i++) {
-        advance(&counts[i], f, i, s, ticks);
+    axes_t bit = 1;
+    for (uint8_t i = 0; i < AXES; i++, bit <<= 1) {
+        advance(&counts[i], f, i, bit, s, ticks);
     }
     if (s->back & LAST && ticks == s->ticks) {
         at_rest(f);
     }
 }
 
-void motion_advance(uint8_t axis, const struct segment *s) {
-    advance(&motion.plan[axis], &motion.plan_fraction, axis, s, s->ticks);
+void motion_advance(uint8_t axis, axes_t bit, const struct segment *s) {
+    advance(&motion.plan[axis], &motion.plan_fraction, axis, bit, s, s->ticks);
 }
 
 // The interrupt notes ticks, not counts: turn them into counts while their segment is still there.
@@ -284,9 +285,10 @@ void motion_lose(uint16_t axes) {
 // u of PROTOCOL.md, section 7, in ms.
 static float stop_time(const struct segment *s, uint16_t interval) {
     float most = 0;
-    for (uint8_t i = 0; i < AXES; i++) {
+    axes_t bit = 1;
+    for (uint8_t i = 0; i < AXES; i++, bit <<= 1) {
         if (s->rate[i]) {
-            const float one = (float)(uint32_t)segment_rate(s, i) * limits.stop_time[i];
+            const float one = (float)(uint32_t)segment_rate(s, i, bit) * limits.stop_time[i];
             most = one > most ? one : most;
         }
     }

@@ -42,7 +42,7 @@ uint16_t motion_queued(void);  // ms
 
 // Appending: write segments into motion_slot(0), (1), … up to motion_free(), each with motion_advance(); then publish them all at once.
 struct segment *motion_slot(uint8_t ahead);
-void motion_advance(uint8_t axis, const struct segment *s);  // motion.plan of one axis to the end of a segment
+void motion_advance(uint8_t axis, axes_t bit, const struct segment *s);  // motion.plan of an axis (bit: 1 << axis) to a segment's end
 void motion_append(uint8_t segments, bool end);
 uint32_t motion_units(const struct segment *s);  // its time, 256 cycles
 int32_t motion_interval(const struct segment *s, uint16_t ticks);  // cycles to the tick after so many

@@ -14,7 +14,7 @@
 enum { HELLO = 0x01, STATUS_ASK, HOLD };
 enum { ACK = 0x80, INFO, STATUS, CREDIT };
 enum { SEQUENCED = 0x10, REPLIES = 0x80 };
-enum { SILENCE_MS = 500, NO_SWITCH = 255 };
+enum { SILENCE_MS = 500 };
 enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32, CUT = 64 };  // flags
 
 struct session session;
@@ -170,7 +170,7 @@ APART void protocol_byte(uint8_t byte) {
 APART void protocol_millisecond(void) {
     const uint8_t state = motion.state;
     uint8_t detail = 0;
-    const enum error error = inputs_millisecond(state == HOMING ? home.input : NO_SWITCH, &detail);
+    const enum error error = inputs_millisecond(&detail);
     end(error, detail);
     if ((state == MOVING || state == HOMING) && ++session.silent >= SILENCE_MS) {
         end(E_SILENCE, 0);

@@ -218,7 +218,7 @@ class Board(_Model):
     )
     power: Literal["A1", "A4"] | None = Field(
         None,
-        description="Input that is high while the motors have power (Uno A1, RAMPS A4): without it the position is lost.",
+        description="Input that is high while the motors have power (Uno A1, RAMPS A4): a cut is noticed.",
     )
 
 

@@ -238,8 +238,8 @@ def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int
     scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
     weight = np.rint(per_count * scale)
     # The exact sum and the rounded one differ by the weights' rounding times the counts, and the counts
-    # themselves are rounded by up to half.
-    slack = float(np.abs(weight - per_count * scale) @ far + np.abs(weight).sum() / 2)
+    # themselves are rounded by up to half, and up to a quarter away where a segment ends.
+    slack = float(np.abs(weight - per_count * scale) @ far + 0.8 * np.abs(weight).sum())
     offset = float(weight @ arm.motor_bias)
     bounds = []
     for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):

@@ -6,7 +6,7 @@ Trajectory (joints, seconds)  --cut-->  Cut (counts, clock cycles)  --Machine.ru
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -62,16 +62,17 @@ class Cut:
         """Number of device segments."""
         return sum(len(move.segments) for move in self.moves())
 
-    def moves(self) -> Iterator[Move]:
-        """The moves, one a stretch, made as they are asked for."""
+    def moves(self, rough: Callable[[], bool] = lambda: False) -> Iterator[Move]:
+        """The moves, one a stretch, made as they are asked for; rough: asked then, see `along`."""
         at = self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
-            yield self._move(stretch, at, end)
+            yield self._move(stretch, at, end, rough())
             at = end
 
-    def _move(self, stretch: Stretch, start: Counts, end: Counts) -> Move:
+    def _move(self, stretch: Stretch, start: Counts, end: Counts, rough: bool) -> Move:
         if isinstance(stretch, Straight) and stretch.law.length and (start != end).any():
-            return along(start.tolist(), end.tolist(), stretch.law, clock=self.clock, min_interval=self.min_interval)
+            ends, how = (start.tolist(), end.tolist()), {"clock": self.clock, "min_interval": self.min_interval}
+            return along(*ends, stretch.law, rough=rough, **how)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         return Move(start, end, parts if stretch.duration else (), round(stretch.duration * self.clock), curve=True)

@@ -6,7 +6,6 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-
 _LAYOUT = 2
 _AXIS = 21  # bytes
 
@@ -105,7 +104,7 @@ class Image:
             lower, upper, *weight = struct.unpack_from(f"<ii{n}h", data, at)
             at += 8 + 2 * n
             limits.append(RowImage(lower, upper, tuple(weight)))
-        bits = (bool(flags >> bit & 1) for bit in range(3))
+        bits = bool(flags & 1), bool(flags & 2), bool(flags & 4)
         return cls(tuple(axes), tuple(limits), tuple(guards), *bits, high, low, setup, wake, meaning)
 
     def crc(self) -> int:

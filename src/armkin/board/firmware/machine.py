@@ -6,7 +6,6 @@ Everything here is said in the arm's words (joints, the robot file); `session` b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from armkin.board.firmware import cutting, protocol
+from armkin.board.firmware.batch import WHY, Batch
 from armkin.board.firmware.protocol import Error, Flag, Segment, State, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
@@ -33,25 +33,9 @@ if TYPE_CHECKING:
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
-# Standing still while the queue fills: 40 ms, or 400 ms on a bad line.
-_LEAD = (Segment(32, 20_000, 0, ()), Segment(200, 32_000, 0, ()))
-_BATCH = (3, 6)  # segments in a frame, on a bad line and on a good one
-
-_WHY = {
-    Error.NO_SESSION: "the board was reset (its button, its power, another program?)",
-    Error.ABORT: "the abort input is active: release it",
-    Error.HELD: "it was told to stop",
-    Error.SILENCE: "nothing was heard from this computer for half a second",
-    Error.DRY: "the line was too slow or too noisy to keep its queue filled",
-    Error.OVERRUN: "a tick came late: lower the speed, and report this as a bug",
-    Error.SWITCH: "the homing switch is stuck, bounces, or needs a longer backoff:",
-    Error.TRAVEL: "no switch was met on the whole way: is it wired, is homing.direction right?",
-    Error.TIME: "homing took too long",
-    Error.LOST: "its position is lost",
-    Error.POWER: "the motors have no power",
-    Error.LIMIT_SWITCH: "a limit switch is pressed: move away from it",
-    Error.SPILL: "more was sent than the board could keep",
-}
+# Standing still while the queue fills: 40 ms, or half a second on a bad line.
+_LEAD = (Segment(32, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
+_BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
 
 
 class Machine:
@@ -238,14 +222,14 @@ class Machine:
         end: Counts | None = None
         total = begun = done = 0.0
 
-        def frames() -> Iterator[_Batch | None]:
+        def frames() -> Iterator[Batch | None]:
             nonlocal end, total, begun
             for plan in plans:
                 if plan is None:
                     yield None
                     continue
                 total += plan.duration
-                for move in plan.moves():
+                for move in plan.moves(lambda: self.session.noisy):
                     for batch in self._batches(move, self.configuration.axes, plan.clock):
                         begun += batch.seconds
                         yield batch
@@ -269,7 +253,7 @@ class Machine:
         self._stream(iter(self._batches(move, (axis,), clock)), lambda left: None)
         return self.status
 
-    def _stream(self, frames: Iterator[_Batch | None], left: Callable[[float], None]) -> None:
+    def _stream(self, frames: Iterator[Batch | None], left: Callable[[float], None]) -> None:
         session, more = self.session, True
         try:
             while more or session.backlog:
@@ -279,7 +263,7 @@ class Machine:
                         more = False
                     if batch is None or not more:
                         break
-                    assert isinstance(batch, _Batch)
+                    assert isinstance(batch, Batch)
                     session.submit(batch.payload, len(batch.segments), batch.seconds)
                 session.pump()
                 left(session.under_way + session.queued / 1000)
@@ -289,7 +273,7 @@ class Machine:
         except DeviceError as error:
             raise self.explain(error) from None
 
-    def _batches(self, move: Move, axes: Sequence[int], clock: int) -> Iterator[_Batch]:
+    def _batches(self, move: Move, axes: Sequence[int], clock: int) -> Iterator[Batch]:
         """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
         moving = sorted(move.moving, key=lambda k: axes[k])
         at = [int(move.start[k]) for k in moving]
@@ -297,7 +281,8 @@ class Machine:
         places = [count * protocol.STEP + protocol.HALF for count in at]
         source = (s.of(moving) for s in move.segments)
         todo: list[Segment] = []
-        if move.segments and self.session.state == State.IDLE and not self.session.under_way:
+        resting = self.session.state == State.IDLE and not self.session.under_way
+        if move.segments and (resting or self.session.damaged):
             lead = _LEAD[self.session.damaged]
             todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
         while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
@@ -314,7 +299,7 @@ class Machine:
                 todo = list(islice(source, 1))
             places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
             end = [p // protocol.STEP for p in places]
-            yield _Batch([axes[k] for k in moving], at, end, part, not todo, clock)
+            yield Batch([axes[k] for k in moving], at, end, part, not todo, clock)
             at = end
 
     def jog(self, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> Status:
@@ -360,7 +345,7 @@ class Machine:
 
     def explain(self, error: DeviceError) -> LinkError:
         """What the board's error means, and where the arm stands now."""
-        why = _WHY.get(error.error)
+        why = WHY.get(error.error)
         if why is None:
             return LinkError(
                 f"the board refused what it was sent: {error.error.name} ({error.detail}); it stands still\n"
@@ -388,25 +373,6 @@ class Machine:
             self.session.call(make)
         except DeviceError as error:
             raise self.explain(error) from None
-
-
-@dataclass(frozen=True)
-class _Batch:
-    axes: list[int]
-    start: list[int]
-    end: list[int]
-    segments: list[Segment]
-    at_rest: bool
-    clock: int
-
-    @property
-    def seconds(self) -> float:
-        """About how long it takes."""
-        return sum(s.units() for s in self.segments) * 256 / self.clock
-
-    def payload(self, tag: int) -> bytes:
-        """Its frame."""
-        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=self.at_rest)
 
 
 _DONE = object()

@@ -7,7 +7,6 @@ Host and simulated board share this module; it knows no port and no motion.
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +22,16 @@ from armkin.board.firmware.image import AxisImage as AxisImage
 from armkin.board.firmware.image import GuardImage as GuardImage
 from armkin.board.firmware.image import Image as Image
 from armkin.board.firmware.image import RowImage as RowImage
+from armkin.board.firmware.segment import BLOCK as BLOCK
+from armkin.board.firmware.segment import COARSE as COARSE
+from armkin.board.firmware.segment import HALF as HALF
+from armkin.board.firmware.segment import STEP as STEP
+from armkin.board.firmware.segment import Segment as Segment
+from armkin.board.firmware.segment import nearest_rate as nearest_rate
+from armkin.board.firmware.segment import pack
+from armkin.board.firmware.segment import read_segment as read_segment
+from armkin.board.firmware.segment import segment_size as segment_size
+from armkin.board.firmware.segment import whole as whole
 
 VERSION = 2
 
@@ -107,101 +116,6 @@ class Flag(IntFlag):
 
 MOTION_END = 1
 MOTION_WIDE = 2
-
-
-STEP = 1 << 23  # units of a rate and of a place in one step
-HALF = STEP // 2  # where an axis stands at rest, above its count
-COARSE = 1 << 8  # units of a rate from 2^-8 step a tick on
-_FINE = 1 << 15  # smaller rates are sent in units of 1
-_FULL = STEP - 128  # the greatest rate: a step a tick, but for 2^-16
-BLOCK = 16  # ticks with the same `add`, counted from the segment's end
-
-
-@dataclass(frozen=True)
-class Segment:
-    """T ticks, the first after `interval` cycles; a rate per axis.
-
-    rates: 2^-23 steps a tick, signed; from 2^-8 step on multiples of `COARSE`, or STEP - 128. An axis at place P is at P + T x rate
-    afterwards, and its count is P >> 23. The interval grows by `add` [2^-16 cycles] with each tick, and `add` by
-    `bend` [2^-22 cycles] with every 16th, counted from the end.
-    """
-
-    ticks: int
-    interval: int
-    add: int
-    rates: tuple[int, ...]
-    bend: int = 0
-
-    def of(self, axes: Sequence[int]) -> Segment:
-        """The same for some of its axes."""
-        return Segment(self.ticks, self.interval, self.add, tuple(self.rates[k] for k in axes), self.bend)
-
-    def interval_after(self, ticks: int) -> int:
-        """Cycles to the tick after so many, not rounded from tick to tick."""
-        blocks, rest = divmod(max(0, ticks - (self.ticks - 1) % BLOCK - 1), BLOCK)
-        bends = (BLOCK // 2 * blocks + rest) * (blocks + 1)
-        return self.interval + (self.add * ticks >> 16) + (self.bend * (bends >> 8) >> 14)
-
-    @property
-    def last_interval(self) -> int:
-        """Cycles before the last tick."""
-        return self.interval_after(self.ticks - 1)
-
-    @property
-    def last_add(self) -> int:
-        """Change of the interval at its end, 2^-16 cycle a tick."""
-        return self.add + (self.bend * ((self.ticks - 1) // BLOCK) >> 6)
-
-    @property
-    def narrow(self) -> bool:
-        """True if it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
-        coarse = all(r % COARSE == 0 or abs(r) == _FULL for r in self.rates)
-        return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
-
-    @property
-    def steps(self) -> tuple[int, ...]:
-        """Steps that it makes if it begins in the middle between two, as at rest."""
-        return tuple((HALF + self.ticks * r) >> 23 for r in self.rates)
-
-    def units(self) -> int:
-        """Its length as the queue counts it, in units of 256 cycles."""
-        return (self.ticks * ((self.interval + self.last_interval) // 2)) >> 8
-
-
-def nearest_rate(exact: float) -> int:
-    """The rate nearest to one in 2^-23 steps a tick that a wide segment can say."""
-    if abs(exact) < _FINE - 0.5:
-        return round(exact)
-    return _coarse(exact)
-
-
-def _coarse(exact: float) -> int:
-    rate = round(exact / COARSE)
-    return rate * COARSE if abs(rate) < _FINE - 1 else int(math.copysign(_FULL, rate))
-
-
-def _short(rate: int) -> int:
-    """A coarse rate as it is sent."""
-    return int(rate / COARSE)
-
-
-def _long(short: int) -> int:
-    """And back."""
-    return short * COARSE if abs(short) != _FINE - 1 else int(math.copysign(_FULL, short))
-
-
-def whole(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
-    """A segment of whole steps, from the middle between two to the middle between two, as near as rates come.
-
-    add: 1/256 cycle a tick.
-
-    >>> whole(100, 1600, 0, (50, -100)).steps
-    (50, -100)
-    """
-    exact = (s * STEP / ticks for s in steps)
-    short = ticks <= 255
-    rates = (_coarse(r) if short else nearest_rate(r) for r in exact)
-    return Segment(ticks, interval, add * 256, tuple(rates))
 
 
 @dataclass(frozen=True)
@@ -332,32 +246,7 @@ def motion(
     wide = wide or not all(segment.narrow for segment in segments)
     flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0)
     head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, _mask(axes), flags, len(segments), *start, *end)
-    return head + b"".join(_pack(segment, axes, wide=wide) for segment in segments)
-
-
-def _pack(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
-    if not wide:
-        return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_short, s.rates))
-    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < _FINE]
-    short = (r if abs(r) < _FINE else _short(r) for r in s.rates)
-    head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
-    return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, _mask(fine), *short)
-
-
-def segment_size(axes: int, *, wide: bool) -> int:
-    """Bytes of a segment."""
-    return (11 if wide else 5) + 2 * axes
-
-
-def read_segment(data: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
-    """A segment of its bytes (for the simulated board)."""
-    if not wide:
-        ticks, interval, add, *short = struct.unpack(f"<BHh{len(axes)}h", data)
-        return Segment(ticks, interval, add * 256, tuple(map(_long, short)))
-    ticks, interval = struct.unpack_from("<HH", data)
-    bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", data, 7)
-    rates = tuple(r if fine >> i & 1 and r != -_FINE else _long(r) for i, r in zip(axes, short, strict=True))
-    return Segment(ticks, interval, int.from_bytes(data[4:7], "little", signed=True), rates, bend)
+    return head + b"".join(pack(segment, axes, wide=wide) for segment in segments)
 
 
 def motion_size(axes: int, segments: Sequence[Segment]) -> int:

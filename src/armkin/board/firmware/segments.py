@@ -3,9 +3,9 @@
     counts over time  --pieces of constant acceleration-->  segments {ticks, interval, add, bend, rates[]}
 
 A segment is a straight line in counts. Its motors are wherever the motion is at its end, to a fraction of a step, and
-go on from there: `Places` follows them as the device does, so that no step is early or late because a segment ends.
-The interval between ticks is a parabola in the number of ticks, 1 / (v + a t) to second order: where the speed changes by
-12 % over a segment, the acceleration is right to 1.5 %.
+go on from there: `Cutter` follows them as the device does, so that no step is early or late because a segment ends.
+The interval between ticks is a parabola in the number of ticks, 1 / (v + a t) to second order: where the speed changes
+by 13 % over a segment, the acceleration is right to 2 %.
 """
 
 from __future__ import annotations
@@ -20,18 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment, nearest_rate
-from armkin.errors import UsageError
-from armkin.formula.arrays import Array
 from armkin.motion.profile import Profile, trapezoid
 
 Counts = NDArray[np.int64]
 
 CLOCK = 16_000_000  # [1/s] of every board so far
-MIN_INTERVAL = 448  # [cycles] between ticks
+MIN_INTERVAL = 576  # [cycles] between ticks, that every board makes
 
-# Speed at a segment's fast end over that at its slow end, from a ramp's top down: so few that the board's queue (32) holds
-# all of the last ramp.
+# Speed at a segment's fast end over that at its slow end, from a ramp's top down: so few that the board's queue (32)
+# holds all of the last ramp.
 _RATIOS = (1.13,) * 22 + (1.25, 1.35, 1.5, 1.8, 2.2)
+_ROUGH = (1.2,) * 12  # for a line that is too bad for so many
 _FIRST = 0.002  # [s] a ramp's first segment at least
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
@@ -105,7 +104,9 @@ class Cutter:
         if short > 0:
             segment = Segment(ticks, interval + short, add, segment.rates, bend)
         self.places = [p + ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
-        self._late = min(exact - cycles_of(segment), float(ticks))  # what the shortest interval costs is not made up for
+        self._late = min(
+            exact - cycles_of(segment), float(ticks)
+        )  # what the shortest interval costs is not made up for
         return segment
 
     def _ticks(self, cycles: float, steps: float) -> int:
@@ -127,20 +128,18 @@ def _parabola(mean: float, ticks: int, change: float) -> tuple[int, int]:
         return 0, 0
     slow, fast = 1 - change / 2, 1 + change / 2  # speeds at its ends, in means
     c = (fast / slow) ** 2 - 1  # interval(x) = I / sqrt(1 + c x), x from 0 to 1 over the ticks
-    first = mean / slow
-    # Its slope, made linear: right at the two points where the error of a line is least (Chebyshev's).
+    # Its slope is made linear: right at the two points where the error of a line is least (Chebyshev's).
     x = np.array([0.5 - math.sqrt(0.125), 0.5 + math.sqrt(0.125)])
-    slope = -first * c / 2 * (1 + c * x) ** -1.5
+    slope = -mean / slow * c / 2 * (1 + c * x) ** -1.5
     curve = (slope[1] - slope[0]) / (x[1] - x[0])
-    at = slope[0] - curve * x[0]
-    bend = max(-32767, min(32767, round(curve * BLOCK / ticks**2 * 2**22)))
-    if ticks <= BLOCK:
-        bend = 0
-    middle = at + curve / 2  # mean slope: what rounding `bend` changes is taken from `add`
+    bend = round(curve * BLOCK / ticks**2 * 2**22)
     blocks = (ticks - 1) // BLOCK
-    add = round(middle / ticks * 65536 - bend * blocks / 128)
-    last = add * 256 + 4 * bend * blocks
-    return (add, bend) if add * last > 0 else (round(middle / ticks * 65536), 0)
+    if abs(bend) > 32767 or blocks < 2:
+        return round(
+            2 * math.copysign(mean - mean / max(slow, fast), -change) / ticks * 65536
+        ), 0  # right at its fast end
+    add = round((mean / fast - mean / slow) / ticks * 65536 - bend * blocks / 128)
+    return (add, bend) if add * (add + (bend * blocks >> 6)) > 0 else _parabola(mean, ticks, change / 2)
 
 
 def along(
@@ -150,20 +149,26 @@ def along(
     *,
     clock: int = CLOCK,
     min_interval: int = MIN_INTERVAL,
+    rough: bool = False,
 ) -> Move:
-    """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length."""
+    """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length.
+
+    rough: half as many, with an acceleration that is right to 10 %.
+    """
     first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
     span = last - first
     if not span.any():
         return Move(first, last, (), 0)
     cutter = Cutter(first.tolist(), clock, min_interval)
-    bounds = _on_steps(law, list(_bounds(law)), int(np.abs(span).max()))
+    bounds = _on_steps(law, list(_bounds(law, _ROUGH if rough else _RATIOS)), int(np.abs(span).max()))
     times = np.array(bounds)
     done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
     made = []
     for k, (a, b) in enumerate(pairwise(bounds)):
         share = 1.0 if k + 2 == len(bounds) else done[k + 1]
-        made.append(cutter.piece(b - a, (first + span * share).tolist(), changing(float(speed[k]), float(speed[k + 1]))))
+        made.append(
+            cutter.piece(b - a, (first + span * share).tolist(), changing(float(speed[k]), float(speed[k + 1])))
+        )
     if [p // STEP for p in cutter.places] != last.tolist():
         raise AssertionError("a line's rates do not lead to its end")
     return Move(first, last, tuple(made), sum(map(cycles_of, made)))
@@ -189,7 +194,7 @@ def line(
     return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
-def _bounds(law: Profile) -> Iterable[float]:
+def _bounds(law: Profile, ratios: Sequence[float]) -> Iterable[float]:
     """When segments end: the speed changes by 12 % in each, cruises have long ones."""
     yield 0.0
     ramp = law.peak / max(law.accel, 1e-12)
@@ -198,21 +203,21 @@ def _bounds(law: Profile) -> Iterable[float]:
         if t1 - t0 < 1e-9:
             continue
         if jerk == 0.0 and accel != 0.0:
-            yield from _ramp(law, t0, t1, accel)
+            yield from _ramp(law, t0, t1, accel, ratios)
             continue
         longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
         parts = math.ceil((t1 - t0) / longest)
         yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1))
 
 
-def _ramp(law: Profile, t0: float, t1: float, accel: float) -> list[float]:
+def _ramp(law: Profile, t0: float, t1: float, accel: float, ratios: Sequence[float]) -> list[float]:
     """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
     v0, v1 = (float(v) for v in law.at(np.array([t0, t1]), 1))
     if accel < 0:
         v1 = max(0.0, v0 + accel * (t1 - t0))
     low, high = min(v0, v1), max(v0, v1)
-    least, speeds = max(low, abs(accel) * _FIRST), [high]
-    for ratio in _RATIOS:
+    least, speeds = max(low, abs(accel) * (_FIRST if ratios is _RATIOS else 5 * _FIRST)), [high]
+    for ratio in ratios:
         if speeds[-1] / ratio < least * 1.05:
             break
         speeds.append(speeds[-1] / ratio)

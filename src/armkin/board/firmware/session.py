@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Ack, Credit, Error, Info, State, Status
+from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
 from armkin.board.ports import Port
 from armkin.errors import LinkError
 
@@ -315,7 +315,7 @@ class Session:
             if done:
                 self._clear, self._gap = max(self._clear, self.port.now()), False
                 self._bytes = _BYTES[0] if self.noisy else min(_BYTES[1], self._bytes + 20)
-            elif self._sent and isinstance(reply, Ack) and (not isinstance(reply, Credit) or reply.detail == Error.SPILL):
+            elif self._sent and (type(reply) is Ack or (reply.detail == Error.SPILL and not reply.error)):
                 self._gap = True  # something behind the first frame has arrived, the first has not
         if reply.error and self._error is None:
             self._error = reply

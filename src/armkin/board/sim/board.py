@@ -14,7 +14,8 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import AxisImage, Error, Flag, Image, Info, Segment, State, Status, Type
 from armkin.board.sim.frames import RefusedError, axes_of, image_valid
 from armkin.board.sim.frames import batch as read_batch
-from armkin.board.sim.motors import Motors, row_value, within
+from armkin.board.sim.motors import Motors, within
+from armkin.board.sim.rows import Rows, toward
 from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.hardware import Board
 
@@ -25,7 +26,7 @@ _RUNNING = (State.IDLE, State.MOVING)
 class SimBoard:
     """One simulated board, powered on.
 
-    `switch`: level of a limit input, given its number and the net steps of all axes since power-on.
+    `switch`: level of a limit input, given its number and the net steps of all axes since power-on; none is pressed.
     """
 
     def __init__(self, board: Board, switch: Callable[[int, Sequence[int]], bool] | None = None) -> None:
@@ -33,7 +34,7 @@ class SimBoard:
         self.abort_level = True  # of the abort input, pulled up
         self.power_level = True  # of the motors' supply
         self.hidden_cause = True
-        self._switch = switch or (lambda number, net: True)
+        self._switch = switch or (lambda number, net: not self._guards_closed(number))
         self._boots = 0
         self._retained: tuple[bytes, int, list[int], bool] | None = None
         self._net = [0] * len(board.axes)
@@ -94,6 +95,7 @@ class SimBoard:
         self._config, self._drivers, self._pulses, self._silent = 0, False, False, 0.0
         self._was_retained = False
         self._velocity = Velocity(board, self._image)
+        self._rows = Rows(self._image, [])
         self.motors = Motors(len(board.axes), board.clock, board.queue, self._level)
         self.motors.fault = self._end
         self.motors.net = list(self._net)
@@ -131,12 +133,13 @@ class SimBoard:
         if self._power_cut():
             self._end(Error.POWER)
         for n in self._pressed():
-            if n != self.motors.homing and self._toward(n, self.motors.velocity()):
+            if self.motors.state != State.HOMING and toward(self._image.guards[n], self.motors.velocity()):
                 self._end(Error.LIMIT_SWITCH, n)
 
-    def _toward(self, switch: int, rates: Sequence[float]) -> bool:
-        parts = [w * r for w, r in zip(self._image.guards[switch].weight, rates, strict=True)]
-        return sum(parts) > max(map(abs, parts)) / 64
+    def _guards_closed(self, number: int) -> bool:
+        """Whether a switch is configured as normally closed: then it is low while nobody presses it."""
+        guards = self._image.guards
+        return bool(self._config) and number < len(guards) and guards[number].closed
 
     def _aborted(self) -> bool:
         return bool(self._config) and self.abort_level == self._image.abort_closed
@@ -193,8 +196,8 @@ class SimBoard:
         b = self.board
         info = Info(
             tag, protocol.VERSION, (2, 0), nonce, b.number, len(b.axes), b.servo_mask, len(b.switches),
-            b.rows, b.queue, b.frame, b.receive, b.min_interval, b.clock, self._config, self.motors.known, self._flags(),
-            self._boots, self._cause,
+            b.rows, b.queue, b.frame, b.receive, b.min_interval, b.clock, self._config,
+            self.motors.known, self._flags(), self._boots, self._cause,
         )  # fmt: skip
         self._send(protocol.pack_info(info))
 
@@ -324,6 +327,8 @@ class SimBoard:
         if len(batch.segments) > self.motors.free:
             raise RefusedError(Error.CREDIT)
         idle = self.motors.state == State.IDLE
+        if idle:
+            self._rows = Rows(self._image, self.motors.plan_counts())
         speed = Velocity(self.board, self._image) if idle else self._velocity.copy()
         segments = [self._checked(i, s, batch.axes, plan, speed) for i, s in enumerate(batch.segments)]
         ends = dict(zip(batch.axes, batch.end, strict=True))
@@ -333,7 +338,7 @@ class SimBoard:
             if axis in ends and plan[axis] >> 23 != ends[axis]:
                 raise RefusedError(Error.END, axis)
         for n in self._pressed() if idle else ():
-            if self._toward(n, segments[0].rates):
+            if toward(self._image.guards[n], segments[0].rates):
                 raise RefusedError(Error.LIMIT_SWITCH, n)
         self._velocity = Velocity(self.board, self._image) if batch.at_rest else speed
         self.motors.append(segments, batch.at_rest)
@@ -355,12 +360,8 @@ class SimBoard:
             image, after = self._image.axes[axis], plan[axis] >> 23
             if axis in given and not within(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
-        counts = [p >> 23 for p in plan]
-        for r, row in enumerate(self._image.rows):
-            known = all(self.motors.known >> i & 1 for i, w in enumerate(row.weight) if w)
-            if known and not within(row.lower, row.upper, row_value(row, before), row_value(row, counts)):
-                raise RefusedError(Error.LIMIT_JOINT, r)
-        return Segment(s.ticks, s.interval, s.add, tuple(rates))
+        self._rows.check([p >> 23 for p in plan], self.motors.known)
+        return Segment(s.ticks, s.interval, s.add, tuple(rates), s.bend)
 
     def _rates(self, rate: tuple[int, ...], *, jogging: bool) -> None:
         moving = [i for i, r in enumerate(rate) if r]

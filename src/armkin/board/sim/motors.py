@@ -75,7 +75,6 @@ class Motors:
         self._hold = 0.0  # [s] time to a stop that the hold allows
         self._cruise: Iterator[None] | None = None  # homing or jogging, a step a millisecond
         self._rate = [0] * axes
-        self._homed = -1
         self._share = 0.0
         self._jog_until = 0.0
         self._wanted: list[int] = []
@@ -123,11 +122,6 @@ class Motors:
         """Stand there."""
         self.base = list(counts)
         self._rest()
-
-    @property
-    def homing(self) -> int:
-        """The switch that homing looks for, -1 if it is not homing."""
-        return self._homed if self.state == State.HOMING else -1
 
     def velocity(self) -> list[float]:
         """Every axis's velocity just now, in any unit."""
@@ -251,7 +245,7 @@ class Motors:
     ) -> None:
         """Look for a switch along this vector."""
         self.known &= ~sum(1 << i for i, r in enumerate(rate) if r)
-        self.state, self.latched, self._homed = State.HOMING, False, switch
+        self.state, self.latched = State.HOMING, False
         self._cruise = self._homing(switch, closed, slow, backoff, travel, self._now + time, rate)
 
     def _vector(self, rate: list[int]) -> None:
