@@ -71,8 +71,8 @@ class Cut:
 
     def _move(self, stretch: Stretch, start: Counts, end: Counts, rough: bool) -> Move:
         if isinstance(stretch, Straight) and stretch.law.length and (start != end).any():
-            ends, how = (start.tolist(), end.tolist()), {"clock": self.clock, "min_interval": self.min_interval}
-            return along(*ends, stretch.law, rough=rough, **how)
+            a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
+            return along(a, b, stretch.law, clock=clock, min_interval=least, rough=rough)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         return Move(start, end, parts if stretch.duration else (), round(stretch.duration * self.clock), curve=True)
