@@ -220,7 +220,8 @@ def frames() -> str:
     add("ACK next=6 error=17 detail=2 state=2 free=0 queued=65535 session=0", ack(6, 17, 2, 2, 0, 65535))
     add(
         "INFO tag=5 version=2 firmware=2,0 nonce=3735928559 board=1 axes=5 servos=16 switches=3 rows=5 "
-        "queue=32 frame=160 receive=127 min_interval=400 clock=16000000 config=305441741 known=23 flags=5 boots=3 cause=2",
+        "queue=32 frame=160 receive=127 min_interval=400 clock=16000000 config=305441741 known=23 flags=5 "
+        "boots=3 cause=2",
         struct.pack("<5BIBBHBBBB", 0x81, 5, 2, 2, 0, 3735928559, 1, 5, 16, 3, 5, 32, 160)
         + struct.pack("<HHIIHBHB", 127, 400, 16_000_000, 305441741, 23, 5, 3, 2),
     )
