@@ -8,6 +8,7 @@ where something is written: a million poses need no second copy of their results
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,13 +49,15 @@ class Results:
         """At least B columns; new ones are empty."""
         if B <= self.B:
             return
-        old, before = (self.q, self.valid, self.within, self.branch), self.B
+        old: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
+        before = self.B
         self.B = B
         if self._room < B:
             self._take(2 * B)
         else:
             self._shape()
-        pairs = zip(old, (self.q, self.valid, self.within, self.branch), (math.nan, False, False, -1), strict=True)
+        new: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
+        pairs = zip(old, new, (math.nan, False, False, -1), strict=True)
         for narrow, wide, none in pairs:
             # from the end: a row moves to where rows behind it have stood
             for start in reversed(range(0, self.N, BLOCK)):
