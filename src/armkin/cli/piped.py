@@ -14,7 +14,7 @@ from armkin.errors import FileError, NoSolutionError, UsageError
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_LARGEST = 100_000_000  # bytes
+_LARGEST = 32_000_000  # [bytes] of standard input: some 50,000 answers
 _NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
 
 
@@ -46,10 +46,7 @@ def read(robot: str | None) -> Piped:
             "nothing to send: give joint values, --target X,Y,Z or --batch FILE,\n"
             "or pipe an answer in: armkin ik ROBOT 390 80 300 --json | armkin send --port PORT"
         )
-    try:
-        text = sys.stdin.buffer.read(_LARGEST).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise UsageError(_NO_JSON) from None
+    text = _text()
     if not text.strip():
         raise UsageError("nothing to send: standard input is empty (did the command before the pipe fail?)")
     answers = [_parsed(part) for part in _parts(text)]
@@ -119,7 +116,10 @@ def _text() -> str:
     if sys.stdin is None or sys.stdin.isatty():
         return ""
     try:
-        return sys.stdin.buffer.read(_LARGEST).decode("utf-8-sig")
+        data = sys.stdin.buffer.read(_LARGEST + 1)
+        if len(data) > _LARGEST:
+            raise UsageError(f"more than {_LARGEST // 1_000_000} MB on standard input: give rows to --batch - instead")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UsageError(_NO_JSON) from None
 

@@ -100,8 +100,8 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     return Solutions(
         arm=arm,
         task=definition,
-        target=target.reshape(lead + target.shape[1:]),
-        near=close if close.shape == (*lead, arm.n) else np.broadcast_to(close, (*lead, arm.n)),
+        target=target.reshape(lead + target.shape[1:]).copy(),  # the caller's arrays may change
+        near=np.broadcast_to(close, (*lead, arm.n)).copy(),
         q=out.q.reshape(*each_branch, arm.n),
         valid=out.valid.reshape(each_branch),
         within_limits=out.within.reshape(each_branch),

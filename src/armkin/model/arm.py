@@ -59,6 +59,13 @@ class Arm:
     source: str = ""  # where the numbers come from
     file: RobotFile | None = None  # for whoever prints the file itself; all that arms do is in the fields above
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy, or what was pickled, is read-only, too: caches hold code for its values."""
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        self.__dict__.update(state)
+
     @property
     def n(self) -> int:
         """Number of joints."""

@@ -80,7 +80,13 @@ def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
     >>> unlock(armkin.load("robots/three_dof.yaml"), {"q2": 0.5}, [0.1, 0.2]).tolist()
     [0.1, 0.5, 0.2]
     """
-    values = np.asarray(q, dtype=float)
+    for name, value in held.items():
+        joint_index(arm, name)
+        if not isinstance(value, int | float | np.number):
+            raise UsageError(f"{name} cannot be held at {value!r}: give a number", joint=name)
+    values = arrays.real(q, "joint values")
+    if values.ndim == 0 or values.shape[-1] != arm.n - len(held):
+        raise UsageError(f"expected the {arm.n - len(held)} joint values that are not held, got shape {values.shape}")
     missing = np.isnan(values).any(axis=-1)
     out = np.empty((*values.shape[:-1], arm.n))
     rest = iter(range(values.shape[-1]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
 from armkin.motors import joints_per_pulse
@@ -16,12 +17,20 @@ from armkin.reach.volume import motion
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+_MOST_MOTORS = 14  # 8,192 combinations of signs a pose
 MEASURES = ("manipulability", "step_error")
 
 
 def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
     """The function (N, n) -> (N,) of a measure's name, its constants worked out."""
     if name == "step_error":
+        if len(arm.motor_gain) > _MOST_MOTORS:
+            raise UsageError(
+                f"{arm.name} has {len(arm.motor_gain)} motors: the worst of all their roundings is searched for up to "
+                f"{_MOST_MOTORS}",
+                motors=len(arm.motor_gain),
+                most=_MOST_MOTORS,
+            )
         half = 0.5 * joints_per_pulse(arm)
         return lambda q: _worst(jacobian(arm, q)[:, :3] @ half)
     normal, _ = motion(arm)

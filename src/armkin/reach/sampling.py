@@ -46,6 +46,9 @@ class Random:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for what, value in (("samples", self.count), ("seed", self.seed)):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+                raise UsageError(f"{what}: {value!r} is no whole number")
         if not 1 <= self.count <= _MOST:
             raise UsageError(f"{self.count} samples: give 1 to 1e15")
         if self.seed < 0:

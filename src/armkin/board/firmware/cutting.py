@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 TOLERANCE = 0.05  # [mm] between the chord of a segment and its curve
 
 
+FARTHEST = 2**30  # counts: half of what a board's registers hold
+
+
 class RateError(UsageError):
     """A motor is asked for more than the board makes; fields: share, what the board makes of it."""
 
@@ -85,6 +88,11 @@ def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_int
     """
     arm, first = trajectory.arm, np.asarray(start, dtype=np.int64)
     ends = [pulses(arm, stretch.end) for stretch in trajectory.stretches]
+    for end in ends:
+        if (far := int(np.abs(end).argmax())) >= 0 and abs(end[far]) > FARTHEST:
+            raise UsageError(
+                f"motor {motor_names(arm)[far]} would stand at {end[far]:,} counts; a board counts to {FARTHEST:,}"
+            )
     top = np.zeros(len(first))
     at, allowed = first, clock / min_interval
     for stretch, end in zip(trajectory.stretches, ends, strict=True):

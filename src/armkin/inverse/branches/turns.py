@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Entry, wrapped
 from armkin.forward import one_pose
 from armkin.model.arm import actual
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 TURN = 2 * np.pi
+MOST = 50_000  # copies of one branch that `turns` gives
 
 
 def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
@@ -82,7 +85,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
     q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n). An unlimited revolute
-    joint has copies without end: it gives the one nearest to `near` alone.
+    joint has copies without end: it gives the one nearest to `near` alone. Raises UsageError for more
+    than `MOST` copies.
 
     >>> import armkin
     >>> arm = armkin.load("robots/ur5e.yaml")  # limits of +-360 degrees, joint 3 of +-180
@@ -106,6 +110,13 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))
             last = int(np.floor((upper + SLACK - row[i]) / TURN))
             choices.append([float(row[i] + TURN * k) for k in range(first, last + 1)])
+    count = math.prod(map(len, choices))
+    if count > MOST:
+        raise UsageError(
+            f"{arm.name}: {count:,} copies of one branch are within the limits; at most {MOST:,} are listed",
+            copies=count,
+            most=MOST,
+        )
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - close) * unit).sum(axis=1)

@@ -1,0 +1,49 @@
+"""What grows without bound is refused with its count, and what is long takes linear time."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from command_line import ROOT, run
+
+
+LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
+
+
+@pytest.mark.parametrize("text", [*(word + "x" for word in LONG), "1" * 9_990 + "deg", "1:" * 4_990])
+def test_long_words_take_no_long_time(text: str, tmp_path: Path) -> None:
+    robot = tmp_path / "arm.yaml"
+    robot.write_text((ROOT / "robots/three_dof.yaml").read_text().replace("d: 170", f"d: {text}"))
+    began = time.process_time()
+    assert run("fk", "three_dof", text, 0, 0).code == 2
+    assert run("info", robot).code == 4
+    assert run("fk", "three_dof", "--batch", "-", stdin=f"{text},0,0\n".encode()).code == 2
+    assert time.process_time() - began < 1.5
+
+
+def test_copies_of_a_branch_are_counted_before_they_are_made(tmp_path: Path) -> None:
+    robot = tmp_path / "wide.yaml"
+    lines = (ROOT / "robots/ur5e.yaml").read_text().splitlines()
+    wide = [line.split("limits:")[0] + "limits: [-3600, 3600]" if "limits:" in line else line for line in lines]
+    robot.write_text("\n".join(wide) + "\n")
+    done = run("ik", robot, 300, -200, 400, 180, 0, 0, "--turns")
+    assert (done.code, done.out) == (2, "")
+    assert "64,000,000 copies of one branch are within the limits; at most 50,000 are listed" in done.err
+
+
+def test_counts_beyond_a_boards_registers_are_refused(tmp_path: Path) -> None:
+    robot = tmp_path / "free.yaml"
+    text = (ROOT / "robots/three_dof.yaml").read_text().partition("gripper:")[0]
+    robot.write_text("\n".join(line for line in text.splitlines() if "limits:" not in line) + "\n")
+    done = run("send", robot, "1e9", 0, 0, "--dry-run")
+    assert (done.code, done.out) == (2, "")
+    assert "motor q1 would stand at 35,555,555,556 counts; a board counts to 1,073,741,824" in done.err
+
+
+def test_standard_input_without_end_is_refused() -> None:
+    done = run("send", "--port", "sim", stdin=b"{}\n" * 11_000_000)
+    assert (done.code, done.out) == (2, "")
+    assert "more than 32 MB on standard input" in done.err
