@@ -9,7 +9,6 @@ import pytest
 
 from command_line import ROOT, run
 
-
 LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
 
 
