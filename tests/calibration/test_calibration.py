@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -312,6 +314,15 @@ def test_the_command_writes_a_file_that_the_others_take(tmp_path: Path) -> None:
     missing = run("calibrate", "three_dof")
     assert missing.code == 2
     assert "--suggest 30 says which poses to measure" in missing.err
+
+
+def test_the_page_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).parents[2]
+    monkeypatch.chdir(root)
+    [block] = re.findall(r"```python\n(.*?)```", (root / "docs/calibration.md").read_text(), re.S)
+    names: dict[str, Any] = {}
+    exec(block, names)
+    assert names["found"].rms("after") < 0.05 * names["found"].rms("before")
 
 
 def test_the_command_suggests_poses(tmp_path: Path) -> None:

@@ -262,6 +262,8 @@ def test_the_command_prints_a_robot_file_and_says_what_it_read(tmp_path: Path) -
     assert several.out == ""
     assert "the tip must be named: wrist_3_link, ee_link, tool0" in several.err
     assert "--tip LINK" in several.err
+    assert "--base" not in several.err
+    assert "--" not in run("import", path, "--tip", "world", "--base", "tool0").err
     done = run("import", path, "--tip", "tool0")
     assert done.code == 0
     assert "note: 6 joints from world to tool0" in done.err

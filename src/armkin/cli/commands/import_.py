@@ -42,7 +42,10 @@ def import_(
     try:
         found = urdf.read(file, base=base, tip=tip, snap=snap)
     except UsageError as error:
-        raise UsageError(f"{error}\ngive it with {'--base' if 'base' in str(error) else '--tip'} LINK") from None
+        option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
+        if option is None:
+            raise
+        raise UsageError(f"{error}\ngive it with --{option} LINK") from None
     arm = build(robot_file.parse(text(found.data), f"{file} as a robot file"))
     data: dict[str, Any] = tables.dh(arm) if dh else found.data
     with output.destination(out) as write:
