@@ -180,15 +180,17 @@ def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
         page.keyboard.press("Tab")
         settled(page)
         page.click("[data-view=space]")
-        page.evaluate("document.activeElement.blur()")
+        page.evaluate("document.activeElement.blur(); document.querySelector('#panels').scrollTop = 0")
         page.mouse.move(5, 500)
-        page.wait_for_timeout(1000)
+        page.wait_for_timeout(500)
+        until(page, "!document.querySelector('#canvas').dataset.coarse")
+        page.wait_for_timeout(500)
         page.screenshot(path=now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
         picture.write_bytes(now.read_bytes())
     shown, drawn = (image.imread(path)[..., :3] for path in (picture, now))
     assert shown.shape == drawn.shape
-    assert np.abs(shown - drawn).mean() < 0.03  # another machine's fonts; an arm that stands elsewhere is more
+    assert np.abs(shown - drawn).mean() < 0.015  # another machine's fonts; a joint turned by 20 degrees: 0.02
     assert "docs/teach.png" in (ROOT / "README.md").read_text()[:3000]
 
 

@@ -195,12 +195,14 @@ export class View {
     if (this.slow >= 3 && !this.coarse) {
       this.coarse = true;
       this.renderer.setPixelRatio(FINE / 2);
+      this.canvas.dataset.coarse = "yes";
     }
     if (!this.coarse) return;
     clearTimeout(this.resting);
     this.resting = setTimeout(() => {
       this.coarse = false;
       this.renderer.setPixelRatio(FINE);
+      delete this.canvas.dataset.coarse;
       this.draw();
     }, 400);
   }
