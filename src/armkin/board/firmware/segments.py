@@ -28,8 +28,8 @@ CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 576  # [cycles] between ticks, that every board makes
 
 # Speed at a segment's fast end over that at its slow end, from a ramp's top down: so few that the board's queue (32)
-# holds all of the last ramp.
-_RATIOS = (1.13,) * 22 + (1.25, 1.35, 1.5, 1.8, 2.2)
+# holds nearly all of a short move, however late the host is.
+_RATIOS = (1.13,) * 10 + (1.18, 1.22, 1.3, 1.4, 1.6, 1.9)
 _ROUGH = (1.2,) * 12  # for a line that is too bad for so many
 _FIRST = 0.002  # [s] a ramp's first segment at least
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
