@@ -393,7 +393,7 @@ def test_servos_ramp_from_the_pose_that_they_are_said_to_have(tmp_path: Path) ->
         widths = [servo["width_us"] for servo in board.stats()["servos"].values()][:4]
         assert widths == pytest.approx(done.json["pulses"], abs=3)
         status = run("status", robot, "--port", board.port, "--json").json
-        # Opening the port again has reset the board: nothing holds servos without pulses, and they jump by consent only.
+        # Opening the port again has reset the board: nothing holds servos without pulses.
         assert status["position"] == "lost"
         assert run("send", robot, 0, 0, 0, 0, "--port", board.port).code == 5
 

@@ -106,7 +106,7 @@ def home(
     for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
-            status, edge = machine.home(search.frame)
+            status, edge = machine.home(search.frame, search.time / 10)
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))

@@ -241,6 +241,10 @@ class Machine:
             progress(done, total)
 
         self._stream(frames(), tell)
+        if self.position() == "lost":
+            raise self._lost("the board has lost the arm's position on the way")
+        if self.status.overruns:
+            raise LinkError(f"the board reports {self.status.overruns} late ticks: lower the speed\n{self.standing()}")
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "
@@ -326,11 +330,11 @@ class Machine:
         self.status = session.status()
         return self.status
 
-    def home(self, make: Callable[[int], bytes]) -> tuple[Status, Status]:
-        """Carry out one HOME; status at rest, and at the switch's edge (page 1)."""
+    def home(self, make: Callable[[int], bytes], seconds: float) -> tuple[Status, Status]:
+        """Carry out one HOME that takes so long at most; status at rest, and at the switch's edge (page 1)."""
         try:
             self.session.call(make)
-            for _ in self.session.arrivals():
+            for _ in self.session.arrivals(seconds):
                 pass
             self.status = self.session.status()
             return self.status, self.session.status(page=1)

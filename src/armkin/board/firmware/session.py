@@ -12,7 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware import protocol
+from armkin.board.firmware import heed, protocol
+from armkin.board.firmware.heed import DeviceError as DeviceError
+from armkin.board.firmware.heed import ReplacedError as ReplacedError
 from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
 from armkin.board.ports import Port
 from armkin.errors import LinkError
@@ -23,6 +25,8 @@ _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
 _POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
 _POLL_CREDIT = 0.01  # [s] while waiting for credit, which only answers bring
 _GIVE_UP = 1.5  # [s] without any answer
+_STALLED = 5.0  # [s] beyond the time that all in the queue may take
+_HOLD = 15.0  # [s] that an arm may take to come to rest
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
 _COPIES = 3  # of every frame, on a bad line
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
@@ -31,19 +35,6 @@ _PROBES = 8
 _UNDER_WAY = 16  # frames
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
 _QUESTION = 12  # [bytes] of a STATUS? on the line
-
-
-class DeviceError(LinkError):
-    """The board has ended the session: `error` is its code, `detail` the axis, row or segment."""
-
-    def __init__(self, error: int, detail: int, state: int) -> None:
-        self.error = Error(error) if error in Error._value2member_map_ else Error.OK
-        self.detail, self.state = detail, state
-        super().__init__(f"the board refused: {self.error.name} ({error}), detail {detail}")
-
-
-class ReplacedError(LinkError):
-    """Another program has opened a session with the board: this one is over."""
 
 
 @dataclass
@@ -79,6 +70,7 @@ class Session:
         self._asked = 0.0
         self._clear = 0.0  # when all that was written will have left, and the window last moved
         self._gap = False
+        self._until = 0.0  # something has to go on by then
         self._bytes = _BYTES[1]  # that may be under way
         self._written = 0  # frames in sequence
 
@@ -99,7 +91,8 @@ class Session:
                     return info
             else:
                 quiet = not self.port.read(0.05) and quiet
-            self._check_stop_idle()
+            if self._stop():
+                raise StoppedError
             if since > _BOOT:
                 heard = "nothing" if quiet and not self._splitter.bad else "but not in this protocol"
                 raise LinkError(
@@ -142,6 +135,7 @@ class Session:
         )
 
     def _begin(self, info: Info) -> None:
+        heed.check_info(info, self.port.name)
         self.info = info
         self._digest = info.nonce & 0xFFFF
         self._waiting.clear()
@@ -149,11 +143,28 @@ class Session:
         self._next, self._free, self._queue = 0, info.queue, info.queue
         self._error, self._gap = None, False
         self._heard = self.port.now()
+        self._patient()
+
+    def _patient(self) -> None:
+        """Something went on: wait for the next as long as what is queued may take, and a little."""
+        self._until = self.port.now() + self.queued / 1000 + _STALLED
+
+    def _stalled(self) -> None:
+        """Raise LinkError if the board has neither gone on nor come to rest in all the time that it may take."""
+        if self.port.now() > self._until:
+            raise LinkError(
+                f"the board on {self.port.name} answers, but does not go on: it stays {State(self.state).name}\n"
+                "if the arm moves, cut the motors' power; armkin status tells what the board says",
+                port=self.port.name,
+                state=State(self.state).name.lower(),
+            )
 
     # Frames in sequence
 
     def submit(self, make: Callable[[int], bytes], segments: int = 0, seconds: float = 0.0) -> None:
         """Put a frame in line; make: its payload for a sequence number; segments: credit that it takes."""
+        if not (self._waiting or self._sent):
+            self._patient()
         self._waiting.append(_Frame(make, segments, seconds))
 
     @property
@@ -196,6 +207,8 @@ class Session:
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
         if self.port.now() - self._heard > _GIVE_UP:
             raise self._silent()
+        if self._waiting or self._sent:
+            self._stalled()
 
     @property
     def noisy(self) -> bool:
@@ -278,8 +291,11 @@ class Session:
             if isinstance(reply, Info):
                 self._same(reply.nonce & 0xFFFF)
                 continue  # of a HELLO that was repeated
+            assert self.info is not None
+            heed.check_reply(reply, self.info, self.port.name)
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 self._same(reply.session)
+                heed.check_next((reply.next - self._next) & 255, len(self._sent), self.port.name)
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
@@ -313,6 +329,7 @@ class Session:
             self._next = reply.next
             self._free = reply.free
             if done:
+                self._patient()
                 self._clear, self._gap = max(self._clear, self.port.now()), False
                 self._bytes = _BYTES[0] if self.noisy else min(_BYTES[1], self._bytes + 20)
             elif self._sent and (type(reply) is Ack or (reply.detail == Error.SPILL and not reply.error)):
@@ -345,21 +362,30 @@ class Session:
             status = self.status()
             if status.state == State.IDLE and status.error:
                 return status
-            if self.port.now() - begin > 60:
-                raise LinkError("the board does not come to rest: cut the motors' power")
+            if self.port.now() - begin > _HOLD:
+                raise LinkError(f"the board on {self.port.name} does not come to rest: cut the motors' power")
             self._hear(0.03)
 
     def rest(self) -> Status:
         """Wait until the arm stands, whatever the session is; its status then."""
+        self._until = self.port.now() + _HOLD
         while True:
             status = self.status()
             if status.state == State.IDLE:
                 return status
+            if self._stop():
+                raise StoppedError(self.hold())
+            self._stalled()
             self._hear(0.02)
 
-    def arrivals(self) -> Iterator[float]:
-        """Wait until all that was submitted is done and the arm stands; yields the seconds left."""
+    def arrivals(self, seconds: float = 0.0) -> Iterator[float]:
+        """Wait until all that was submitted is done and the arm stands; yields the seconds left.
+
+        seconds: that a motion may take which is not queued: homing.
+        """
+        self._until = max(self._until, self.port.now() + self.queued / 1000 + seconds + _STALLED)
         while True:
+            self._stalled()
             if not (self._waiting or self._sent) and self.state == State.IDLE:
                 return
             # Asking again when the queue must have ended, rather than at the next poll.
@@ -367,10 +393,6 @@ class Session:
                 self._asked = min(self._asked, self.port.now() - _POLL + 0.01)
             self.pump()
             yield self.under_way + self.queued / 1000
-
-    def _check_stop_idle(self) -> None:
-        if self._stop():
-            raise StoppedError
 
     def _silent(self) -> LinkError:
         return LinkError(

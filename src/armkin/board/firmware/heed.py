@@ -1,0 +1,80 @@
+"""What a board may say: every field of its replies in its range, or the link is at an end."""
+
+from __future__ import annotations
+
+from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
+from armkin.errors import LinkError
+
+_INFO: dict[str, tuple[int, int]] = {
+    "axes": (1, 15),
+    "switches": (0, 8),
+    "rows": (0, 15),
+    "queue": (8, 128),
+    "frame": (100, 250),
+    "receive": (64, 65_535),
+    "min_interval": (129, 32_767),
+    "clock": (1_000_000, 1_000_000_000),
+    "boots": (1, 65_535),
+}
+
+
+class DeviceError(LinkError):
+    """The board has ended the session: `error` is its code, `detail` the axis, row or segment."""
+
+    def __init__(self, error: int, detail: int, state: int) -> None:
+        self.error = Error(error) if error in Error._value2member_map_ else Error.OK
+        self.detail, self.state = detail, state
+        super().__init__(f"the board refused: {self.error.name} ({error}), detail {detail}")
+
+
+class ReplacedError(LinkError):
+    """Another program has opened a session with the board: this one is over."""
+
+
+class BoardSaysError(LinkError):
+    """The board says what no board with this firmware can say; fields: field, value."""
+
+
+def _impossible(port: str, field: str, value: object, allowed: str) -> BoardSaysError:
+    return BoardSaysError(
+        f"the board on {port} says {field} {value}; {allowed} can be: its answers are not to be trusted\n"
+        "flash the firmware that came with this armkin, or look for another program on the line",
+        port=port,
+        field=field,
+        value=value,
+    )
+
+
+def check_info(info: Info, port: str) -> None:
+    """Raise BoardSaysError for an INFO that cannot be."""
+    for field, (least, most) in _INFO.items():
+        value = getattr(info, field)
+        if not least <= value <= most:
+            raise _impossible(port, field, value, f"{least} to {most}")
+    for field in ("known", "servos"):
+        value = getattr(info, field)
+        if value >> info.axes:
+            raise _impossible(port, field, f"{value:#x}", f"{info.axes} axes")
+
+
+def check_reply(reply: Ack | Status, info: Info, port: str) -> None:
+    """Raise BoardSaysError for an ACK or STATUS that cannot be."""
+    if reply.state > max(State):
+        raise _impossible(port, "state", reply.state, f"0 to {int(max(State))}")
+    if reply.error > max(Error):
+        raise _impossible(port, "error", reply.error, f"0 to {int(max(Error))}")
+    if reply.free > info.queue:
+        raise _impossible(port, "free", reply.free, f"0 to {info.queue}")
+    if isinstance(reply, Status):
+        if len(reply.counts) != info.axes:
+            raise _impossible(port, "counts", len(reply.counts), str(info.axes))
+        if reply.known >> info.axes:
+            raise _impossible(port, "known", f"{reply.known:#x}", f"{info.axes} axes")
+        if max(map(abs, reply.counts)) > 2**31 - 1:
+            raise _impossible(port, "counts", max(map(abs, reply.counts)), "31 bits")
+
+
+def check_next(done: int, sent: int, port: str) -> None:
+    """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
+    if done > sent:
+        raise _impossible(port, "next", f"{done} ahead", f"0 to {sent}")
