@@ -548,3 +548,22 @@ def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path)
     assert done.code == 2
     for words in ("joint q1 has no max_accel", "it has no board", "max_accel: ...", "board: {kind: ..., driver: ...}"):
         assert words in done.err
+
+
+def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -> None:
+    lines = []
+    for line in (ROOT / "robots/panda.yaml").read_text().splitlines():
+        lines.append(line)
+        if line.startswith("    max_speed:"):
+            lines += ["    max_accel: 100", "    drive: {full_steps: 200, microsteps: 16, gear: 50}"]
+    path = tmp_path / "panda.yaml"
+    path.write_text("\n".join(lines))
+    words = ("send", path, "--target", "400,0,400,180,0,0", "--dry-run", "--json")
+    assert "--lock JOINT=VALUE" in run(*words).err
+    done = run(*words, "--lock", "J3=20")
+    assert done.code == 0, done.err
+    assert done.json["joints"][2] == pytest.approx(20, abs=0.01)
+    assert done.json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
+    alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
+    assert (alone.code, alone.out) == (2, "")
+    assert "--branch, --task and --lock belong to --target" in alone.err

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from armkin.cli import inputs, piped
+from armkin.cli import holding, inputs, piped
 from armkin.cli.csv_rows import streamed_rows
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
@@ -24,6 +24,7 @@ def goals(
     branch: str | None,
     task: str | None,
     batch: str | None,
+    lock: Sequence[str] | None = None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     import numpy as np
@@ -36,8 +37,8 @@ def goals(
         inputs.target_list(arm, task_for(arm, task), target, q)  # 390 80 300 wants commas
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
-    if target is None and (branch is not None or task is not None):
-        raise UsageError("--branch and --task belong to --target")
+    if target is None and (branch is not None or task is not None or lock):
+        raise UsageError("--branch, --task and --lock belong to --target")
     if not given:
         return _from_pipe(robot)
     if robot is None:
@@ -49,7 +50,7 @@ def goals(
         what = task_for(arm, task)
         values = inputs.target_list(arm, what, target)
         goal = units.targets_in(what.labels, np.array([values]))
-        return arm, Goals(None, [1], goal, what.name, branch)
+        return arm, Goals(None, [1], goal, what.name, branch, holding.locks(arm, lock))
     if batch == "-":
         from armkin.board.moving import Stream
 
@@ -75,6 +76,7 @@ class Goals:
     target: Array | None = None
     task: str | None = None
     branch: str | None = None
+    held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
 
     def resolve(self, arm: Arm, near: Array) -> Array:
         """Joint values (w, n); near: where the arm stands [rad | mm]."""
@@ -82,7 +84,8 @@ class Goals:
             return self.joints
         from armkin.inverse import choose
 
-        request = choose.Request(arm=arm, task=self.task, near=units.joints_out(arm, near).tolist(), branch=self.branch)
+        at = units.joints_out(arm, near).tolist()
+        request = choose.Request(arm=arm, task=self.task, near=at, branch=self.branch, held=self.held)
         [answer] = choose.solve(request, self.target)  # type: ignore[arg-type]
         if answer.best is None:
             nearest = choose.closest(request, self.target[0])  # type: ignore[index]

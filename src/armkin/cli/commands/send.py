@@ -12,7 +12,7 @@ from armkin.cli.batch import csv_line
 from armkin.cli.goals import goals as read_goals
 from armkin.cli.linking import SIM, AssumeHome, Baud, PortName
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, RobotOrPipe, TaskName
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -33,6 +33,7 @@ def send(
     ] = None,
     branch: BranchName = None,
     task: TaskName = None,
+    lock: Lock = None,
     batch: Annotated[
         str | None,
         typer.Option(
@@ -91,7 +92,7 @@ def send(
         sent(robot, path, port, speed, dry_run, start, trace, baud, assume_home=assume_home, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, target, branch, task, batch)
+    arm, goals = read_goals(robot, q, target, branch, task, batch, lock)
     board = linking.board_of(arm, rehearsal=dry_run or port == SIM)
     planner = Planner(arm, board, fraction, radius)
     if dry_run:

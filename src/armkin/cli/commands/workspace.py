@@ -41,7 +41,7 @@ def workspace(
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", metavar="FILE", help="All samples as .csv, .npz or .ply; whole or not at all."),
+        typer.Option("--out", "-o", metavar="FILE", help="All samples as .csv, .npz or .ply; whole or not at all."),
     ] = None,
     plot: Annotated[
         str | None,
