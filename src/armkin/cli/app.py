@@ -19,7 +19,7 @@ from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
 
-RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED, TERMINATED = 1, 2, 3, 4, 5, 130, 143
+RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED = 1, 2, 3, 4, 5, 130
 
 EXIT_CODES: dict[type[errors.ArmkinError], int] = {
     errors.FileError: RUNTIME,
@@ -118,7 +118,8 @@ def _version(wanted: bool) -> None:
     if wanted:
         from armkin import __version__
 
-        sys.stdout.write(f"armkin {__version__}\n")
+        with output.destination(None) as write:
+            write(f"armkin {__version__}\n")
         raise typer.Exit
 
 
@@ -133,7 +134,7 @@ def armkin(
 
 def run(arguments: list[str]) -> int:
     """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
-    before = signal.signal(signal.SIGTERM, _terminate)
+    before = {number: signal.signal(number, _terminate) for number in _ending()}
     if arguments[:1] in ([], ["help"]):  # armkin help fk
         arguments = [*arguments[1:2], "--help"]
     output.for_programs("--json" in arguments)
@@ -143,7 +144,8 @@ def run(arguments: list[str]) -> int:
         return _exit_code(_flush) or code
     finally:
         output.flush()
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _exit_code(command: Callable[[], Any]) -> int:
@@ -158,6 +160,7 @@ def _exit_code(command: Callable[[], Any]) -> int:
     except _ClosedPipe:
         return _enough()
     except (KeyboardInterrupt, typer.Abort):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C while the first one tidies up
         return INTERRUPTED
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else RUNTIME
@@ -175,9 +178,17 @@ def _flush() -> None:
         sys.stdout.flush()
 
 
+def _ending() -> list[int]:
+    """The signals that end a command, but for those that its parent has it ignore, as `nohup` does."""
+    known = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
+    return [number for number in known if number is not None and signal.getsignal(number) != signal.SIG_IGN]
+
+
 def _terminate(signum: int, frame: object) -> None:
-    """SIGTERM ends the command as Ctrl-C does, through its ``finally``s, with its own exit code."""
-    sys.exit(TERMINATED)
+    """SIGTERM and SIGHUP end the command as Ctrl-C does, through its ``finally``s, with their own exit codes."""
+    for number in _ending():
+        signal.signal(number, signal.SIG_IGN)  # once is enough
+    sys.exit(128 + signum)
 
 
 def _os_error(error: OSError) -> int:

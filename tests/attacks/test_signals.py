@@ -1,0 +1,52 @@
+"""Signals end a command silently, with its exit code, and leave nothing behind."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from command_line import ROOT
+
+ARMKIN = [sys.executable, "-m", "armkin"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+@pytest.mark.parametrize(("number", "code"), [("SIGHUP", 129), ("SIGTERM", 143), ("SIGINT", 130)])
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_file_that_is_half_written_goes(number: str, code: int, times: int, tmp_path: Path) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text("1,2,3\n" * 400_000)
+    command = [*ARMKIN, "fk", str(ROOT / "robots/three_dof.yaml"), "--batch", str(rows), "--out", "out.csv"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE)
+    end = time.monotonic() + 30
+    while not list(tmp_path.glob(".armkin-*.part")):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    time.sleep(0.2)
+    for _ in range(times):
+        process.send_signal(getattr(signal, number))
+    assert process.communicate(timeout=20)[1] == b""
+    assert process.returncode == code
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        ("--version >&-", 1, "standard output is closed"),
+        ("fk three_dof 0 0 0 >&-", 1, "standard output is closed"),
+        ("robots > /dev/full", 1, "No space left on device"),
+        ("fk three_dof --batch - <&-", 1, "standard input is closed"),
+    ],
+)
+def test_streams_that_are_not_there_are_named(words: str, code: int, message: str) -> None:
+    done = subprocess.run(["sh", "-c", f"exec {sys.executable} -m armkin {words}"], capture_output=True, text=True)
+    assert done.returncode == code
+    assert message in done.stderr
+    assert "internal error" not in done.stderr
