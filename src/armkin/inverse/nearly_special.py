@@ -6,7 +6,8 @@ between the two arms: where those of the similar arm move too much, appear or va
 target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
 then go to the elimination, which needs no special class; for fewer, the similar arm's branches
 at the targets around give more seeds. There is no proof that nothing is lost in between,
-hence `complete` is False.
+hence `complete` is False. Where the elimination is healthy on the arm, as the share of poses that its main pass
+settles shows, six joints go straight to it, and the similar arm only names the branches.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from armkin.inverse import general
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import HOPELESS, NEAR, STEADY
 from armkin.inverse.tasks.fitting import PARALLEL
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+SICK = 0.08  # share of poses that a healthy elimination leaves open in its main pass
+APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
 
 
@@ -56,6 +60,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
+    if elimination is not None and (straight := _straight(arm, task, alike, off, elimination())) is not None:
+        return straight
 
     def rows(target: Array) -> Rows:
         starts = range(0, max(len(target), 1), CHUNK)
@@ -77,6 +83,54 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         ordered=alike.ordered,
         branches=int(np.prod(sizes)) if sizes else None,
     )
+
+
+def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
+    """The elimination, its branches named after those of the similar arm; None if it is not healthy on this arm."""
+    if general_ is None or general_.elimination is None or general_.rows is None or not general_.complete:
+        return None
+    if method.left_open(general_.elimination) > SICK:
+        return None
+    solve = general_.rows
+
+    def rows(target: Array) -> Rows:
+        found = solve(target)
+        starts = range(0, max(len(target), 1), CHUNK)
+        parts = [_placed(arm, task, alike, off, found.q[k : k + CHUNK], target[k : k + CHUNK]) for k in starts]
+        q = np.full((len(target), max(part.shape[1] for part in parts), arm.n), np.nan)
+        for k, part in zip(starts, parts, strict=True):
+            q[k : k + len(part), : part.shape[1]] = part
+        return found._replace(q=q)
+
+    sizes = [2 if label else 1 for label in alike.labels]
+    return Geometry(
+        general_.name,
+        f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class",
+        True,
+        rows=rows,
+        labels=alike.labels,
+        ordered=alike.ordered,
+        branches=int(np.prod(sizes)) if sizes else None,
+    )
+
+
+def _placed(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> Array:
+    """Branches (N, M, n) in the places of the similar arm's branches that they are nearest to, the others behind."""
+    seed, miss, _ = recorded(arm, task, alike).rows(target)
+    N, B, n = seed.shape
+    with np.errstate(invalid="ignore"):
+        away = newton.wrapped_distance(arm, q[:, None], seed[:, :, None])  # (N, B, M)
+        real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
+    away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
+    nearest, back = away.argmin(axis=2), away.argmin(axis=1)
+    row, place = np.nonzero(
+        (np.take_along_axis(back, nearest, axis=1) == np.arange(B)) & (away.min(axis=2, initial=np.inf) < APART)
+    )
+    out = np.full((N, B, n), np.nan)
+    rest = q.copy()
+    out[row, place] = q[row, nearest[row, place]]
+    rest[row, nearest[row, place]] = np.nan
+    return _packed(np.concatenate([out, rest], axis=1), B)
 
 
 def _distance(arm: Arm, task: Task, alike: Geometry) -> float:

@@ -114,6 +114,19 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0].error)
 
 
+def left_open(elimination: Elimination, samples: int = 48) -> float:
+    """Share of random poses that the main pass leaves open: near a special geometry the method is ill-conditioned."""
+    closed = elimination.loop
+    if not elimination.plans:
+        return 0.0
+    rng = np.random.default_rng(6)
+    q = np.where(closed.prismatic, rng.uniform(-1, 1, (samples, 6)), rng.uniform(-np.pi, np.pi, (samples, 6)))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    goal = np.tile(np.eye(4), (samples, 1, 1))
+    goal[:, :3] = np.moveaxis(frame, -1, 0)
+    return float(_attempt(closed, elimination.plans[0], goal, 0)[1].mean())
+
+
 class _Rating(NamedTuple):
     """How well a role does on an arm: the raw error is the 90th percentile of log10 over random poses."""
 
