@@ -118,6 +118,8 @@ def _placed(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target:
     """Branches (N, M, n) in the places of the similar arm's branches that they are nearest to, the others behind."""
     seed, miss, _ = recorded(arm, task, alike).rows(target)
     N, B, n = seed.shape
+    if not q.size:
+        return np.full((N, B, n), np.nan)
     with np.errstate(invalid="ignore"):
         away = newton.wrapped_distance(arm, q[:, None], seed[:, :, None])  # (N, B, M)
         real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
