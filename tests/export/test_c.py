@@ -13,6 +13,7 @@ from exported import agreement
 
 import armkin
 from armkin.export.c.program import identifier, program
+from command_line import run as run_armkin
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
@@ -111,3 +112,26 @@ def test_it_says_what_python_says(robot: str, count: int, tmp_path: Path) -> Non
 def test_a_calibrated_arm_takes_and_gives_commanded_values(tmp_path: Path) -> None:
     arm = replace(armkin.load(ROBOTS / "three_dof.yaml"), ratio=np.array([1.01, 0.99, 1.002]))
     assert agreement(arm, tmp_path, 500).different == []
+
+
+def test_the_command_writes_three_files(tmp_path: Path) -> None:
+    done = run_armkin("export", "robots/three_dof.yaml", "--c", "--float", "--out", tmp_path / "arm.c")
+    assert done.code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.c", "arm.h", "arm_test.c"]
+    assert "typedef float three_dof_real;" in (tmp_path / "arm.h").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["three_dof.yaml", "--c"], "name the source, for example -o arm.c"),
+        (["three_dof.yaml", "--c", "--out", "arm.txt"], "name the source, for example -o arm.c"),
+        (["three_dof.yaml", "--float", "--dh"], "--float goes with --c alone"),
+        (["jaco_j2n6s300.yaml", "--c", "--float", "--out", "arm.c"], "needs double precision; leave --float away"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_in_words(words: list[str], said: str) -> None:
+    done = run_armkin("export", f"robots/{words[0]}", *words[1:])
+    assert done.code == 2
+    assert said in done.err
+    assert not done.out

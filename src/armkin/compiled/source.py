@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PARTS = Path(__file__).parent / "parts"
 
 
-LANES = 32  # poses at once: vectors of any length, and blocks of some kilobytes
+LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
 
 
 class Library(NamedTuple):

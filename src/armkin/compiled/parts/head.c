@@ -3,7 +3,7 @@
 #include <stdint.h>
 
 /* poses worked on at once: vectors of the compiler's choice, and blocks that stay in the cache */
-#define ARM_LANES 32
+#define ARM_LANES 16
 #define ARM_INLINE static inline __attribute__((always_inline))
 #define ARM_RESTRICT restrict
 #define ARM_ROUNDED 1e-14 /* a rotation this far from orthonormal is taken as it is: `armkin.inverse.tasks` */
