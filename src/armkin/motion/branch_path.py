@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian, position
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
@@ -18,7 +19,7 @@ from armkin.motion.chains import Chain, Run, chains, fewest
 from armkin.motion.columns import Columns, change, chord_bound, levers, linked
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
+from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, within
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 _GRID = 1000  # points of a route's grid, at least
 _EACH = 8  # of a piece's
+_DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 _STEP = 1.0  # [mm] between the first samples, at most
 _SAMPLES = (200, 20_000)
@@ -145,18 +147,25 @@ def stretches(
         if b - a <= 1e-9:
             continue
         number = max(int(grid * (b - a) / route.length), 60)
-        for _ in range(6):
-            path, breaks = _on_grid(arm, route, s, q, a, b, number)
-            if grid < _GRID or deviation(arm, route, path) <= pace.tolerance:
+        for damping, finer in [(d, 2**k) for d in _DAMPING for k in range(4)]:
+            path, breaks = _on_grid(arm, route, s, q, a, b, number * finer, damping)
+            off = 0.0 if grid < _GRID else deviation(arm, route, path)
+            if off <= pace.tolerance:
                 break
-            number *= 2
+        else:
+            raise NoSolutionError(
+                f"between {a:.3f} and {b:.3f} mm the plan may leave the path by {off:.3g} mm; "
+                f"{pace.tolerance:g} are allowed: nothing was moved"
+            )
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
         made.append(_timed(arm, route, knots(path.s, path.q, breaks), pace))
     return made
 
 
-def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Knots, list[int]]:
+def _on_grid(
+    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, damping: float
+) -> tuple[Knots, list[int]]:
     """Joint values on a grid from a to b that follows way and joints, exact to the inverse kinematics."""
     inside = [float(x) for x in route.ends if a + 1e-9 < x < b - 1e-9]
     moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
@@ -174,12 +183,16 @@ def _on_grid(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, num
     breaks: list[int] = np.cumsum([len(part) for part in parts])[:-1].tolist()
     where = np.append(np.concatenate(parts), b)
     guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
-    exact = corrected(arm, route.task, guess, route.targets(where))
+    exact = corrected(arm, route.task, guess, route.targets(where), damping)
     return knots(where, exact, breaks), breaks
 
 
-def corrected(arm: Arm, task: Task, q: Array, target: Array, steps: int = 4) -> Array:
-    """Joint values near the right ones, made exact by Newton steps; those of free joints stay: (N, n)."""
+def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:
+    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
+
+    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
+    round for what is within the tolerance anyway.
+    """
     k, p = len(task.sums), task.position
     scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
     scale[:p] = 1 / arm.reach
@@ -189,7 +202,7 @@ def corrected(arm: Arm, task: Task, q: Array, target: Array, steps: int = 4) -> 
         J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
         J[:, p : p + k] *= arm.ratio
         J = J * np.where(arm.prismatic, arm.reach, 1.0)
-        H = np.swapaxes(J, 1, 2) @ J + 1e-13 * np.eye(arm.n)
+        H = np.swapaxes(J, 1, 2) @ J + (damping / arm.reach) ** 2 * np.eye(arm.n)
         step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
         size = np.abs(step).max(axis=1, keepdims=True)
         q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * np.where(
@@ -236,7 +249,7 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
     if pace.jerk is not None:
         window = float((2 * accel / pace.jerk).max())
         cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
-    curve = Curve(path, optimal(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
+    curve = Curve(path, within(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
     return Smoothed(curve, window) if window else curve
 
 

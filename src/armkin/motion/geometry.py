@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -89,6 +89,7 @@ class Piece:
     length: float
     speed: float | None = None  # fraction of the joints' max_speed, of this move
     tool_speed: float | None = None  # [mm/s] of this move
+    rate: float | None = None  # of a straight line: millimetres of the position for each of length
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""
@@ -130,12 +131,14 @@ class Piece:
             w = vector(turn(y[:, n:]) @ turned.T)
             return np.concatenate([y[:, :n], w], axis=1)
 
-        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed)
+        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed, self.rate)
 
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
     """A straight line; orientation by slerp, sums linearly."""
-    return _uniform(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), float(np.linalg.norm(b.p - a.p)))
+    size = float(np.linalg.norm(b.p - a.p))
+    made = _uniform(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
+    return replace(made, rate=size / made.length) if made.length > 0 else made
 
 
 def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:
@@ -234,6 +237,8 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
             f"a blend of {radius:g} mm is longer than half of a side of {side:.4g} mm next to it: "
             f"at most {away(outer):.4g} mm"
         )
+    if piece.rate:
+        return inner + math.copysign(radius / piece.rate, outer - inner)
     for _ in range(60):
         middle = (inner + outer) / 2
         inner, outer = (middle, outer) if away(middle) < radius else (inner, middle)

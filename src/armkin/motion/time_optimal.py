@@ -133,6 +133,37 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     return _forward(beta, 1.0 - 2 * h[:, None] * slope, 2 * h[:, None] * level)
 
 
+def within(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
+    """The same, and within the accelerations between the grid points, too, where q'' changes much from one to the next.
+
+    An interval that exceeds them at a quarter of its way, or two, or three, is asked for that much less.
+    """
+    accel = np.broadcast_to(bounds.accel, path.q.shape).copy()
+    most = accel.copy()
+    for _ in range(4):
+        x = optimal(path, Bounds(bounds.speed, accel, bounds.cap), rows)
+        over = _excess(path, x, most)
+        if over.max(initial=0.0) <= 1.001:
+            break
+        each = np.maximum(np.append(over, 1.0), np.append(1.0, over))
+        accel /= np.where(each > 1.001, each, 1.0)[:, None]
+    return x
+
+
+def _excess(path: Knots, x: Array, accel: Array) -> Array:
+    """Greatest share of the accelerations inside every interval: (N - 1,)."""
+    left, right = path.second()
+    h = path.h[:, None]
+    u = (np.diff(x) / (2 * path.h))[:, None]
+    out = np.zeros(len(u))
+    for f in (0.25, 0.5, 0.75):
+        second = left + f * (right - left)
+        first = path.d[:-1] + f * h * (left + second) / 2
+        here = first * u + second * (x[:-1, None] + 2 * u * f * h)
+        out = np.maximum(out, (np.abs(here) / np.maximum(accel[:-1], accel[1:])).max(axis=1))
+    return out
+
+
 def _rows(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> tuple[Array, Array, Array]:
     """P >= 0, R, C of |P u + R x| <= C, x at the left end: (N - 1, k)."""
     left, right = path.second()

@@ -13,7 +13,7 @@ from armkin.path_file.model import Move, PathFile
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
-MOST = 200_000  # rows
+MOST = 50_000  # rows
 
 
 def parse(raw: bytes, name: str) -> PathFile:
@@ -34,7 +34,7 @@ def parse(raw: bytes, name: str) -> PathFile:
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     if len(rows) > MOST:
-        raise PathFileError(f"{name}: has {len(rows)} rows; a path takes up to {MOST}", file=name)
+        raise PathFileError(f"{name}: has {len(rows)} rows; a path takes up to {MOST}: give it in parts", file=name)
     header: list[str] | None = None
     if any(_value(cell) is None for cell in rows[0][1]):
         header = [_bare(cell) for cell in rows.pop(0)[1]]

@@ -1,0 +1,198 @@
+"""Paths against brute force, toppra and ruckig, in one run on one machine.
+
+    pip install -e '.[bench]'
+    OPENBLAS_NUM_THREADS=1 python tests/bench/bench_path.py [--lines 50] [--splines 20]
+
+Runs and reach against brute force over every branch, copy and edge at four times the samples (where the two differ,
+brute force is asked again ten times finer about the place); the chosen time against the fastest of all branches; the
+ladder against the arm's own ik batch; the law of time against toppra on the same grid; straight moves with jerk
+against ruckig; what is executed at 1 ms against the limits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
+
+import brute
+
+import armkin
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.motion.chains import chains, fewest
+from armkin.motion.columns import linked
+from armkin.motion.curve import Curve
+from armkin.motion.geometry import Piece, Spot, line, spot
+from armkin.motion.profile import seven_phases
+from armkin.motion.time_optimal import Bounds, Knots, optimal
+
+ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")
+
+
+def moving(name: str) -> armkin.Arm:
+    """An arm with rates, ours where its file has none."""
+    arm = armkin.load(name)
+    unit = np.where(arm.prismatic, 5.0, np.pi / 180)
+    speed = np.where(np.isnan(arm.max_speed), 90 * unit, arm.max_speed)
+    return replace(arm, max_speed=speed, max_accel=np.where(np.isnan(arm.max_accel), 3 * speed, arm.max_accel))
+
+
+def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:
+    """300 mm in a random direction from where random legal joint values put the tool."""
+    task = task_for(arm)
+    low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
+    high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
+    q = rng.uniform(low, high)
+    a = spot(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
+    d = rng.normal(size=len(a.p))
+    return line(task, a, Spot(a.p + 300 * d / np.linalg.norm(d), a.sums, a.turned))
+
+
+def branches(lines: int) -> None:
+    """Reach, worst tip deviation and cost of the ladder."""
+    print("arm            lines  whole  differ  worst dev/um  ladder us/pt  ik us/pt")
+    for name in ARMS:
+        arm, rng = moving(name), np.random.default_rng(7)
+        whole = differ = 0
+        worst = spent = own = 0.0
+        for _ in range(lines):
+            way = random_line(arm, rng)
+            dense = np.linspace(0, way.length, 1001)
+            columns = linked(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
+            all_ = chains(arm, columns)
+            mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
+            found = brute.reach(arm, way.targets(dense), 0.05)
+            whole += mine >= way.length - 1e-9
+            if abs(mine - (dense[found] if found >= 0 else -1.0)) > 0.3 + 1e-6:
+                fine = np.linspace(max(min(mine, dense[max(found, 0)]) - 1.0, 0.0), way.length, 10_001)
+                finer = brute.reach(arm, way.targets(fine), 0.05)
+                differ += abs(mine - (fine[finer] if finer >= 0 else -1.0)) > 0.06
+            for chain in all_:
+                if len(chain.q) > 1:
+                    f = np.linspace(0, 1, 20)[:, None]
+                    a, b = chain.q[:-1, None], chain.q[1:, None]
+                    p = armkin.fk(arm, a + f * (b - a))[..., :3, 3]
+                    worst = max(worst, np.linalg.norm(p - p[:, :1] - f * (p[:, -1:] - p[:, :1]), axis=2).max())
+            s = np.linspace(0, way.length, 10_000)
+            targets = way.targets(s)
+            began = time.process_time()
+            armkin.ik(arm, targets)
+            between = time.process_time()
+            fewest(chains(arm, linked(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)), 10_000)
+            own, spent = own + between - began, spent + time.process_time() - between
+        per = 1e6 / lines / 10_000
+        print(
+            f"{name:14} {lines:5d} {whole:6d} {differ:7d} {1000 * worst:13.1f} {spent * per:13.1f} {own * per:9.2f}",
+            flush=True,
+        )
+
+
+def chosen(lines: int) -> None:
+    """The chosen branch's time against the fastest of all that carry the line; executed at 1 ms."""
+    print("arm            planned  chosen/best  speed   accel   (executed at 1 ms, shares of the limits)")
+    for name in ARMS:
+        arm, rng = moving(name), np.random.default_rng(7)
+        ratio = speed = accel = 0.0
+        planned = 0
+        for _ in range(lines):
+            way = random_line(arm, rng)
+            ends = way.targets(np.array([0.0, way.length]))
+            try:
+                plan = armkin.path(arm, ends, hold=None)
+            except armkin.NoSolutionError:
+                continue
+            planned += 1
+            times = []
+            for branch in plan.branches:
+                if branch.carries >= plan.length - 1e-6 and branch.name:
+                    times.append(armkin.path(arm, ends, hold=None, branch=branch.name).motion.stretches[-1].duration)
+            ratio = max(ratio, plan.motion.stretches[-1].duration / min(times, default=np.inf))
+            q = plan.q(np.arange(0, plan.duration, 0.001))
+            speed = max(speed, float((np.abs(np.diff(q, axis=0)) / 0.001 / arm.max_speed).max()))
+            accel = max(accel, float((np.abs(np.diff(q, n=2, axis=0)) / 1e-6 / arm.max_accel).max()))
+        print(f"{name:14} {planned:7d} {ratio:12.5f} {speed:7.4f} {accel:7.4f}", flush=True)
+
+
+def laws(splines: int) -> None:
+    """The law of time on cubic splines against toppra on the same grid: cost and result."""
+    try:
+        import toppra
+        from scipy.interpolate import CubicSpline
+        from toppra import algorithm, constraint
+    except ImportError:
+        print("toppra is not installed")
+        return
+    logging.disable(logging.CRITICAL)
+    print("joints  points  ours ms  toppra ms  ratio   T ours/toppra - 1 (least, greatest)")
+    for n in (3, 6):
+        for N in (1000, 10_000):
+            ours = theirs = 0.0
+            apart = []
+            for seed in range(splines):
+                way = np.random.default_rng(seed).normal(size=(7, n))
+                u, s = np.linspace(0, 1, 7), np.linspace(0, 1, N)
+                curve = CubicSpline(u, way)
+                path = Knots(s, curve(s), curve(s, 1))
+                v, a = np.ones(n), np.full(n, 2.0)
+                began = time.process_time()
+                x = optimal(path, Bounds(v, a, np.full(N, np.inf)))
+                between = time.process_time()
+                bounds = [
+                    constraint.JointVelocityConstraint(np.stack([-v, v], 1)),
+                    constraint.JointAccelerationConstraint(np.stack([-a, a], 1)),
+                ]
+                spline = toppra.SplineInterpolator(u, way)
+                began_theirs = time.process_time()
+                made = algorithm.TOPPRA(bounds, spline, gridpoints=s).compute_parameterization(0, 0)
+                theirs += time.process_time() - began_theirs
+                ours += between - began
+                sd = made[1]
+                apart.append(Curve(path, x).duration / float(np.sum(2 * np.diff(s) / (sd[1:] + sd[:-1]))) - 1)
+            print(
+                f"{n:6d} {N:7d} {1e3 * ours / splines:8.1f} {1e3 * theirs / splines:10.1f} {ours / theirs:6.2f}   "
+                f"{min(apart):+.1e} {max(apart):+.1e}",
+                flush=True,
+            )
+
+
+def straight(moves: int) -> None:
+    """Straight moves with bounded jerk against ruckig."""
+    try:
+        import ruckig
+    except ImportError:
+        print("ruckig is not installed")
+        return
+    worst, rng = 0.0, np.random.default_rng(1)
+    for _ in range(moves):
+        length, v, a, j = 10 ** rng.uniform([-2, -1, -1, -1], [2, 1, 1, 2])
+        one = ruckig.InputParameter(1)
+        one.current_position, one.target_position = [0.0], [length]
+        one.max_velocity, one.max_acceleration, one.max_jerk = [v], [a], [j]
+        made = ruckig.Trajectory(1)
+        ruckig.Ruckig(1).calculate(one, made)
+        worst = max(worst, abs(seven_phases(length, v, a, j).duration / made.duration - 1))
+    print(f"straight moves with jerk, {moves} at random: T ours/ruckig - 1 at most {worst:.1e}")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--lines", type=int, default=50)
+    parser.add_argument("--splines", type=int, default=20)
+    given = parser.parse_args()
+    straight(2000)
+    laws(given.splines)
+    chosen(given.lines)
+    branches(given.lines)
+
+
+if __name__ == "__main__":
+    main()

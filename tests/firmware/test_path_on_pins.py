@@ -1,0 +1,68 @@
+"""A closed, curved path on the compiled firmware in the emulator: exact counts, nothing violated, holds on the path."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from emulator import EmulatedBoard
+
+import armkin
+from command_line import ROOT, THREE_DOF, run
+
+CIRCLE = "moves:\n  - point: [350, 0, 300]\n  - circle: {centre: [300, 0, 300]}\n"
+
+
+@pytest.fixture
+def board() -> Iterator[EmulatedBoard]:
+    with EmulatedBoard() as one:
+        yield one
+
+
+def net(board: EmulatedBoard) -> list[int]:
+    found = board.net()
+    return [found[axis] for axis in "XYZ"]
+
+
+def off_the_circle(arm: armkin.Arm, counts: list[int]) -> float:
+    """Distance [mm] of the tip at counts from the circle."""
+    x, y, z = armkin.fk(arm, armkin.joints(arm, counts))[:3, 3]
+    return float(np.hypot(np.hypot(x - 300, y) - 50, z - 300))
+
+
+def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: EmulatedBoard, tmp_path: Path) -> None:
+    path = tmp_path / "circle.yaml"
+    path.write_text(CIRCLE)
+    done = run("path", THREE_DOF, path, "--port", board.port, "--assume-home", "--json")
+    assert done.code == 0, done.err
+    arm = armkin.load(THREE_DOF)
+    counts = net(board)
+    assert counts == done.json["pulses"]
+    assert done.json["segments"] < 100 * done.json["duration_s"]
+    assert off_the_circle(arm, counts) < 0.3
+    stats = board.stats()
+    for axis in "XYZ":
+        assert set(stats["axes"][axis]["violations"].values()) == {0}
+    # Again, held half-way round: within the tolerance, half a step of all motors (0.14 mm) and one step of the path.
+    command = [sys.executable, "-m", "armkin", "path", THREE_DOF, str(path), "--port", board.port]
+    sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    end = time.monotonic() + 30
+    while net(board)[0] > counts[0] - 120:
+        assert time.monotonic() < end, sender.communicate(timeout=5)
+        time.sleep(0.01)
+    sender.send_signal(signal.SIGINT)
+    _, err = sender.communicate(timeout=20)
+    assert sender.returncode == 130, err
+    held = run("status", THREE_DOF, "--port", board.port, "--json").json
+    assert held["position"] in ("known", "retained")
+    assert held["pulses"] == net(board)
+    assert off_the_circle(arm, net(board)) < 0.05 + 0.14 + 0.2
+    back = run("path", THREE_DOF, path, "--port", board.port, "--json")
+    assert back.code == 0, back.err
+    assert net(board) == counts

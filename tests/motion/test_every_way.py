@@ -1,0 +1,61 @@
+"""Branches along lines against brute force over every branch, copy and edge (a sample; all in tests/bench)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import brute
+import numpy as np
+import pytest
+
+import armkin
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.motion.chains import chains, fewest
+from armkin.motion.columns import linked
+from armkin.motion.geometry import Piece, Spot, line, spot
+
+
+def random_line(arm: armkin.Arm, rng: np.random.Generator, length: float = 300.0) -> Piece:
+    """A line in a random direction from where random legal joint values put the tool."""
+    task = task_for(arm)
+    low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
+    high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
+    q = rng.uniform(low, high)
+    a = spot(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
+    d = rng.normal(size=len(a.p))
+    return line(task, a, Spot(a.p + length * d / np.linalg.norm(d), a.sums, a.turned))
+
+
+@pytest.mark.parametrize("name", ["three_dof", "irb120", "ar4", "labvolt_5150"])
+def test_reach_is_that_of_brute_force(name: str) -> None:
+    arm = armkin.load(name)
+    rng = np.random.default_rng(11)
+    for _ in range(2):
+        way = random_line(arm, rng)
+        columns = linked(arm, way.targets, np.linspace(0, way.length, 150), task=None, tolerance=0.05, near=arm.home)
+        all_ = chains(arm, columns)
+        mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
+        dense = np.linspace(0, way.length, 401)
+        found = brute.reach(arm, way.targets(dense), 0.05)
+        assert mine <= (dense[min(found + 1, 400)] if found >= 0 else 0.0) + 1e-6
+        assert mine >= (dense[found] if found >= 0 else -1.0) - 1e-6
+        runs = fewest(all_, len(columns.s))
+        for a, b in pairwise(runs):
+            assert b.first >= a.last
+
+
+@pytest.mark.parametrize("name", ["three_dof", "irb2400"])
+def test_the_tip_stays_within_the_tolerance_between_samples(name: str) -> None:
+    arm = armkin.load(name)
+    rng = np.random.default_rng(3)
+    for _ in range(8):
+        way = random_line(arm, rng)
+        columns = linked(arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home)
+        for chain in chains(arm, columns):
+            if len(chain.q) < 2:
+                continue
+            a, b = chain.q[:-1, None], chain.q[1:, None]
+            p = armkin.fk(arm, a + np.linspace(0, 1, 20)[:, None] * (b - a))[..., :3, 3]
+            chord = p[:, :1] + np.linspace(0, 1, 20)[:, None] * (p[:, -1:] - p[:, :1])
+            assert np.linalg.norm(p - chord, axis=2).max() <= 0.05

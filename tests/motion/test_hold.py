@@ -1,0 +1,50 @@
+"""A hold on a curve: the board's motors slow down at their own accelerations along the path; no joint is overasked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.motion.curve import Curve
+from armkin.motors import motor_accel
+
+CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
+
+
+def asked(plan: armkin.PathPlan) -> float:
+    """Greatest share of max_accel that a joint is asked for when the arm is held anywhere on the plan's curves.
+
+    By finite differences of the way alone: the leading motor slows down with its greatest acceleration, the others
+    follow along the path.
+    """
+    arm, worst = plan.arm, 0.0
+    brakes = motor_accel(arm)
+    for curve in plan.motion.stretches:
+        if not isinstance(curve, Curve):
+            continue
+        for t in np.linspace(0.02, curve.duration - 0.02, 200):
+            v = curve.place(np.array([t]))[2][0]
+            q = curve.at(np.array([t - 1e-4, t, t + 1e-4]))
+            s = curve.way(np.array([t - 1e-4, t, t + 1e-4]))
+            first = (q[2] - q[0]) / (s[2] - s[0])
+            second = 2 * ((q[2] - q[1]) / (s[2] - s[1]) - (q[1] - q[0]) / (s[1] - s[0])) / (s[2] - s[0])
+            rate, bend = arm.motor_gain @ first, arm.motor_gain @ second
+            m = int(np.argmax(np.abs(rate) / brakes))
+            slower = (-np.sign(rate[m]) * brakes[m] - bend[m] * v**2) / rate[m]
+            worst = max(worst, float(np.abs((first * slower + second * v**2) / arm.max_accel).max()))
+    return worst
+
+
+@pytest.mark.parametrize(("hold", "most"), [(1.5, 1.52), (1.2, 1.22)])
+def test_a_hold_asks_for_no_more_than_it_may(hold: float, most: float) -> None:
+    arm = armkin.load("three_dof")
+    assert asked(armkin.path(arm, CIRCLE, hold=hold)) <= most
+    assert asked(armkin.path(arm, CIRCLE, hold=None)) > 1.6  # without the cap it does
+
+
+def test_the_cap_costs_little() -> None:
+    arm = armkin.load("three_dof")
+    free, held = (armkin.path(arm, CIRCLE, hold=hold).duration for hold in (None, 1.5))
+    assert free < 2.45
+    assert held < 1.13 * free

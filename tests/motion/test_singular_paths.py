@@ -1,0 +1,58 @@
+"""Through a wrist singularity, a micrometre and a tenth of a millimetre beside it; and where the branch must change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import NoSolutionError
+
+
+def with_rates(name: str) -> armkin.Arm:
+    """An arm of revolute joints with rates of ours where its file has none."""
+    arm = armkin.load(name)
+    speed = np.where(np.isnan(arm.max_speed), np.pi / 2, arm.max_speed)
+    return replace(arm, max_speed=speed, max_accel=3 * speed)
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-3, 0.1])
+@pytest.mark.parametrize(
+    ("name", "q"), [("puma560", [0.3, -0.8, 0.5, 0.4, 0.0, 0.2]), ("irb120", [0.3, 0.3, 0.2, 0.5, 0.0, 0.3])]
+)
+def test_a_wrist_singularity_is_passed_within_limits_and_tolerance(name: str, q: list[float], beside: float) -> None:
+    arm = with_rates(name)
+    ends = np.tile(armkin.fk(arm, q), (2, 1, 1))
+    ends[:, :3, 3] += np.array([[-60.0, -60, 0], [60, 60, 0]]) + beside * np.array([0.3, 0.5, 0.7])
+    plan = armkin.path(arm, ends, hold=None)
+    t = np.arange(0, plan.duration, 0.001)
+    q_of = plan.q(t)
+    assert np.abs(np.diff(q_of, axis=0) / 0.001 / arm.max_speed).max() <= 1.002
+    assert np.abs(np.diff(q_of, n=2, axis=0) / 1e-6 / arm.max_accel).max() <= 1.04
+    tips = armkin.fk(arm, q_of[plan.s(t) > 0])[:, :3, 3] - ends[0, :3, 3]
+    way = (ends[1] - ends[0])[:3, 3]
+    way /= np.linalg.norm(way)
+    assert np.linalg.norm(tips - np.outer(tips @ way, way), axis=1).max() <= 0.05
+    assert plan.deviation <= plan.tolerance
+
+
+def test_a_limit_ends_the_run_and_split_changes_the_branch_there() -> None:
+    arm = with_rates("irb120")
+    ends = np.tile(armkin.fk(arm, [0.3, 0.3, 0.2, 0.5, 0.0, 0.3]), (2, 1, 1))
+    ends[:, :3, 3] += np.array([[0.0, 0, -80], [0, 0, 80]]) + 0.1 * np.array([0.3, 0.5, 0.7])
+    with pytest.raises(NoSolutionError, match="J4 meets its limit 160 deg; with 1 change of branch") as refused:
+        armkin.path(arm, ends)
+    assert refused.value.fields["splittable"]
+    plan = armkin.path(arm, ends, split=True)
+    [change] = plan.reconfigurations
+    assert (change.why, change.joint) == ("limit", "J4")
+    assert len(plan.runs) == 2
+    assert plan.runs[0].end == plan.runs[1].begin == change.s
+    t = np.arange(0, plan.duration, 0.001)
+    q = plan.q(t)
+    assert np.abs(np.diff(q, axis=0)).max() < 0.01  # a joint move in between, no jump
+    assert np.all((q >= arm.lower - 1e-6) & (q <= arm.upper + 1e-6))
+    end = armkin.fk(arm, plan.q(plan.duration))[:3, 3]
+    assert end == pytest.approx(ends[1, :3, 3], abs=0.001)
