@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,7 @@ _LEAST, _MOST = 0.010, 0.050  # [s] a segment
 _GROWTH = 0.12  # of the time since the start, or to the end
 _FINE = 0.005  # [s] between the samples from which the spans are chosen
 _QUEUED = 25  # segments that are surely in the board's queue
+_JUMP = 1.1  # of the greatest acceleration
 _BLOCK = 512  # segments that are made at once
 
 
@@ -51,9 +53,29 @@ class CurveSegments:
             at = places(self.arm, self.stretch.at(t))
             if first + _BLOCK >= len(bounds) - 1:
                 at[-1] = self.end
-            speed = np.linalg.norm(self.stretch.at(t, 1) @ self.arm.motor_gain.T, axis=1).tolist()
+            change = self._changes(t, np.diff(at, axis=0)).tolist()
             for k in range(len(t) - 1):
-                yield cutter.piece(float(t[k + 1] - t[k]), at[k + 1].tolist(), changing(speed[k], speed[k + 1]))
+                yield cutter.piece(float(t[k + 1] - t[k]), at[k + 1].tolist(), change[k])
+
+    def _changes(self, t: Array, steps: Array) -> Array:
+        """How much the speed changes in every segment, see `Cutter.piece`: (segments,).
+
+        As the speed along the way does, but so that no motor's speed jumps where two segments meet, nor changes in
+        one, by more than 1.1 of what its greatest acceleration makes: the board refuses 1.25. On a curve motors speed
+        up and slow down at once, and a segment has one ramp for all.
+        """
+        gain = self.arm.motor_gain.T
+        speed = np.linalg.norm(self.stretch.at(t, 1) @ gain, axis=1).tolist()
+        change = np.array([changing(a, b) for a, b in pairwise(speed)])
+        h = np.diff(t)[:, None]
+        most = _JUMP * motor_accel(self.arm)
+        ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration
+        size = np.maximum(np.abs(ramp), 1e-12)
+        share = np.minimum((most / size).min(axis=1), 1.0)
+        for end in (self.stretch.at(t[:-1] + 1e-9, 2) @ gain, self.stretch.at(t[1:] - 1e-9, 2) @ gain):
+            room = (np.maximum(most + end * np.sign(ramp), 0.0) / size).min(axis=1)
+            share = np.minimum(share, room)
+        return np.asarray(share * change)
 
     def __len__(self) -> int:
         return len(self.bounds()) - 1

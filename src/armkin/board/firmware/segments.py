@@ -176,7 +176,7 @@ def along(
 
 def changing(begin: float, end: float) -> float:
     """`Cutter.piece`'s change of speed, from `begin` to `end`; next to rest a piece has one speed."""
-    if min(begin, end) < (begin + end) / 8:
+    if min(begin, end) <= (begin + end) / 8:
         return 0.0
     return max(-1.0, min(1.0, 2 * (end - begin) / (begin + end)))
 
