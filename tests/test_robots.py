@@ -91,6 +91,11 @@ def test_printed_pose(name: str, joints: list[float], tip: tuple[float, ...], to
     assert fk(arm, np.radians(joints))[:3, 3] == pytest.approx(tip, abs=tolerance), source
 
 
+@pytest.mark.parametrize("path", sorted(ROBOTS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_shipped_arm_says_what_it_was_compared_with(path: Path) -> None:
+    assert robot_file.read(path).compared
+
+
 def test_makers_reaches() -> None:
     """Data sheets' figures, which no URDF states: KR 6 R700 706.7 mm, CRX-10iA 1249 mm, iiwa 7 800 mm."""
     kuka = load("kuka_kr6_r700")

@@ -15,7 +15,12 @@ def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
     assert found["panda"]["lacks"]["ik"] == ["hold 1 joint with --lock"]
     assert found["ur5e"]["target_labels"] == ["x", "y", "z", "roll", "pitch", "yaw"]
     lines = run("robots").out.splitlines()
-    assert lines[0].split() == ["robot", "joints", "task", "target", "ik", "pulses", "simulate", "send", "home"]
+    can = ["ik", "pulses", "simulate", "send", "home"]
+    assert lines[0].split() == ["robot", "joints", "task", "target", *can, "compared"]
+    assert [name for name in found if found[name]["compared"].startswith("only its own URDF")] == [
+        line.split()[0] for line in lines[1:] if line.endswith("URDF only")
+    ]
+    assert found["fanuc_crx10ia"]["compared"].startswith("the maker's reach of 1249 mm")
     assert [line.split()[0] for line in lines[1:]] == list(found)
 
 

@@ -193,6 +193,7 @@ class ShippedRobot(Head):
     target_labels: list[str]
     can: Annotated[dict[str, bool], "ik, pulses, simulate, send, home: as its file stands"]
     lacks: Annotated[dict[str, list[str]], "what each of them lacks, in words"]
+    compared: Annotated[str, "what its geometry was compared with: a maker's figure, or only a URDF"]
 
 
 class Robots(TypedDict):

@@ -17,7 +17,8 @@ def robots(json: Json = False, out: Out = None) -> None:
     """The robots that come with armkin, and what each can do.
 
     Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run` and
-    `--port sim`. `armkin info ROBOT` says what is missing for the rest.
+    `--port sim`. `armkin info ROBOT` says what is missing for the rest. compared: whether the geometry was held
+    against a maker's or another author's figure, or against the URDF alone that it comes from; --json says which.
     """
     from armkin.robot_file import catalogue
 
@@ -42,6 +43,7 @@ def _entry(name: str) -> ShippedRobot:
         "target_labels": labels,
         "can": {"ik": not refused, **{what: not lacks[what] for what in _CAN[1:]}},
         "lacks": {"ik": refused, **lacks},
+        "compared": "" if arm.file is None else arm.file.compared,
     }
 
 
@@ -60,11 +62,12 @@ def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
 
 
 def _text(found: list[ShippedRobot]) -> str:
-    rows = [["robot", "joints", "task", "target", *_CAN]]
+    rows = [["robot", "joints", "task", "target", *_CAN, "compared"]]
     for entry in found:
         kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])
         marks = ["yes" if entry["can"][what] else "-" for what in _CAN]
         if entry["task"] is not None and not entry["can"]["ik"]:
             marks[0] = "--lock"
-        rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks])
-    return render.table(rows, left=range(9), indent="") + "\n"
+        compared = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"
+        rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks, compared])
+    return render.table(rows, left=range(10), indent="") + "\n"
