@@ -194,7 +194,7 @@ def _rehearsal_board(arm: Arm) -> Board:
     if arm.gripper is not None:
         (servos if arm.gripper.kind == "servo" else steppers).append("gripper")
     switches = dict.fromkeys(homing.switch for homing in arm.homing if homing is not None)
-    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 80)
+    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 129)
 
 
 def _limits(arm: Arm) -> tuple[list[int], list[int]]:
