@@ -17,7 +17,8 @@ PROMISED = {
     5: ["reach [", "volume 0.24"],
     6: ["8 branches of 7 joints; J3 is 20 degrees in each"],
     7: ["[1067, -5370, 3000] after"],
-    8: [" 0.000 s", "branch: left, elbow up"],
+    8: ["308.1 mm in", "left, elbow up"],
+    9: ["right, elbow down", "<- chosen"],
 }
 
 

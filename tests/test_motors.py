@@ -96,6 +96,8 @@ def test_pulses_are_the_robot_files_figures_in_degrees(arm: Arm) -> None:
     home = {joint.name: joint.home for joint in arm.file.joints}
     for k, motor in enumerate(arm.file.motor_list()):
         turn = sum(w * (value[name] - home[name]) for name, w in motor.joints.items())
+        assert motor.full_steps is not None
+        assert motor.microsteps is not None
         ratio = motor.full_steps * motor.microsteps * motor.gear * motor.pulley / (motor.lead or 360.0)
         exact = turn * ratio
         assert np.all(np.abs(pulses(arm, q)[:, k] - exact) <= 0.5 + 1e-6)
@@ -158,7 +160,7 @@ def test_servo_pulse_widths() -> None:
 
 def test_servo_outside_its_travel_is_told_and_not_clamped() -> None:
     arm = servo_arm(invert=False)
-    p = pulses(arm, np.deg2rad([[91, 0], [0, -90.1], [90, -90]]))
+    p = pulses(arm, np.deg2rad([[91.0, 0.0], [0.0, -90.1], [90.0, -90.0]]))
     assert p.tolist() == [[2511, 1500], [1500, 499], [2500, 500]]
     assert outside_travel(arm, p).tolist() == [[True, False], [False, True], [False, False]]
     assert pulse_range(arm).tolist() == [[500, 2500], [500, 2500]]
@@ -216,7 +218,7 @@ def test_errors() -> None:
     partly = from_links(np.tile(np.eye(4), (3, 1, 1)), [False, False], motor_gain=[[100.0, 0.0]])
     with pytest.raises(UsageError, match=r"^arm has no motor for q2; add drive: to each joint, or motors:$"):
         pulses(partly, [0, 0])
-    dependent = from_links(np.tile(np.eye(4), (3, 1, 1)), [False, False], motor_gain=[[1.0, 2], [2, 4]])
+    dependent = from_links(np.tile(np.eye(4), (3, 1, 1)), [False, False], motor_gain=[[1.0, 2.0], [2.0, 4.0]])
     with pytest.raises(UsageError, match=r"^arm's motors do not determine its joints"):
         joints(dependent, [0, 0])
     with pytest.raises(UsageError, match=r"^joint values must be finite"):

@@ -173,8 +173,10 @@ joints:
     path.write_text(text, encoding="utf-8")
     arm, q = load(path), [1.3, 0.4, 20.0]
     expected = np.eye(4)
+    assert arm.file is not None
     for joint, value in zip(arm.file.joints, q, strict=True):
-        expected = expected @ exponential(*map(np.array, joint.twist()), value)
+        w, v = joint.twist()
+        expected = expected @ exponential(np.array(w), np.array(v), value)
     expected = expected @ [[1, 0, 0, 300], [0, 1, 0, 0], [0, 0, 1, 115], [0, 0, 0, 1]]
     assert fk(arm, q) == pytest.approx(expected, abs=1e-11)
 

@@ -67,7 +67,7 @@ def turn(axis: Any, angle: float) -> NDArray[np.float64]:
     """Rodrigues' formula."""
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
 
 
 def rigid(R: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:

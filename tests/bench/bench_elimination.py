@@ -9,6 +9,7 @@ Set OPENBLAS_NUM_THREADS=1 (or your BLAS's variable) to measure one thread.
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +47,9 @@ def measure(name: str, arm: Arm, count: int) -> None:
     plan = method.prepare(*arm)
     prepare = seconds(lambda: method.prepare(*arm), 3)
     begin = time.perf_counter()
-    found, doubtful = method.solve(plan, T)
+    found, doubtful, _ = method.solve(plan, T)
     batch = (time.perf_counter() - begin) / count
-    alone = np.median([seconds(lambda i=i: method.solve(plan, T[i : i + 1]), 1) for i in range(15)])
+    alone = np.median([seconds(partial(method.solve, plan, T[i : i + 1]), 1) for i in range(15)])
     branches = (~np.isnan(found[..., 0])).sum(axis=1)
     size = plan.plans[0].size if plan.plans else 0
     print(

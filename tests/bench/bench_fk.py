@@ -6,21 +6,25 @@ OMP_NUM_THREADS=1 python tests/bench/bench_fk.py
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from bench_ik import ROBOTS, best_time, random_joints
 
 import armkin
 
 
-def toolbox(arm: armkin.Arm) -> object | None:
+def toolbox(arm: armkin.Arm) -> Any:
     """The same arm as an elementary transform sequence, or None if the toolbox is not installed."""
     try:
         from roboticstoolbox import DHRobot, RevoluteDH
     except ImportError:
         return None
     links = []
+    assert arm.file is not None
     for joint in arm.file.joints:
         dh = joint.dh
+        assert dh is not None
         links.append(RevoluteDH(d=dh.d, a=dh.a, alpha=np.deg2rad(dh.alpha), offset=np.deg2rad(dh.theta)))
     return DHRobot(links).ets().compile()
 

@@ -75,6 +75,7 @@ def peer_job(tool: str | None, arm: armkin.Arm, T: np.ndarray) -> tuple[str, Cal
             from eaik.IK_DH import DhRobot
         except ImportError:
             return None
+        assert arm.file is not None
         rows = [j.dh for j in arm.file.joints]
         alpha, a, d = (np.array([getattr(r, key) for r in rows]) for key in ("alpha", "a", "d"))
         robot = DhRobot(np.radians(alpha), a * 1e-3, d * 1e-3)
@@ -85,8 +86,8 @@ def peer_job(tool: str | None, arm: armkin.Arm, T: np.ndarray) -> tuple[str, Cal
             from ssik.prebuilt.kinova import jaco2_ik
         except ImportError:
             return None
-        poses = _metres(T)[:300]
-        return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in poses], len(poses)
+        some = _metres(T)[:300]
+        return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in some], len(some)
     return None
 
 

@@ -12,6 +12,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,8 @@ def noisy(seed: int) -> str:
         machine.prepare(assume_home=True)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
         machine.session.probe()
-        plans, at, lowest = [], list(machine.counts()), [10**6]
+        plans: list[Any] = []
+        at, lowest = list(machine.counts()), [10**6]
         while sum(plan.segments for plan in plans) < SEGMENTS:
             goal = rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10]))
             plans.append(plan_moves(arm, at, goal))

@@ -117,7 +117,9 @@ def test_a_hold_stops_on_the_path_within_the_ramp() -> None:
     host.board.advance(0.1)
     before = host.status()
     assert before.state == State.MOVING
-    assert host.ask(protocol.hold(1)).error == Error.HELD
+    held = host.ask(protocol.hold(1))
+    assert isinstance(held, protocol.Ack)
+    assert held.error == Error.HELD
     host.board.advance(0.05 * 1.1)
     after = host.status()
     assert (after.state, after.error, after.queued) == (State.IDLE, Error.HELD, 0)
@@ -265,7 +267,7 @@ def test_a_planned_line_runs_to_its_count() -> None:
     at, done = [0, 0, 0], 0
     while done < len(segments):
         free = host.status().free
-        for s in segments[done : done + free]:
+        for s in list(segments)[done : done + free]:
             done += 1
             assert host.move([0, 1, 2], at, [s], at_rest=done == len(segments)) == Error.OK
             at = host.board.motors.plan_counts()[:3]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import time
+from typing import Any
 
 import pytest
 import scservo_sdk as sdk
@@ -96,7 +97,8 @@ def test_a_servo_that_is_gone_is_named() -> None:
 def test_whole_packets_come_out_of_any_bytes() -> None:
     rng = random.Random(4)
     whole = [packet.packet(rng.randrange(1, 253), 0, rng.randbytes(rng.randrange(9))) for _ in range(300)]
-    splitter, found = Splitter(), []
+    splitter = Splitter()
+    found: list[Any] = []
     for one in whole:
         data = rng.randbytes(rng.randrange(3)).replace(b"\xff", b"") + one
         for k in range(0, len(data), 3):

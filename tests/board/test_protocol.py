@@ -152,7 +152,8 @@ def test_cobs_decode_takes_nothing_that_encode_does_not_make(data: bytes) -> Non
 @given(st.lists(st.binary(min_size=2, max_size=246), max_size=5), st.data())
 def test_a_stream_in_pieces_gives_its_payloads(payloads: list[bytes], data: st.DataObject) -> None:
     stream = b"\0".join([b"", *(protocol.wire(p) for p in payloads)])
-    splitter, found = protocol.Splitter(), []
+    splitter = protocol.Splitter()
+    found: list[bytes] = []
     while stream:
         n = data.draw(st.integers(1, len(stream)))
         found += splitter.feed(stream[:n])

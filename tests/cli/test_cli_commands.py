@@ -11,6 +11,7 @@ import pytest
 
 import armkin
 from armkin.cli.commands import COMMANDS
+from armkin.model import units
 from command_line import ROOT, THREE_DOF, run
 
 ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
@@ -20,7 +21,7 @@ ALL_ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
 def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
     word = f"{name}_" if iskeyword(name) else name
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
-    assert inspect.getdoc(function).splitlines()[0] == COMMANDS[name]
+    assert (inspect.getdoc(function) or "").splitlines()[0] == COMMANDS[name]
     assert name in run("--help").out
     result = run(name, "--help")
     assert result.code == 0
@@ -215,7 +216,7 @@ def test_pulses_of_a_differential() -> None:
 
 
 def _zeros(robot: str) -> list[float]:
-    return [joint.home for joint in armkin.load(ROOT / f"tests/robots/{robot}.yaml").file.joints]
+    return units.home_out(armkin.load(ROOT / f"tests/robots/{robot}.yaml"))
 
 
 @pytest.mark.parametrize("robot", ALL_ROBOTS)

@@ -19,7 +19,8 @@ def targets_of(q: np.ndarray) -> bytes:
 def winding() -> np.ndarray:
     """A path on which the last joint turns through 340 degrees, far from home."""
     share = np.linspace(0, 1, 60)[:, None]
-    return np.array([40.0, -70, 80, -100, -80, 5]) + share * np.array([60.0, 20, -30, 15, 20, 340])
+    begin = np.array([40.0, -70.0, 80.0, -100.0, -80.0, 5.0])
+    return np.asarray(begin + share * np.array([60.0, 20.0, -30.0, 15.0, 20.0, 340.0]))
 
 
 def test_rows_follow_each_other_where_a_fixed_pose_makes_them_jump(winding: np.ndarray) -> None:

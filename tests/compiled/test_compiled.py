@@ -71,7 +71,10 @@ def questions(arm: armkin.Arm, kind: str, count: int) -> np.ndarray:
     target = targets_of(task, armkin.fk(arm, q), q)
     if kind == "far":
         target = target.copy()
-        target[..., : task.position if task.orientation != "full" else 3, *([3] if target.ndim == 3 else [])] *= 1.5
+        if target.ndim == 3:
+            target[:, :3, 3] *= 1.5
+        else:
+            target[:, : task.position if task.orientation != "full" else 3] *= 1.5
     return target.astype(np.float32).astype(float) if kind == "float32" else target
 
 

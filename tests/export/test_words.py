@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from armkin.robot_file.writing import text
 from command_line import ROOT, run
 
 FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots").glob("*.yaml"))
-KINDS = {
+KINDS: dict[str, Callable[[armkin.Arm], dict[str, Any]]] = {
     "screws": tables.screws,
     "dh": tables.dh,
     "mdh": lambda arm: tables.dh(arm, modified=True),
@@ -40,6 +41,12 @@ def solver(arm: armkin.Arm) -> str:
         return armkin.method(arm)[0]
     except UsageError:
         return "none"
+
+
+def numbers(element: ET.Element | None, name: str) -> np.ndarray:
+    """An attribute of numbers with spaces between them."""
+    assert element is not None
+    return np.array((element.get(name) or "").split(), dtype=float)
 
 
 def again(data: dict[str, Any]) -> armkin.Arm:
@@ -103,12 +110,12 @@ def test_links_are_drawn_from_axis_to_axis() -> None:
     for name, following in (("q1", "q2"), ("q2", "q3")):
         [link] = [link for link in root.iterfind("link") if link.get("name") == f"{name}_link"]
         [joint] = [joint for joint in root.iterfind("joint") if joint.get("name") == following]
-        balls = [v.find("origin").get("xyz") for v in link.iterfind("visual") if v.find("geometry/sphere") is not None]
-        end = np.array(balls[-1].split(), dtype=float)
+        balls = [v for v in link.iterfind("visual") if v.find("geometry/sphere") is not None]
+        end = numbers(balls[-1].find("origin"), "xyz")
         place = joint.find("origin")
-        roll = float(place.get("rpy").split()[0])
+        roll = numbers(place, "rpy")[0]
         z = np.array([0, -np.sin(roll), np.cos(roll)])  # both of its turns are about x alone
-        off = end - np.array(place.get("xyz").split(), dtype=float)
+        off = end - numbers(place, "xyz")
         assert np.linalg.norm(off - (off @ z) * z) < 1e-6
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from emulator import EmulatedBoard
 
@@ -25,7 +25,7 @@ WIDE = protocol.AxisImage(True, False, -(1 << 30), 1 << 30, 0, 40_000, 400_000)
 SERVO = protocol.AxisImage(True, False, 500, 2500, 1500, 2000, 40_000)
 
 
-def image_for(board: str, stepper: protocol.AxisImage = WIDE, **times: int) -> protocol.Image:
+def image_for(board: str, stepper: protocol.AxisImage = WIDE, **times: Any) -> protocol.Image:
     """Every axis used, every stepper alike, no switch guards; A4988 timing."""
     steppers = STEPPERS[board]
     axes = (stepper,) * steppers + (SERVO,) * (AXES[board] - steppers)

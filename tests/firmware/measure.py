@@ -243,7 +243,7 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             if any(rest):
                 work.append(whole(20, 16_000, 0, rest))
             status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
-            at = status.counts[:3]
+            at = (status.counts[0], status.counts[1], status.counts[2])
         emulated.control("restore")
         trace = emulated.trace()
         x_cycle, x = trace.positions("X")

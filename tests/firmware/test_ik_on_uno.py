@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict
     common += [f"-I{folder}", "-ffunction-sections", "-fdata-sections"]
     subprocess.run([*common, "-c", folder / "arm.c", "-o", folder / "arm.o"], check=True)
     words = [*common, *defines, "-Wl,--gc-sections", HERE / "ik_on_uno.c", folder / "arm.o", "-lm"]
-    subprocess.run([*words, "-o", folder / "ik.elf"], check=True)
+    subprocess.run([*map(str, words), "-o", str(folder / "ik.elf")], check=True)
     return folder / "ik.elf", sizes(folder / "arm.o", "solver") | sizes(folder / "ik.elf", "program")
 
 
@@ -47,7 +48,7 @@ def sizes(path: Path, name: str) -> dict[str, int]:
     return {f"{name}_flash": code + data, f"{name}_ram": data + bss}
 
 
-def answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, object]:
+def answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, Any]:
     """What the chip says: found (QUESTIONS, branches, n) and its counts, cycles, bytes."""
     elf, told = built(arm, target, folder)
     count, branches = len(target), armkin.ik(arm, target).q.shape[1]
@@ -86,22 +87,22 @@ def questions(arm: armkin.Arm) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def on_uno(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+def on_uno(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
     return answers(arm, questions(arm), tmp_path_factory.mktemp("uno"))
 
 
-def test_an_uno_finds_the_branches_of_python(on_uno: dict[str, object]) -> None:
+def test_an_uno_finds_the_branches_of_python(on_uno: dict[str, Any]) -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
     found = armkin.ik(arm, questions(arm))
     np.testing.assert_array_equal(on_uno["counts"], found.valid.sum(axis=1))
     np.testing.assert_allclose(on_uno["q"], found.q, atol=2e-5)
 
 
-def test_its_cycles_and_bytes_are_those_of_the_documents(on_uno: dict[str, object]) -> None:
+def test_its_cycles_and_bytes_are_those_of_the_documents(on_uno: dict[str, Any]) -> None:
     text = (HERE.parents[1] / "docs" / "c.md").read_text()
     for cycles, what in ((np.max(on_uno["ik_cycles"]), "all branches"), (np.max(on_uno["fk_cycles"]), "fk")):
         assert f"| {what} | {cycles:,} cycles | {cycles / 16_000:.1f} ms |" in text
-    stack = 2048 - on_uno["program_ram"] - on_uno["stack_left"]  # type: ignore[operator]
+    stack = 2048 - on_uno["program_ram"] - on_uno["stack_left"]
     assert f"{on_uno['program_flash']:,} bytes of flash" in text
     assert f"{stack} bytes of stack" in text

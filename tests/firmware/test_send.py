@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -187,7 +188,8 @@ def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[M
 
 def _killed_often(seed: int, times: int) -> list[str]:
     """Send back and forth, die at random moments; what went wrong."""
-    rng, wrong = random.Random(seed), []
+    rng = random.Random(seed)
+    wrong: list[Any] = []
     goals = np.deg2rad([[-30, 5, -5], [25, 85, -60]])
     with EmulatedBoard(seed=seed) as board:
         with machine(board) as first:
@@ -360,6 +362,7 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
         assert (outside.code, board.net()) == (3, pins)
         # A host that forgets its own check meets the board's: joint 2 would go to 45 degrees.
         arm = arms.load(robot)
+        assert arm.file is not None
         loose = arms.build(arm.file.model_copy(update={"joints": tuple(
             joint.model_copy(update={"limits": (-90.0, 90.0)}) for joint in arm.file.joints
         )}))  # fmt: skip

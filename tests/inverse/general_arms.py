@@ -104,12 +104,12 @@ def distance(arm: Arm, q: Array, other: Array) -> Array:
     """Largest joint difference, modulo whole turns and in scaled lengths; infinite where a row is NaN."""
     step = q - other
     step = np.where(arm[1], step / size(arm), step - 2 * np.pi * np.round(step / (2 * np.pi)))
-    return np.nan_to_num(np.abs(step).max(axis=-1), nan=np.inf)
+    return np.asarray(np.nan_to_num(np.abs(step).max(axis=-1), nan=np.inf))
 
 
 def miss(arm: Arm, q: Array, found: Array) -> Array:
     """How far the nearest of the answers (N, B, 6) is from the joints (N, 6) that made the target."""
-    return distance(arm, found, q[:, None]).min(axis=1, initial=np.inf)
+    return np.asarray(distance(arm, found, q[:, None]).min(axis=1, initial=np.inf))
 
 
 def pose_residual(arm: Arm, found: Array, T: Array) -> float:

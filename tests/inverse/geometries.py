@@ -179,7 +179,9 @@ for _k in range(4):
 def pitch(rng: Rng, n: int, first: str = "R", flat: bool = False) -> Fields:
     """A joint of any direction, three (anti)parallel ones, for n = 5 one more."""
     if flat:  # the usual table: shoulder on the base's axis, no offsets
-        alpha, a, d = [90.0, 0.0, 0.0, 0.0], [0.0, None, None, None], [None, 0.0, 0.0, 0.0]
+        alpha: list[float | None] = [90.0, 0.0, 0.0, 0.0]
+        a: list[float | None] = [0.0, None, None, None]
+        d: list[float | None] = [None, 0.0, 0.0, 0.0]
         if n == 5:
             alpha[3], a[3], alpha, a, d = 90.0, 0.0, [*alpha, 0.0], [*a, 0.0], [*d, None]
             a[3] = 0.0
@@ -240,7 +242,8 @@ add("spherical shoulder, elbow", "pose", lambda r: dh(
 
 def three_parallel(rng: Rng, first: int, meet: bool = True) -> Fields:
     """Axes first, first + 1, first + 2 (anti)parallel, the two at the other end meeting."""
-    axis, w, q = unit(rng), [None] * 6, [None] * 6
+    axis = unit(rng)
+    q: list[Any] = [None] * 6
     w = [either(rng, axis) if first <= i < first + 3 else None for i in range(6)]
     if meet:
         point = rng.uniform(-300, 300, 3)

@@ -251,7 +251,7 @@ def distance(screw: Screws, a: Array, b: Array) -> Array:
     """Largest joint difference modulo whole turns, slides in units of the arm's size; inf where nan."""
     d = a - b
     d = np.where(screw.prismatic, d / screw.size, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
-    return np.nan_to_num(np.abs(d).max(axis=-1), nan=np.inf)
+    return np.asarray(np.nan_to_num(np.abs(d).max(axis=-1), nan=np.inf))
 
 
 def weakness(screw: Screws, goals: Goal, q: Array) -> Array:
@@ -259,4 +259,4 @@ def weakness(screw: Screws, goals: Goal, q: Array) -> Array:
     _, J = _residual(screw, goals, q)
     S = np.linalg.svd(J * np.where(screw.prismatic, screw.size, 1.0), compute_uv=False)
     rank = goals.position + len(goals.sums) + {"none": 0, "axis": 2, "full": 3}[goals.orientation]
-    return S[:, min(rank, q.shape[1]) - 1]
+    return np.asarray(S[:, min(rank, q.shape[1]) - 1], dtype=float)

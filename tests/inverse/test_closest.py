@@ -23,7 +23,7 @@ def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -
     goal = read_targets(definition, target).values
     r = residual(definition, T, q, np.repeat(goal, len(q), axis=0))
     p = definition.position
-    return (r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1)
+    return np.asarray((r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1))
 
 
 CASES = [

@@ -142,8 +142,8 @@ def test_double_roots_of_random_arms_are_kept(seed: int) -> None:
         case = random_case(name, 400 + seed)
         rng = np.random.default_rng(seed)
 
-        def determinant(q: np.ndarray, case=case) -> np.ndarray:
-            return np.linalg.det(armkin.jacobian(case.arm, q)[:, :3])
+        def determinant(q: np.ndarray, case: Case = case) -> np.ndarray:
+            return np.asarray(np.linalg.det(armkin.jacobian(case.arm, q)[:, :3]))
 
         low = rng.uniform(-3, 3, (200, 3)) * np.where(case.arm.prismatic, 100, 1)
         high = low + np.array([0, 0, 1.0]) * np.where(case.arm.prismatic, 100, 1)
@@ -198,7 +198,7 @@ def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
     far = np.eye(4)
     far[:3, 3] = 1e9
     s = armkin.ik(arm, far, "pose")
-    assert (s.status, s.valid.any()) == (Status.UNREACHABLE, False)
+    assert (int(s.status), bool(s.valid.any())) == (Status.UNREACHABLE, False)
     six = case(spatial(np.random.default_rng(0), "RRRRRR", [None] * 6, [None] * 6), "pose").arm
     assert not armkin.ik(six, far, "pose").valid.any()
 
@@ -274,7 +274,7 @@ def test_two_slides_that_become_parallel() -> None:
     ]
     arm = case({"convention": "standard", "joints": rows}, "xyz").arm
     s = armkin.ik(arm, armkin.fk(arm, [100, 0, 100])[:3, 3])
-    assert (s.status, s.free.tolist(), s.valid.sum()) == (Status.SINGULAR, [True, False, True], 1)
+    assert (int(s.status), s.free.tolist(), int(s.valid.sum())) == (Status.SINGULAR, [True, False, True], 1)
 
 
 def test_no_target_is_too_odd() -> None:

@@ -45,7 +45,7 @@ def jacobian(arm: Arm, q: Array) -> Array:
 
 def smallest_singular_value(arm: Arm, q: Array) -> Array:
     """Of the Jacobian, (N, 6) -> (N,)."""
-    return np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1]
+    return np.asarray(np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1], dtype=float)
 
 
 def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped: bool = False) -> tuple[Array, Array]:
@@ -56,7 +56,7 @@ def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped:
     return found.q * unit, found.residual
 
 
-def solve(arm: Arm, T: Array) -> tuple[Array, Array]:
+def solve(arm: Arm, T: Array) -> tuple[Array, Bool]:
     return method.solve(method.prepare(*arm), T)[:2]
 
 
@@ -127,7 +127,7 @@ def test_polish_keeps_the_best_point_and_says_how_far_it_is() -> None:
 # ---- every branch ------------------------------------------------------------------------------------------
 
 
-def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Array]:
+def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Bool]:
     """Solve for the poses of q: the generating joints are found, every branch is exact, none comes twice."""
     T = forward(arm, q)
     plan = method.prepare(*arm)
@@ -290,7 +290,7 @@ def singular_joints(arm: Arm, count: int) -> Array:
     """Joint values (<= count, 6) with the fifth joint where the Jacobian loses rank, by bisection."""
 
     def determinant(q: Array) -> Array:
-        return np.linalg.det(jacobian(arm, q))
+        return np.asarray(np.linalg.det(jacobian(arm, q)))
 
     low = random_joints(arm, 4 * count, 13)
     high = low.copy()

@@ -17,7 +17,7 @@ POSES = 10_000
 def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
     arm = armkin.load(path)
     screw = screws(arm.file)
-    q = random_joints(arm, POSES, 6)
+    q = random_joints(screw, POSES, 6)
     T, J = armkin.fk(arm, q), armkin.jacobian(arm, q)
     expected, jacobian = forward_and_jacobian(screw, q)
     assert np.abs(T - expected).max() < 1e-9
@@ -30,16 +30,17 @@ def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
 def test_frames_begin_at_the_base_and_end_at_the_tool(path: Path) -> None:
     arm = armkin.load(path)
-    q = random_joints(arm, 200, 7)
+    screw = screws(arm.file)
+    q = random_joints(screw, 200, 7)
     frames = armkin.frames(arm, q)
     assert frames.shape == (200, arm.n + 2, 4, 4)
     assert np.array_equal(frames[:, 0], np.broadcast_to(arm.base, (200, 4, 4)))
-    assert np.abs(frames[:, -1] - forward(screws(arm.file), q)).max() < 1e-9
+    assert np.abs(frames[:, -1] - forward(screw, q)).max() < 1e-9
 
 
 def test_the_jacobian_is_the_derivative() -> None:
     arm = armkin.load(ROBOTS[0].parent / "stanford.yaml")
-    q = random_joints(arm, 20, 8)
+    q = random_joints(screws(arm.file), 20, 8)
     J, h = armkin.jacobian(arm, q), 1e-6
     for i in range(arm.n):
         step = np.eye(arm.n)[i] * h

@@ -47,7 +47,7 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     scale = np.abs(e).sum(axis=0)
     pair, doubt = trig_quadratic(list(e), 1.0)
     q = np.arctan2(pair.s, pair.c).reshape(4, -1)
-    doubt = doubt.reshape(-1, e.shape[1]).any(axis=0)
+    doubt = np.asarray(doubt.reshape(-1, e.shape[1]).any(axis=0))
     on_circle = np.abs(pair.c**2 + pair.s**2 - 1).reshape(4, -1) < 1e-12
     root = on_circle & (np.abs(values(e, q)) < 1e-12 * scale)
     assert not (on_circle & ~root & ~doubt).any()

@@ -33,7 +33,7 @@ def jumps(s: armkin.Solutions, name: int) -> np.ndarray:
     both = has[1:] & has[:-1]
     step = np.diff(q, axis=0)
     step = np.where(s.arm.prismatic, step / s.arm.reach, step - 2 * np.pi * np.rint(step / (2 * np.pi)))
-    return np.abs(step).max(axis=1)[both]
+    return np.asarray(np.abs(step).max(axis=1)[both])
 
 
 def test_the_published_circle() -> None:

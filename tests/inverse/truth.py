@@ -93,7 +93,7 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
 # ---- targets -----------------------------------------------------------------------------------------------
 
 
-def rounded(values: Array, digits: int) -> Array:
+def rounded(values: Array, digits: float) -> Array:
     """Numbers as printed with that many significant digits; 7.5 of them stand for float32."""
     if digits == 7.5:
         return np.asarray(values, dtype=np.float32).astype(float)
@@ -236,7 +236,9 @@ def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array, parts: tup
     return all(miss_of(arm, screw, goals, (a + part * d)[None])[0] < 0.9 * SOLVES for part in parts)
 
 
-def ask_oracle(arm: Arm, screw: Screws, verdict: Verdict, target: Array, rows: Array, starts: int, seed: int) -> None:
+def ask_oracle(
+    arm: Arm, screw: Screws, verdict: Verdict, target: Array, rows: NDArray[np.int64], starts: int, seed: int
+) -> None:
     """Add to the verdict the isolated branches (sigma > 1e-6) that the oracle knows and a `complete` answer lacks."""
     s = verdict.solutions
     goals = goal_of(s.task, target).take(rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,7 +33,7 @@ def test_limits_home_and_poses_are_those_of_the_file(path: Path) -> None:
 def test_every_decimal_of_nine_digits_comes_back(digits: int, places: int) -> None:
     value = float(f"{digits}e-{places}")
     limits = [[0, max(value, 0.0) * units.DEGREE or 1.0]]
-    arm = from_links([[[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]] * 2, [False], limits=limits)
+    arm = from_links(np.tile(np.eye(4), (2, 1, 1)), [False], limits=limits)
     if value > 0:
         assert units.limits_out(arm) == [(0.0, value)]
 

@@ -76,7 +76,7 @@ def reach(arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = No
     for i in range(len(targets) - 1):
         if not len(n.q[i + 1]):
             return i
-        alive = edges(arm, n.q[i][alive], n.q[i + 1], tolerance).any(axis=0)
+        alive = np.asarray(edges(arm, n.q[i][alive], n.q[i + 1], tolerance).any(axis=0))
         if not alive.any():
             return i
     return len(targets) - 1

@@ -60,7 +60,7 @@ def millimetres_per_millimetre(axes: Any) -> np.ndarray:
     """How long a millimetre of each axis is in the picture's box, relative to x."""
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     length = np.asarray(axes._box_aspect) / np.ptp(limits, axis=1)
-    return length / length[0]
+    return np.asarray(length / length[0])
 
 
 def texts(figure: Any) -> list[str]:
@@ -111,7 +111,7 @@ def test_single_pose(tmp_path: Path, drawn: list[Any]) -> None:
     bone = skeleton(THREE_DOF, POSE).path
     assert np.all((bone >= low - 1e-9) & (bone <= high + 1e-9))
     # ... and the axes' box, with its labels, within the figure.
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     box = axes.get_tightbbox(renderer)
     assert box.x0 >= 0
     assert box.y0 >= 0
@@ -164,7 +164,7 @@ def boxes(figure: Any) -> tuple[Any, Any]:
 
     [axes] = figure.axes
     legend = axes.get_legend()
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     return _seen(axes), None if legend is None else legend.get_window_extent(renderer)
 
 

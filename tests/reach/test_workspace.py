@@ -4,9 +4,10 @@ import csv
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ FREE = (-math.inf, math.inf)
 TURN_X, TURN_Y = transform((0, 0, 0), (90, 0, 0)), transform((0, 0, 0), (0, 90, 0))
 
 
-def chain(*links: np.ndarray, kinds: str, limits: list[tuple[float, float]]) -> Arm:
+def chain(*links: np.ndarray, kinds: str, limits: Sequence[Any]) -> Arm:
     """An arm of R and P joints with limits in degrees and mm."""
     scale = [[1.0] if kind == "P" else [math.pi / 180] for kind in kinds]
     return from_links(np.array(links), [k == "P" for k in kinds], limits=np.array(limits) * scale)
@@ -352,7 +353,7 @@ def test_an_endless_slide_is_an_error() -> None:
     arm = from_links(np.tile(np.eye(4), (3, 1, 1)), [False, True], name="mast")
     for arguments in ({"samples": 5}, {"grid_points": [5]}):
         with pytest.raises(UsageError, match="prismatic joint q2 of mast has no limits; give it limits"):
-            workspace(arm, **arguments)  # type: ignore[arg-type]
+            workspace(arm, **arguments)
 
 
 def test_progress_counts_to_the_end() -> None:

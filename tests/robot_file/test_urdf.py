@@ -214,7 +214,12 @@ def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_pat
     path.write_bytes(document(('<link name="base"/>', mesh)))
     opened: list[str] = []
     real = Path.open
-    monkeypatch.setattr(Path, "open", lambda self, *a, **k: (opened.append(str(self)), real(self, *a, **k))[1])
+
+    def noted(self: Path, *words: Any, **named: Any) -> Any:
+        opened.append(str(self))
+        return real(self, *words, **named)
+
+    monkeypatch.setattr(Path, "open", noted)
     urdf.read(path)
     assert opened == [str(path)]
 

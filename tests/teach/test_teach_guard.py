@@ -26,7 +26,12 @@ def acted(server: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     desk = server.desk
     before = desk.act
-    monkeypatch.setattr(desk, "act", lambda name, tab, fields: names.append(name) or before(name, tab, fields))
+
+    def noted(name: str, tab: str, fields: dict[str, Any]) -> dict[str, Any]:
+        names.append(name)
+        return before(name, tab, fields)
+
+    monkeypatch.setattr(desk, "act", noted)
     return names
 
 

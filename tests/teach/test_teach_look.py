@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -20,7 +21,7 @@ def arm(name: str) -> armkin.Arm:
     return armkin.load(str(ROOT / f"robots/{name}.yaml"))
 
 
-def asked(name: str, q: list[float], **more: Any) -> dict[str, Any]:
+def asked(name: str, q: Sequence[float], **more: Any) -> dict[str, Any]:
     one = arm(name)
     return look(one, Question(units.joints_in(one, q), **more))
 

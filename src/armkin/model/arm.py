@@ -106,7 +106,7 @@ def actual(arm: Arm) -> Arm:
 
 def from_links(
     link: ArrayLike,
-    prismatic: Sequence[bool],
+    prismatic: Sequence[bool] | NDArray[np.bool_],
     *,
     name: str = "arm",
     joint_names: tuple[str, ...] = (),
