@@ -92,7 +92,12 @@ def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     if out is None or Path(out).suffix != ".c":
         raise UsageError("--c writes a source, its header and a test program: name the source, for example -o arm.c")
     path = Path(out)
-    texts = program(arm, path.name, task, single)
+    try:
+        texts = program(arm, path.name, task, single)
+    except UsageError as error:
+        if error.fields.get("precision") != "double":
+            raise
+        raise UsageError(error.message, advice="leave --float away", **error.fields) from None
     for name, text in ((path.with_suffix(".h"), texts.header), (path.with_name(f"{path.stem}_test.c"), texts.test)):
         with output.destination(str(name)) as write:
             write(text)

@@ -93,7 +93,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     if not has_form(geometry):
         raise UsageError(f"{arm.name}: {geometry.name} has no form in C; task {task.name} is solved in Python alone")
     if single:
-        raise UsageError(f"{arm.name}: {geometry.name} needs double precision")
+        raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
     return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
 
 
