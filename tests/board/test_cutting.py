@@ -198,3 +198,10 @@ def test_values_that_are_no_pose_are_refused(three_dof: Arm) -> None:
         plan_moves(three_dof, [0, 0, 0], [0.0, 0.0])
     with pytest.raises(UsageError, match="finite"):
         plan_moves(three_dof, [0, 0, 0], [0.0, math.nan, 0.0])
+
+
+def test_a_piece_at_rest_has_one_speed() -> None:
+    """A wait on a path begins and ends at rest: 0 / 0 once."""
+    assert segments.changing(0.0, 0.0) == 0.0
+    assert segments.changing(0.0, 5.0) == 0.0
+    assert segments.changing(4.0, 5.0) == pytest.approx(2 / 9)
