@@ -681,6 +681,157 @@ static void abort_normally_closed(void) {
     host_wait_idle(100);
 }
 
+// ---- limit switches, power, bytes beyond the credit, speeds
+
+// Guards X by switch 0, which is pressed where X is at least so many counts.
+static int32_t guard_at;
+
+static void guard_switch(void) {
+    bench_switches = bench_pins[0] >= guard_at ? 0xFE : 0xFF;
+}
+
+static void guarded(uint32_t nonce, uint8_t flags) {
+    fresh(nonce);
+    struct image image = host_image();
+    image.guard[0] = (struct guard_config){.flags = USED, .weight = {1}};
+    image.flags = flags;
+    host_hello(nonce + 1000);
+    host_configure(&image);
+    CHECK(host_position(ALL_AXES, home_counts).error == OK && host_enable(3).error == OK);
+    bench_run(5000);
+}
+
+static void a_limit_switch_stops_within_one_ramp(void) {
+    const struct host_segment on = {.ticks = 30000, .interval = 1600, .steps = {30000}};
+    const struct host_segment away = {.ticks = 100, .interval = 16000, .steps = {-100}};
+    guarded(70, 0);
+    guard_at = 500;
+    bench_on_tick = guard_switch;
+    CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 1, &on).error == OK);
+    host_wait_idle(1000);
+    struct status status = host_status(0);
+    CHECK(status.ack.error == E_LIMIT_SWITCH && status.ack.detail == 0);
+    CHECK(status.known == ALL_AXES && pins_are(status.counts));
+    CHECK(bench_pins[0] > 500 && bench_pins[0] < 500 + 10000 * (0.050 / 2 + 0.006));  // u = 50 ms, 3 ms of debounce
+    // towards it: refused; away from it: fine
+    host_hello(71);
+    CHECK(host_motion(1, HOST_END | HOST_WIDE, status.counts, 1, &on).error == E_LIMIT_SWITCH);
+    host_hello(72);
+    CHECK(host_motion(1, HOST_END, status.counts, 1, &away).error == OK);
+    host_wait_idle(1000);
+    CHECK(host_status(0).ack.error == OK && bench_pins[0] == status.counts[0] - 100);
+    bench_on_tick = NULL;
+    bench_switches = 0xFF;
+}
+
+static void a_cut_of_the_power_loses_the_position(void) {
+    for (int moving = 0; moving < 2; moving++) {
+        guarded(80 + moving, POWER_SENSED);
+        if (moving) {
+            CHECK(host_motion(3, HOST_END | HOST_WIDE, home_counts, 1, &cruise_segment).error == OK);
+            bench_run(100000);
+        }
+        bench_power_level = false;
+        bench_run(5000);
+        CHECK(host_status(0).known == 0 && host_status(0).flags & 64);
+        host_wait_idle(1000);
+        CHECK(host_status(0).ack.error == (moving ? E_POWER : OK));
+        host_hello(90);
+        CHECK(host_position(1, home_counts).error == E_POWER);
+        bench_power_level = true;
+        bench_run(5000);
+        host_hello(91);
+        CHECK(host_position(1, zero).error == OK);
+    }
+}
+
+static void a_stuck_switch_is_left_by_two_back_offs_at_most(void) {
+    const int32_t rate[AXES] = {-4000};
+    fresh(85);
+    bench_switches = 0xFE;  // pressed, for ever
+    CHECK(host_home(0, 0, 26, 200, 20000, 600, rate).error == OK);
+    host_wait_idle(60000);
+    CHECK(host_status(0).ack.error == E_SWITCH);
+    CHECK(bench_pins[0] > 380 && bench_pins[0] < 440);
+    bench_switches = 0xFF;
+}
+
+static void lost_bytes_are_told_at_once(void) {
+    uint8_t answer[300];
+    fresh(86);
+    bench_spill = true;
+    bench_run(1000);
+    CHECK(bench_answer(answer, sizeof answer) == 10 && answer[0] == 0x83 && answer[1] == host_next);
+    CHECK(answer[2] == OK && answer[3] == E_SPILL);
+    CHECK(host_status(0).ack.error == OK && host_status(0).ack.detail == 0);
+}
+
+static void speeds_are_checked_where_segments_meet(void) {
+    // one step in one tick, at the shortest interval
+    const struct host_segment one = {.ticks = 1, .interval = MIN_INTERVAL, .steps = {1}};
+    fresh(87);
+    CHECK(host_motion(1, HOST_END, home_counts, 1, &one).error == E_RATE);
+    // 2,000/s², so 125 counts/s at once at most: from rest, between segments, within one, and to rest
+    struct image image = host_image();
+    image.axis[0].max_accel = 2000;
+    const struct host_segment cases[][2] = {
+        {{.ticks = 1000, .interval = 16000, .steps = {200}}},
+        {{.ticks = 1000, .interval = 16000, .steps = {100}}, {.ticks = 1000, .interval = 16000, .steps = {300}}},
+        {{.ticks = 1000, .interval = 40000, .add = -8960, .steps = {100}}},
+        {{.ticks = 1000, .interval = 40000, .add = -8000, .steps = {250}}},
+    };
+    for (size_t n = 0; n < 4; n++) {
+        host_hello(200 + n);
+        if (n == 0) {
+            host_configure(&image);
+            CHECK(host_position(ALL_AXES, home_counts).error == OK && host_enable(3).error == OK);
+        }
+        const struct ack ack = host_motion(1, HOST_END | HOST_WIDE, home_counts, n == 1 ? 2 : 1, cases[n]);
+        CHECK(ack.error == E_ACCEL && ack.detail == 0);
+    }
+    // what leads there gently is taken
+    const struct host_segment ramp[] = {
+        {.ticks = 1000, .interval = 16000, .steps = {100}}, {.ticks = 1000, .interval = 16000, .steps = {200}},
+        {.ticks = 1000, .interval = 16000, .steps = {100}},
+    };
+    host_hello(210);
+    CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 3, ramp).error == OK);
+    host_wait_idle(5000);
+    CHECK(host_status(0).ack.error == OK && bench_pins[0] == 400);
+}
+
+// Wherever a hold comes in a segment whose interval grows to the greatest, it is obeyed.
+static void a_hold_is_obeyed_in_every_phase_of_a_segment(void) {
+    const struct host_segment slow[] = {
+        {.ticks = 200, .interval = 40000, .add = 32640, .steps = {100}},  // 65,372 at the last tick, 65,500 beyond
+        {.ticks = 200, .interval = 65000, .steps = {100}},
+    };
+    for (int phase = 0; phase < 260; phase++) {
+        fresh(300);
+        CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 2, slow).error == OK);
+        for (int n = 0; n < phase; n++) {
+            bench_run(2500);
+            session.silent = 0;
+        }
+        const int32_t before = bench_pins[0];
+        host_hold();
+        host_wait_idle(20);
+        CHECK(host_status(0).counts[0] == bench_pins[0] && bench_pins[0] - before <= 2);
+    }
+    // an interval that would leave 16 bits one tick after the end is refused
+    const struct host_segment beyond = {.ticks = 200, .interval = 40000, .add = 32767, .steps = {100}};
+    fresh(301);
+    CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 1, &beyond).error == E_INTERVAL);
+}
+
+static void replies_carry_the_session(void) {
+    fresh(88);
+    host_hello(0xABCD1234);
+    CHECK(host_status(0).ack.session == 0x1234 && host_hold().session == 0x1234);
+    bench_reset(0);
+    CHECK(host_status(0).ack.session == 0);
+}
+
 int main(void) {
     srand(1);
     steps_are_exact();
@@ -700,6 +851,13 @@ int main(void) {
     jogging();
     coupled_motors();
     abort_normally_closed();
+    a_limit_switch_stops_within_one_ramp();
+    a_cut_of_the_power_loses_the_position();
+    a_stuck_switch_is_left_by_two_back_offs_at_most();
+    lost_bytes_are_told_at_once();
+    speeds_are_checked_where_segments_meet();
+    a_hold_is_obeyed_in_every_phase_of_a_segment();
+    replies_carry_the_session();
     printf("core: all promises kept\n");
     return 0;
 }

@@ -280,6 +280,19 @@ def test_waypoints_in_a_file(board: EmulatedBoard, tmp_path: Path) -> None:
     assert board.stats()["axes"]["Y"]["negative"] > 2000
 
 
+def test_after_a_cut_of_the_power_the_position_is_declared_lost() -> None:
+    with EmulatedBoard(reset_on_open=False) as board:
+        assert run("send", THREE_DOF, 1, 89, -89, "--port", board.port, "--assume-home").code == 0
+        assert run("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
+        done = run("stop", "--power-cut", "--port", board.port)
+        assert (done.code, done.err) == (
+            0,
+            "note: the arm stands; its position is lost: home it, or say --assume-home\n",
+        )
+        assert run("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "lost"
+        assert run("send", THREE_DOF, 0, 90, -90, "--port", board.port).code == 5
+
+
 def test_the_gripper(board: EmulatedBoard) -> None:
     refused = run("grip", THREE_DOF, "closed", "--port", board.port)
     assert refused.code == 5

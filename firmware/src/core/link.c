@@ -44,7 +44,7 @@ static uint8_t end_of_frame(void) {
     return whole ? size : 0;
 }
 
-const uint8_t *link_frame(void) {
+uint8_t *link_frame(void) {
     return frame;
 }
 

@@ -90,7 +90,9 @@ APART static void send_info(uint8_t tag, uint32_t said) {
 }
 
 APART static void send_status(uint8_t tag, uint8_t page) {
-    uint8_t reply[18 + 4 * AXES] = {STATUS, tag};
+    uint8_t *const reply = link_frame();
+    reply[0] = STATUS;
+    reply[1] = tag;
     int32_t counts[AXES];
     if (page == 1) {
         memcpy(counts, motion.latch, sizeof counts);
@@ -109,7 +111,7 @@ APART static void send_status(uint8_t tag, uint8_t page) {
     for (uint8_t i = 0; i < AXES; i++) {
         p = put32(p, counts[i]);
     }
-    link_send(reply, sizeof reply);
+    link_send(reply, 18 + 4 * AXES);
 }
 
 // ---- frames in sequence

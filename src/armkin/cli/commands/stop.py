@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from armkin.cli import linking, output
 from armkin.cli.linking import Baud, PortName
 from armkin.errors import LinkError, UsageError
@@ -9,7 +13,14 @@ from armkin.errors import LinkError, UsageError
 _PATIENCE = 15.0  # [s] for an arm to come to rest
 
 
-def stop(port: PortName = None, baud: Baud = None) -> None:
+def stop(
+    port: PortName = None,
+    baud: Baud = None,
+    power_cut: Annotated[
+        bool,
+        typer.Option("--power-cut", help="The motors' power was cut: declare the arm's position lost, drivers off."),
+    ] = False,
+) -> None:
     """Stop the arm along its path.
 
     Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
@@ -25,7 +36,9 @@ def stop(port: PortName = None, baud: Baud = None) -> None:
     if process is not None:
         _end(process, port)
         output.note(f"process {process} has stopped the arm and given the port back")
-        return
+        if not power_cut:
+            return
+    from armkin.board.firmware import protocol
     from armkin.board.firmware.session import Session
     from armkin.board.stopping import stoppable
 
@@ -35,9 +48,11 @@ def stop(port: PortName = None, baud: Baud = None) -> None:
             session = Session(link, asked)
             session.open()  # a former session's motion is held by that alone
             session.hold()
+            if power_cut and session.reopen().config:
+                session.call(lambda tag: protocol.enable(tag, 0))
         finally:
             link.close()
-    output.note("the arm stands")
+    output.note("the arm stands" + ("; its position is lost: home it, or say --assume-home" if power_cut else ""))
 
 
 def _port(given: str | None, baud: int) -> str:
