@@ -1,4 +1,4 @@
-"""The firmware's core and the emulator are layered: no header includes itself by way of others, and errors return upward."""
+"""The layers of the firmware's core: no module reaches itself, errors return upward, no chip is named."""
 
 from __future__ import annotations
 
