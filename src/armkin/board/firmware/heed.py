@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
+from armkin.board.firmware.protocol import VERSION, Ack, Error, Info, State, Status
 from armkin.errors import LinkError
 
 _INFO: dict[str, tuple[int, int]] = {
@@ -42,6 +42,17 @@ def _impossible(port: str, field: str, value: object, allowed: str) -> BoardSays
         port=port,
         field=field,
         value=value,
+    )
+
+
+def other_version(port: str, version: int) -> LinkError:
+    """The board's firmware speaks another version of the protocol."""
+    return LinkError(
+        f"the firmware of the board on {port} speaks protocol {version}, this armkin {VERSION}: nothing was moved\n"
+        "flash the firmware that came with this armkin: make -C firmware flash BOARD=... PORT=...",
+        port=port,
+        board_protocol=version,
+        protocol=VERSION,
     )
 
 

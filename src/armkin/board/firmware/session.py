@@ -117,22 +117,12 @@ class Session:
             for payload in self._splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
                 version = protocol.info_version(payload)
                 if version is not None and version != protocol.VERSION:
-                    raise self._other_version(version)
+                    raise heed.other_version(self.port.name, version)
                 info = protocol.parse(payload)
                 if isinstance(info, Info) and info.nonce == nonce:
                     self._begin(info)
                     return info
         return None
-
-    def _other_version(self, version: int) -> LinkError:
-        return LinkError(
-            f"the firmware of the board on {self.port.name} speaks protocol {version}, this armkin "
-            f"{protocol.VERSION}: nothing was moved\n"
-            "flash the firmware that came with this armkin: make -C firmware flash BOARD=... PORT=...",
-            port=self.port.name,
-            board_protocol=version,
-            protocol=protocol.VERSION,
-        )
 
     def _begin(self, info: Info) -> None:
         heed.check_info(info, self.port.name)
