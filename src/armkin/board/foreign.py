@@ -94,8 +94,8 @@ class Foreign:
         machine.prepare()
         arm, q = self.arm, machine.joints()
         goal = q.copy()
-        low, high = min(arm.lower[joint], q[joint]), max(arm.upper[joint], q[joint])
-        goal[joint] = np.clip(q[joint] + rate * seconds, low, high)
+        goal[joint] += rate * seconds
+        goal = np.clip(goal, arm.lower, arm.upper)  # whole steps may stand half a step outside
         share = float(abs(rate) / arm.max_speed[joint])
         machine.run([self.plan(machine.counts(), goal[None], min(share, 1.0))])
 

@@ -41,7 +41,7 @@ _LIKE_FLOAT = r"([-+]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([-+]?)([0-9]+))?"
 _SEXAGESIMAL = r"[-+]?[0-9][0-9_]*(?::[0-9]+)+(?:\.[0-9_]*)?"
 _LEADING_ZERO = r"([-+]?)0([0-9_]++(?:\.[0-9_]*+)?(?:[eE][-+]?[0-9]++)?)"
 _OTHER_BASE = r"[-+]?0[xXbBoO][0-9a-fA-F_]+"
-_UNDERSCORE = r"[-+]?[0-9][0-9]*+_[0-9_]*+(?:\.[0-9_]*+)?(?:[eE][-+]?[0-9]++)?"
+_UNDERSCORE = r"[-+]?[0-9][0-9_]*+(?:\.[0-9_]*+)?(?:[eE][-+]?[0-9]++)?"
 _NOT_FINITE = r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
 _TIMESTAMP = r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?"
 _WORDS_FOR_TRUE = ("yes", "on")
@@ -282,13 +282,13 @@ def _number(text: str, line: int) -> str | int | float:
     if re.fullmatch(_SEXAGESIMAL, text):
         raise StrictYamlError(line, _sexagesimal(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
-        rest = zeros[2].lstrip("0")
+        rest = zeros[2].replace("_", "").lstrip("0")
         plain = zeros[1] + (rest if rest[:1].isdigit() else f"0{rest}")
         what = f"{shown(text)} begins with 0, which YAML may read as octal"
         raise StrictYamlError(line, f"{what}; write {shown(plain)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):
         raise StrictYamlError(line, f"{shown(text)} is not decimal; write it in decimal, or in quotes")
-    if re.fullmatch(_UNDERSCORE, text):
+    if "_" in text and re.fullmatch(_UNDERSCORE, text):
         plain = text.replace("_", "")
         raise StrictYamlError(line, f"{shown(text)} has underscores; write {shown(plain)}")
     if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
