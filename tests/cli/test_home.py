@@ -1,12 +1,16 @@
 """`armkin home`, rehearsed on the simulated board with switches where the robot file says."""
 
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import armkin
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.homing import switches
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.port import SimPort
+from armkin.hardware import BOARDS
 from command_line import ROOT, THREE_DOF, run
 from pty_board import PtyBoard
 
@@ -34,7 +38,7 @@ def arm_with_switches(folder: Path, *, four: bool, normally: str = "closed", upp
     return str(path)
 
 
-@pytest.mark.parametrize(("normally", "upper"), list(itertools.product(("open", "closed"), (False, True))))
+@pytest.mark.parametrize(("normally", "upper"), [("closed", False), ("open", True)])
 def test_homing_is_rehearsed_and_ends_in_the_home_pose(tmp_path: Path, normally: str, upper: bool) -> None:
     path = arm_with_switches(tmp_path, four=False, normally=normally, upper=upper)
     done = run("home", path, "--port", "sim", "--json")
@@ -69,19 +73,24 @@ def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: 
     assert f"armkin home {path} q1 q3" in one.err
 
 
-def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path) -> None:
-    """The shield's fourth axis has no input: three switches, and a word for the rest."""
-    from armkin.board.firmware.configuration import configure
-    from armkin.board.firmware.homing import switches
+def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shield's fourth axis has no input: three switches, and a word for the rest.
 
+    The board outlives each command, as a real one does, and its time is not the clock's.
+    """
     path = arm_with_switches(tmp_path, four=True)
     arm = armkin.load(path)
-    with PtyBoard() as board:
-        with board.lock:
-            board.board._switch = switches(arm, configure(arm))
-        assert run("home", path, "--port", board.port, "--rest-at-home").code == 0
-        done = run("send", path, 10, 80, -80, 0, "--port", board.port, "--json")
-        assert (done.code, done.json["position"]) == (0, "known")
+    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
+
+    class Wire(SimPort):
+        simulated = False
+
+    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    assert run("send", path, 10, 80, -80, 0, "--port", "COM3").code == 5
+    assert run("home", path, "--port", "COM3", "--rest-at-home").code == 0
+    done = run("send", path, 10, 80, -80, 0, "--port", "COM3", "--json")
+    assert (done.code, done.json["position"]) == (0, "known")
+    assert run("send", path, "home", "--port", "COM3", "--assume-home").code == 5
 
 
 def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
