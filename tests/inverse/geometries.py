@@ -203,6 +203,17 @@ for _n in (4, 5):
     add(f"pitch arm, {_n} joints, usual table", _task, lambda r, n=_n: pitch(r, n, flat=True))
     add(f"pitch arm, {_n} joints, slide first", _task, lambda r, n=_n: pitch(r, n, "P"))
 
+
+def rolled(rng: Rng, first: str = "R") -> Fields:
+    """A joint of any direction, two (anti)parallel ones, a roll about any direction, the tool off its axis."""
+    alpha = [None, float(rng.choice([0, 180])), None, None]
+    return dh(rng, first + "RRR", alpha, [None] * 4, **anywhere(rng))
+
+
+add("roll arm", "xyz_roll", rolled)
+add("roll arm, slide first", "xyz_roll", lambda r: rolled(r, "P"))
+add("roll arm, usual table", "xyz_roll", lambda r: dh(
+    r, "RRRR", [90.0, 0.0, 90.0, 0.0], [0.0, _N, 0.0, 0.0], [_N, 0.0, 0.0, _N]))  # fmt: skip
 add("axis, 5R general", "xyz_axis", lambda r: dh(r, "RRRRR", [_N] * 5, [_N] * 5, **anywhere(r)))
 add("axis, 5R with elbow", "xyz_axis", lambda r: dh(r, "RRRRR", [90.0, 0.0, 90.0, 90.0, _N], [0.0, _N, 0.0, 0.0, 0.0]))
 add("axis, pitch arm", "xyz_axis", lambda r: dh(r, "RRRRR", [90.0, 0.0, 0.0, 90.0, _N], [0.0, _N, _N, 0.0, 0.0]))

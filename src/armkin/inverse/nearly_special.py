@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+BLURRED = 1e-9  # distance from a class that rounding alone explains
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its main pass
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
@@ -60,7 +61,11 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
-    if elimination is not None and (straight := _straight(arm, task, alike, off, elimination())) is not None:
+    if (
+        elimination is not None
+        and off > BLURRED
+        and (straight := _straight(arm, task, alike, off, elimination())) is not None
+    ):
         return straight
 
     def rows(target: Array) -> Rows:

@@ -145,10 +145,11 @@ def _settle(
         moving, joints = moves[k, b], which[k, b]
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (k, M, n)
         rest = group[k] < 0
-        # of a self-motion: whatever differs in its free joints alone
+        # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
+        # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < WEAK)
-        one = rest & ~moving[:, None] & _joined(arm, task, q, k, b, away.max(axis=2), sigma, target)
+        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
+        one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, target)
         mine |= one
         mine[np.arange(len(k)), b] = True
         group[k] = np.where(mine, b[:, None], group[k])
@@ -166,7 +167,7 @@ def _settle(
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
-    _drop_contained(arm, q, chosen, curve)
+    _drop_contained(arm, q, chosen & (sigma < SOLUTION), chosen, curve)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
     out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
@@ -183,13 +184,13 @@ def _settle(
     )
 
 
-def _drop_contained(arm: Arm, q: Array, chosen: Bool, curve: Bool) -> None:
-    """Of self-motions through each other keep the one of more joints: change chosen (K, M).
+def _drop_contained(arm: Arm, q: Array, sure: Bool, chosen: Bool, curve: Bool) -> None:
+    """Of self-motions through each other keep the one of more joints: change chosen (K, M), of which sure lie on one.
 
     curve: (K, M, n) the joints that a chosen posture's self-motion moves. `near`, the first candidate, stays.
     """
-    for k in np.flatnonzero((chosen & curve.any(axis=2)).sum(axis=1) > 1):
-        mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
+    for k in np.flatnonzero((sure & curve.any(axis=2)).sum(axis=1) > 1):
+        mine = np.flatnonzero(sure[k] & curve[k].any(axis=1))
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))

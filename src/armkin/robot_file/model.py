@@ -19,7 +19,7 @@ MAX_POSES = 100
 Triple = tuple[float, float, float]
 Convention = Literal["standard", "modified", "screws"]
 JointType = Literal["revolute", "prismatic"]
-Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_axis", "pose"]
+Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_roll", "xyz_axis", "pose"]
 BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "grbl", "feetech"]
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 

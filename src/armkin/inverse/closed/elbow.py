@@ -7,6 +7,7 @@ al., Robotics, 2.12.2 and 2.12.4).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,21 +41,26 @@ class Elbow:
         self.from_base = pose.constant(inverse(chain.link[0]))
         self.shoulder = pose.constant(chain.link[1])  # frame of joint 2 seen from joint 1
         upper, fore = L2[:3, 3], L2[:3, :3] @ tip  # upper arm, forearm at q3 = 0
+        self.rise, self.to_fore = float(upper[2]), pose.constant(L2 @ FLIP if sense3 < 0 else L2)
         self.along = float(upper[2] + fore[2])
         self.two_link = TwoLink(upper[:2], fore[:2], sense3)
         self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
 
-    def solve(self, p: list[Entry], past: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(
+        self, p: list[Entry], past: list[Entry], prefer: Prefer, tip: list[Entry] | None = None
+    ) -> tuple[list[Pair], Bool]:
         """Angles of the three joints that bring the tip to p.
 
         p: position in the base, entries (N,); past: an offset added to the tip in the frame
         of joint 2 turned to its final direction (what lies past joint 3 and has a known
-        direction), else zeros; prefer: values given to joints that a target leaves free.
+        direction), else zeros; prefer: values given to joints that a target leaves free; tip: the point after
+        joint 3 where it depends on the target.
         Returns three pairs on branch axes (shoulder, elbow, 1, N), and doubt.
         """
         x, y, z = pose.apply(self.from_base, p)
         n, o = self.shoulder[6:9], self.shoulder[9:12]
-        along = arrays.add(self.along, past[2])
+        fore = None if tip is None else pose.turn(self.to_fore, tip)
+        along = arrays.add(self.along if fore is None else arrays.add(self.rise, fore[2]), past[2])
         if self.prismatic1:
             ahead = arrays.sub(arrays.dot(n, [x, y, z]), along + arrays.dot(n, o))
             first, doubt1 = Pair(ahead / n[2], None), np.zeros(1, bool)
@@ -69,7 +75,7 @@ class Elbow:
         lever = [arrays.sub(x, o[0]), arrays.sub(y, o[1]), arrays.sub(z, o[2])]
         rx = arrays.sub(arrays.dot(self.shoulder[0:3], lever), past[0])
         ry = arrays.sub(arrays.dot(self.shoulder[3:6], lever), past[1])
-        second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2])
+        second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2], fore)
         return [first, second, third], doubt1 | doubt23
 
 
@@ -82,9 +88,11 @@ class TwoLink:
         self.sense = sense
         self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
 
-    def solve(self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None) -> tuple[Pair, Pair, Bool]:
-        """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,)."""
-        lx, ly, mx, my = self.lx, self.ly, self.mx, self.my
+    def solve(
+        self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None
+    ) -> tuple[Pair, Pair, Bool]:
+        """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,); fore: m, if the target changes it."""
+        lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
         # |r|^2 = |l + Rz(q3) m|^2
         third, doubt3 = linear(
             2.0 * (lx * mx + ly * my),
@@ -95,30 +103,30 @@ class TwoLink:
             prefer3,
         )
         third = third if self.sense > 0 else Pair(third.c, -third.s)
-        ux, uy, _ = self.reach(third)
+        ux, uy, _ = self.reach(third, fore)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
         doubt = doubt2 | doubt3
         return second, third, doubt
 
-    def reach(self, third: Pair) -> list[Entry]:
+    def reach(self, third: Pair, fore: list[Entry] | None = None) -> list[Entry]:
         """``l + Rz(q3) m``, before joint 2 turns it."""
-        x, y, _ = spin(third.c, arrays.mul(self.sense, third.s), [self.mx, self.my, 0.0])
+        x, y, _ = spin(third.c, arrays.mul(self.sense, third.s), [self.mx, self.my, 0.0] if fore is None else fore)
         return [arrays.add(self.lx, x), arrays.add(self.ly, y), 0.0]
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
-    """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_pitch, xyz_pitch_roll."""
-    n = {"xyz": 3, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
+    """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_roll, xyz_pitch, xyz_pitch_roll."""
+    n = {"xyz": 3, "xyz_roll": 4, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
     if n != arm.n or arm.prismatic[1:].any():
         return None
-    parallels = 2 if n == 3 else 3
+    parallels = 2 if task.name in ("xyz", "xyz_roll") else 3
     link = arm.link.copy()
     for i in range(2, parallels + 1):
         if not is_parallel(link[i], tolerance):
             return None
     if arm.prismatic[0] and abs(link[1][2, 2]) < 1e-6:
         return None  # the slide lies in the arm's plane
-    why = "joints 2 and 3 are parallel" if n == 3 else "joints 2, 3 and 4 are parallel"
+    why = "joints 2 and 3 are parallel" if parallels == 2 else "joints 2, 3 and 4 are parallel"
     labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")
     if n == 3:
         elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
@@ -129,6 +137,8 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return Geometry("elbow", why, True, xyz, labels=labels)
 
     elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
+    if task.name == "xyz_roll":
+        return Geometry("elbow with roll", f"{why}, joint 4 is the roll", True, _roll(arm, task, elbow), labels=labels)
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
     past = pose.constant(link[4])
     # Rz(q2) R2 Rz(q3) R3 Rz(q4) = Rz(q2 +- q3 +- q4) R2 R3, the signs those of antiparallel axes
@@ -157,3 +167,16 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
 
     return Geometry("elbow with pitch", why, True, pitch, labels=labels)
+
+
+def _roll(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer], Candidates]:
+    """Joint 4 is given by the target; it moves the tip that the three joints before it place."""
+    weight, after3, end = float(task.sums[0][3]), pose.constant(arm.link[3]), pose.constant(arm.link[4])
+
+    def roll(goal: list[Entry], prefer: Prefer) -> Candidates:
+        fourth = Pair(*arrays.cos_sin((goal[3] - task.offsets[0]) / weight))
+        tip = pose.times(pose.rotate(after3, *fourth), end)[9:12]
+        pairs, doubt = elbow.solve(goal[:3], [0.0, 0.0, 0.0], prefer, tip)
+        return Candidates([*pairs, fourth], doubt)
+
+    return roll

@@ -110,7 +110,7 @@ def _two_turning(chain: Chain) -> Solve:
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
         # height does not matter: any point above or below the target will do
         p = pose.apply(start, [goal[0], goal[1], 0.0])
-        first, second, doubt = two_link.solve(p[0], p[1], *prefer)
+        first, second, doubt = two_link.solve(p[0], p[1], prefer[0], prefer[1])
         return [first, second], doubt
 
     return solve

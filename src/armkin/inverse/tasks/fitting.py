@@ -43,7 +43,7 @@ def default_task(arm: Arm) -> str | None:
     order = {
         2: ("xy",),
         3: ("xy_theta", "xyz"),
-        4: ("xyz_yaw", "xyz_pitch"),
+        4: ("xyz_yaw", "xyz_pitch", "xyz_roll"),
         5: ("xyz_pitch_roll", "xyz_axis"),
     }.get(arm.n, ("pose",) if arm.n > 5 else ())
     for name in order:
@@ -139,6 +139,20 @@ def _pitch(arm: Arm, name: str) -> Task | str:
     return _plain(arm, name, 3, [weights * arm.ratio, roll * arm.ratio], [offset, arm.dh_theta[4]])
 
 
+def _roll(arm: Arm, name: str) -> Task | str:
+    w = _directions(arm)
+    if arm.n != 4:
+        return "it needs 4 joints"
+    if arm.prismatic[1:].any():
+        return "joints 2 and after must turn"
+    parallel = _along(w, w[1])
+    if parallel[2] == 0 or parallel[3] != 0:
+        return "joints 2 and 3 must be parallel, and joint 4 must turn about another direction"
+    roll = np.zeros(4)
+    roll[3] = arm.dh_sign[3]
+    return _plain(arm, name, 3, roll * arm.ratio, [arm.dh_theta[3]])
+
+
 # Each gives the task for an arm, or says why it does not fit.
 _BUILDERS = {
     "xy": _planar,
@@ -146,6 +160,7 @@ _BUILDERS = {
     "xyz": _free,
     "xyz_pitch": _pitch,
     "xyz_pitch_roll": _pitch,
+    "xyz_roll": _roll,
     "xyz_yaw": _yaw,
     "xyz_axis": _free,
     "pose": _free,

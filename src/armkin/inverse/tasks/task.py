@@ -33,6 +33,7 @@ LABELS = {
     "xyz_pitch": ("x", "y", "z", "phi"),
     "xyz_yaw": ("x", "y", "z", "yaw"),
     "xyz_pitch_roll": ("x", "y", "z", "phi", "roll"),
+    "xyz_roll": ("x", "y", "z", "roll"),
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
