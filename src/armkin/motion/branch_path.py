@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _GRID = 1000  # points of a route's grid, at least
-_EACH = 8  # of a piece's
+_EACH = (8, 64)  # of a piece's, at least, with many pieces and with few
 _DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 _STEP = 1.0  # [mm] between the first samples, at most
@@ -147,7 +147,7 @@ def stretches(
         if b - a <= 1e-9:
             continue
         number = max(int(grid * (b - a) / route.length), 60)
-        for damping, finer in [(d, 2**k) for d in _DAMPING for k in range(4)]:
+        for damping, finer in [(d, 2**k) for d in _DAMPING for k in range(5)]:
             path, breaks = _on_grid(arm, route, s, q, a, b, number * finer, damping)
             off = 0.0 if grid < _GRID else deviation(arm, route, path)
             if off <= pace.tolerance:
@@ -172,10 +172,11 @@ def _on_grid(
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
     at = np.interp([a, *inside, b], s, measure)
     total = max(float(at[-1] - at[0]), 1e-12)
+    each = int(np.clip(2 * number / (len(inside) + 1), *_EACH))
     parts = []
     for (x, y), (m, n) in zip(pairwise([a, *inside, b]), pairwise(at.tolist()), strict=True):
         share = _MOTION * (n - m) / total + (1 - _MOTION) * (y - x) / (b - a)
-        count = max(int(number * share), _EACH)
+        count = max(int(number * share), each)
         here = s[(s > x) & (s < y)]
         grid = np.concatenate([[x], here, [y]])
         level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.protocol import Segment
+from armkin.board.firmware.protocol import STEP, Segment
 from armkin.board.firmware.segments import Counts, Cutter, changing
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
@@ -48,14 +48,65 @@ class CurveSegments:
         """The segments in order."""
         bounds = self.bounds()
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
+        before, span = np.zeros(len(self.start)), 0.0  # the speed at the end of the segment before, and its time
         for first in range(0, len(bounds) - 1, _BLOCK):
             t = bounds[first : first + _BLOCK + 1]
-            at = places(self.arm, self.stretch.at(t))
+            at = self._places(t)
             if first + _BLOCK >= len(bounds) - 1:
                 at[-1] = self.end
-            change = self._changes(t, np.diff(at, axis=0)).tolist()
+            steps = np.diff(at, axis=0)
+            # No motor faster than its greatest rate, whatever rounding says.
+            seconds = np.maximum(np.diff(t), (np.abs(steps) / self._fastest()).max(axis=1))
+            change = self._changes(t, steps).tolist()
+            mean = np.vstack([steps / seconds[:, None], np.zeros(len(self.start))])
+            longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
+            open_end = first + _BLOCK < len(bounds) - 1  # what follows this block is not known here
             for k in range(len(t) - 1):
-                yield cutter.piece(float(t[k + 1] - t[k]), at[k + 1].tolist(), change[k])
+                one, before = self._smooth(
+                    cutter, float(seconds[k]), at[k + 1].tolist(), 0.0 if open_end and k + 2 == len(t) else change[k],
+                    before, max(float(seconds[k]), span), mean[k + 1], float(longer[k]),
+                )  # fmt: skip
+                span = float(seconds[k])
+                yield one
+
+    def _places(self, t: Array) -> Array:
+        """Where the motors are at times t, fractions included: (T, motors).
+
+        Both ends are whole counts; what rounding them has moved is spread over the whole stretch, with no speed at
+        its ends, where a segment is worth a fraction of a step.
+        """
+        ends = places(self.arm, self.stretch.at(np.array([0.0, self.stretch.duration])))
+        f = (t / self.stretch.duration)[:, None]
+        w = f * f * (3 - 2 * f)
+        return np.asarray(
+            places(self.arm, self.stretch.at(t)) + (1 - w) * (self.start - ends[0]) + w * (self.end - ends[1])
+        )
+
+    def _smooth(
+        self, cutter: Cutter, seconds: float, counts: list[float], change: float, before: Array, since: float,
+        after: Array, until: float,
+    ) -> tuple[Segment, Array]:  # fmt: skip
+        """One segment and the motors' speeds at its end, its ramp taken back as far as the board asks for it.
+
+        before: speeds at the end of the segment before, since: the longer of the two's time; after, until: the mean
+        speed of the next one, and the same of it. Without a ramp a segment always fits: its mean follows the one before
+        within the greatest acceleration.
+        """
+        most = _JUMP * motor_accel(self.arm)
+        state = list(cutter.places), cutter.late
+        for share in (1.0, 0.75, 0.5, 0.25, 0.0):
+            cutter.places, cutter.late = list(state[0]), state[1]
+            one = cutter.piece(seconds, counts, change * share)
+            rate = np.array(one.rates) * (self.clock / STEP)
+            begin, end = rate / one.interval, rate / one.last_interval
+            slow = (np.abs(begin - before) <= most * since).all() and (np.abs(end - begin) <= most * seconds).all()
+            if share == 0.0 or (slow and (np.abs(after - end) <= most * until).all()):
+                break
+        return one, end
+
+    def _fastest(self) -> Array:
+        """Greatest rate of every motor: (motors,) [counts/s]."""
+        return np.asarray(np.abs(self.arm.motor_gain) @ self.arm.max_speed)
 
     def _changes(self, t: Array, steps: Array) -> Array:
         """How much the speed changes in every segment, see `Cutter.piece`: (segments,).
@@ -72,6 +123,8 @@ class CurveSegments:
         ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration
         size = np.maximum(np.abs(ramp), 1e-12)
         share = np.minimum((most / size).min(axis=1), 1.0)
+        spare = np.maximum(self._fastest() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
+        share = np.minimum(share, 2 * spare / np.maximum(np.abs(change), 1e-12))
         for end in (self.stretch.at(t[:-1] + 1e-9, 2) @ gain, self.stretch.at(t[1:] - 1e-9, 2) @ gain):
             room = (np.maximum(most + end * np.sign(ramp), 0.0) / size).min(axis=1)
             share = np.minimum(share, room)

@@ -73,7 +73,7 @@ class Cut:
             at = end
 
     def _move(self, stretch: Stretch, start: Counts, end: Counts, rough: bool) -> Move:
-        if isinstance(stretch, Straight) and stretch.law.length and (start != end).any():
+        if isinstance(stretch, Straight) and stretch.law.is_trapezoid and (start != end).any():
             a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
             return along(a, b, stretch.law, clock=clock, min_interval=least, rough=rough)
         arm = self.trajectory.arm

@@ -85,7 +85,7 @@ class Cutter:
     def __init__(self, start: Sequence[int], clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> None:
         self.clock, self.min_interval = clock, min_interval
         self.places = [int(count) * STEP + HALF for count in start]
-        self._late = 0.0  # [cycles] that the segments so far should have lasted longer
+        self.late = 0.0  # [cycles] that the segments so far should have lasted longer
 
     def piece(self, seconds: float, counts: Sequence[float], change: float = 0.0) -> Segment:
         """A straight line to `counts` (motors,), fractions included, in so many seconds.
@@ -94,7 +94,7 @@ class Cutter:
         """
         left = [round(c * STEP) + HALF - p for c, p in zip(counts, self.places, strict=True)]
         most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
-        exact = seconds * self.clock + self._late
+        exact = seconds * self.clock + self.late
         ticks = self._ticks(exact, most)
         add, bend = _parabola(exact / ticks, ticks, change)
         slack = _added(ticks, add, bend)
@@ -104,9 +104,7 @@ class Cutter:
         if short > 0:
             segment = Segment(ticks, interval + short, add, segment.rates, bend)
         self.places = [p + ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
-        self._late = min(
-            exact - cycles_of(segment), float(ticks)
-        )  # what the shortest interval costs is not made up for
+        self.late = min(exact - cycles_of(segment), float(ticks))  # what the shortest interval costs is not made up for
         return segment
 
     def _ticks(self, cycles: float, steps: float) -> int:

@@ -1,0 +1,57 @@
+"""Curved paths on the simulated board, which checks speeds and accelerations of every segment as the firmware does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import cut
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.segments import cycles_of
+from armkin.board.following import parts
+from armkin.board.opening import open_port
+
+
+def some_path(seed: int) -> dict[str, object]:
+    """Lines, a spline and an arc through points at random, some with rounded corners."""
+    rng = np.random.default_rng(seed)
+    points = (rng.uniform([-60, -120, -80], [60, 120, 80], (6, 3)) + [330, 0, 280]).tolist()
+    moves = [
+        {"point": points[0]},
+        {"line": points[1]},
+        {"spline": points[2:4]},
+        {"arc": {"via": points[4], "to": points[5]}},
+        {"line": points[0]},
+    ]
+    return {"moves": moves, "blend": float(rng.choice([0, 3, 8]))}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
+    arm = armkin.load("three_dof")
+    configuration = configure(arm)
+    plan = armkin.path(arm, some_path(seed), jerk=np.deg2rad(3000) if seed % 2 else None)
+    machine = Machine(open_port("sim", board=configuration.board), arm, configuration)
+    machine.prepare()
+    laid = parts(plan, machine.counts(), machine.lay)
+    machine.run(laid)
+    assert machine.counts() == tuple(laid[-1].end.tolist())
+    assert sum(one.segments for one in laid) < 100 * plan.duration + 50
+
+
+def test_segments_follow_the_plan_in_time_and_place() -> None:
+    arm = armkin.load("three_dof")
+    plan = armkin.path(arm, {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300], "turns": 2}}]})
+    laid = cut(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=576)
+    *_, move = laid.moves()
+    stretch = plan.motion.stretches[-1]
+    assert sum(cycles_of(s) for s in move.segments) / laid.clock == pytest.approx(stretch.duration, rel=1e-4)
+    t, place = 0.0, np.array(move.start, dtype=float)
+    for segment in move.segments:
+        t += cycles_of(segment) / laid.clock
+        place += np.array(segment.rates) * segment.ticks / 2**23
+        exact = (stretch.at(np.array([t]))[0] - arm.home) @ arm.motor_gain.T
+        assert np.abs(place - exact).max() < 1.0
+    assert np.round(place).tolist() == move.end.tolist() == move.start.tolist()
