@@ -17,7 +17,7 @@ from armkin.board.opening import open_port
 def some_path(seed: int) -> dict[str, object]:
     """Lines, a spline and an arc through points at random, some with rounded corners."""
     rng = np.random.default_rng(seed)
-    points = (rng.uniform([-60, -120, -80], [60, 120, 80], (6, 3)) + [330, 0, 280]).tolist()
+    points = rng.uniform([270, -120, 200], [390, 120, 360], (6, 3)).tolist()
     moves = [
         {"point": points[0]},
         {"line": points[1]},
