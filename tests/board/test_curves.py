@@ -10,7 +10,7 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import cut
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.segments import cycles_of
-from armkin.board.following import parts
+from armkin.board.following import follow, parts
 from armkin.board.opening import open_port
 
 
@@ -36,7 +36,7 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     machine = Machine(open_port("sim", board=configuration.board), arm, configuration)
     machine.prepare()
     laid = parts(plan, machine.counts(), machine.lay)
-    machine.run(laid)
+    follow(machine, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(one.segments for one in laid) < 100 * plan.duration + 50
 
