@@ -62,7 +62,7 @@ def _missing(robot: str) -> str:
         return f"there is no robot {robot}; did you mean {near}?"
     if os.path.dirname(robot) or robot.endswith(_SUFFIXES):
         return f"{robot}: cannot read the robot file: No such file or directory"
-    return f"there is no robot {robot}: neither a file nor a shipped robot ({', '.join(names()[:4])}, ...)"
+    return f"there is no robot {robot}: neither a file nor a shipped robot (three_dof, ur5e, ...)"
 
 
 def _near(robot: str) -> str | None:
