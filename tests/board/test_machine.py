@@ -158,8 +158,8 @@ def test_another_board_is_refused(three_dof: Arm, wrist: Arm) -> None:
 def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
     configuration = configure(three_dof)
     x, y, z, a, servo = configuration.image.axes
-    assert (x.lower, x.upper, x.max_rate, x.max_accel) == (-4267, 4267, 2176, 4267)
-    assert (y.lower, y.upper, y.max_rate) == (-13127, 3580, 7304)
+    assert (x.lower, x.upper, x.max_rate, x.max_accel) == (-4267, 4267, 2240, 4267)
+    assert (y.lower, y.upper, y.max_rate) == (-13127, 3580, 7519)
     assert (z.lower, z.upper) == (-2000, 14000)
     assert not a.used
     assert (servo.lower, servo.upper, servo.home) == (833, 1833, 833)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.robot_file import Gripper
 
 _FAR = 2**30  # counts: an axis without a limit
-_SLACK = 1.02  # of a motor's rate: whole cycles and rates of 15 bits make a segment that much faster
+_SLACK = 1.05  # of a motor's rate: cycles, rates of 15 bits and parabolas make the end of a ramp that much faster
 _SERVO_RANGE = (400, 2600)  # [us] that the boards can make
 
 
