@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
-# Standing still while the queue fills: 40 ms, or half a second on a bad line.
-_LEAD = (Segment(32, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
+# Standing still while the queue fills: 100 ms, or half a second on a bad line.
+_LEAD = (Segment(80, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
 _BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
 
 
