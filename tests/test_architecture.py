@@ -41,7 +41,7 @@ MAY_IMPORT: dict[str, str] = {
     "plot": "errors files formula model forward motion view reach",
     "board/ports": "errors",
     "board/firmware": "board/backend errors hardware formula model forward motors motion board/ports robot_file",
-    "board/backend": "formula model motion board/ports",
+    "board/backend": "formula model motion motors board/ports",
     "board/grbl": "errors formula model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.board import following
 from armkin.board.backend import StoppedError
+from armkin.board.backend.job import Job
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.machine import GrblMachine
 from armkin.board.grbl.settings import wanted
@@ -179,3 +181,18 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
             axes_of(build(parse(text.replace(old, new))))
     with pytest.raises(UsageError, match="GRBL drives steppers alone"):
         axes_of(armkin.load("ra02"))
+
+
+def test_a_pause_of_a_path_is_a_dwell() -> None:
+    port = board()
+    one = machine(port)
+    one.prepare(assume_home=True)
+    plan = armkin.path(
+        ARM, {"start": "home", "moves": [{"joint": [0, 80, -80]}, {"wait": 1.5}, {"joint": [0, 90, -90]}]}
+    )
+    before = port.now()
+    for part in following.parts(plan, one.counts(), one.lay):
+        assert isinstance(part, Job)
+        one.run([part])
+    assert port.now() - before > 1.5
+    assert pins(port) == [0, 0, 0]

@@ -41,12 +41,12 @@ class Foreign:
     def lay(self, trajectory: Trajectory, counts: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
         if self.board.kind == "grbl":
-            from armkin.board.grbl.gcode import Job
+            from armkin.board.grbl.gcode import job
 
-            return Job(trajectory, counts)
-        from armkin.board.feetech.machine import Job as Positions
+            return job(trajectory, counts)
+        from armkin.board.feetech.machine import job as positions
 
-        return Positions(trajectory, counts)
+        return positions(trajectory, counts)
 
     def simulated(self) -> Port:
         """A board of this kind in this process, set up for the arm, which stands at home."""

@@ -7,7 +7,6 @@ at once; the servos' own regulators follow. A lost packet is made up for by the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
+from armkin.board.backend.job import Job
 from armkin.board.feetech import registers
 from armkin.board.feetech.bus import Bus
 from armkin.errors import LinkError, PositionKnownError, UsageError
@@ -39,33 +39,9 @@ GRIP_SPEED = 500.0  # [counts/s] of a gripper without max_speed, 44 deg/s
 EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
 
 
-@dataclass(frozen=True)
-class Job:
-    """A trajectory that starts at counts `start` (motors,)."""
-
-    trajectory: Trajectory
-    start: NDArray[np.int64]
-
-    @property
-    def end(self) -> NDArray[np.int64]:
-        """Counts at the end: (motors,)."""
-        stretches = self.trajectory.stretches
-        return pulses(self.trajectory.arm, stretches[-1].end) if stretches else self.start
-
-    @property
-    def duration(self) -> float:
-        """Seconds."""
-        return self.trajectory.duration
-
-    @property
-    def segments(self) -> int:
-        """Number of positions sent."""
-        return int(np.ceil(self.duration / PERIOD))
-
-    @property
-    def top_rate(self) -> Array:
-        """Greatest rate of every motor: (motors,) [counts/s]."""
-        return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
+def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    """A trajectory from counts `start` (motors,) on, as positions."""
+    return Job(trajectory, start, int(np.ceil(trajectory.duration / PERIOD)))
 
 
 def servo_ids(arm: Arm) -> list[int]:
@@ -187,11 +163,11 @@ class ServoMachine:
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
         counts = np.asarray(start, dtype=np.int64)
-        return Job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
+        return job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
-        return Job(trajectory, start)
+        return job(trajectory, start)
 
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.job import Job
 from armkin.board.grbl.settings import Axis
 from armkin.motion.trajectory import Straight
 from armkin.motors import pulses
@@ -21,52 +21,33 @@ PIECE = 0.04  # [s] of a curved stretch in one line: 25 lines a second
 SLOWEST = 0.01  # [units/min] of a feed: GRBL refuses 0
 
 
-@dataclass(frozen=True)
-class Job:
-    """A trajectory that starts at counts `start` (motors,)."""
+def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    """A trajectory from counts `start` (motors,) on, for GRBL, whose own planner may take longer."""
+    return Job(trajectory, start, sum(len(_times(stretch)) for stretch in trajectory.stretches))
 
-    trajectory: Trajectory
-    start: NDArray[np.int64]
 
-    @property
-    def end(self) -> NDArray[np.int64]:
-        """Counts at the end: (motors,)."""
-        stretches = self.trajectory.stretches
-        return pulses(self.trajectory.arm, stretches[-1].end) if stretches else self.start
-
-    @property
-    def duration(self) -> float:
-        """Seconds, as planned: GRBL's own planner may take longer."""
-        return self.trajectory.duration
-
-    @property
-    def segments(self) -> int:
-        """Number of lines."""
-        return sum(len(_times(stretch)) for stretch in self.trajectory.stretches)
-
-    @property
-    def top_rate(self) -> Array:
-        """Greatest rate of every motor: (motors,) [counts/s]."""
-        return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
-
-    def lines(self, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator[str]:
-        """G-code, a line a piece; offset: GRBL's machine steps less the arm's counts."""
-        arm, at = self.trajectory.arm, np.asarray(self.start, dtype=np.int64)
-        steps = np.array([axis.steps for axis in axes])
-        for stretch in self.trajectory.stretches:
-            before = 0.0
-            for t in _times(stretch):
-                goal = np.asarray(pulses(arm, stretch.at(np.array([t]))[0]), dtype=np.int64)
-                way = float(np.linalg.norm((goal - at) / steps))
-                if way > 0.0:
-                    speed = way * stretch.law.peak if isinstance(stretch, Straight) else way / (t - before)
-                    words = "".join(
-                        f"{axis.letter}{value:.5f}"
-                        for axis, value, moves in zip(axes, (goal + offset) / steps, goal != at, strict=True)
-                        if moves
-                    )
-                    yield f"G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
-                at, before = goal, t
+def lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator[str]:
+    """G-code, a line a piece; offset: GRBL's machine steps less the arm's counts."""
+    arm, at = job.trajectory.arm, np.asarray(job.start, dtype=np.int64)
+    steps = np.array([axis.steps for axis in axes])
+    for stretch in job.trajectory.stretches:
+        before = idle = 0.0
+        for t in _times(stretch):
+            goal = np.asarray(pulses(arm, stretch.at(np.array([t]))[0]), dtype=np.int64)
+            way = float(np.linalg.norm((goal - at) / steps))
+            if way > 0.0:
+                speed = way * stretch.law.peak if isinstance(stretch, Straight) else way / (t - before)
+                words = "".join(
+                    f"{axis.letter}{value:.5f}"
+                    for axis, value, moves in zip(axes, (goal + offset) / steps, goal != at, strict=True)
+                    if moves
+                )
+                yield f"G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
+            else:
+                idle += t - before
+            at, before = goal, t
+        if idle > 0.0 and idle == stretch.duration:  # a pause: elsewhere a piece without a step is too short to matter
+            yield f"G4P{idle:.3f}"
 
 
 def _times(stretch: Stretch) -> Array:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.grbl import lines, settings
+from armkin.board.backend.job import Job
+from armkin.board.grbl import gcode, lines, settings
 from armkin.board.grbl.axes import axes_of
-from armkin.board.grbl.gcode import Job
 from armkin.board.grbl.session import GrblError, Session
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
@@ -147,11 +147,11 @@ class GrblMachine:
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
         made = joints_of(self.arm, np.asarray(start, dtype=np.int64))
-        return Job(plan_joints(self.arm, made, targets, speed=speed), np.asarray(start, dtype=np.int64))
+        return gcode.job(plan_joints(self.arm, made, targets, speed=speed), np.asarray(start, dtype=np.int64))
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
-        return Job(trajectory, start)
+        return gcode.job(trajectory, start)
 
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
@@ -172,7 +172,7 @@ class GrblMachine:
 
             try:
                 # the dwell is answered when all before it has been carried out
-                whole = self.session.stream([*job.lines(self.axes, self._offset), "G4P0.01"], tick)
+                whole = self.session.stream([*gcode.lines(job, self.axes, self._offset), "G4P0.01"], tick)
             except GrblError as error:
                 raise self._explain(error) from None
             if not whole:

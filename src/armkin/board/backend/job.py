@@ -1,0 +1,40 @@
+"""A trajectory for a board that is sent positions, not segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.motors import pulses
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.motion.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Job:
+    """A trajectory that starts at counts `start` (motors,), sent in so many `segments`: lines or positions."""
+
+    trajectory: Trajectory
+    start: NDArray[np.int64]
+    segments: int
+
+    @property
+    def end(self) -> NDArray[np.int64]:
+        """Counts at the end: (motors,)."""
+        stretches = self.trajectory.stretches
+        return pulses(self.trajectory.arm, stretches[-1].end) if stretches else self.start
+
+    @property
+    def duration(self) -> float:
+        """Seconds, as planned."""
+        return self.trajectory.duration
+
+    @property
+    def top_rate(self) -> Array:
+        """Greatest rate of every motor: (motors,) [counts/s]."""
+        return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
