@@ -423,6 +423,20 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
     sender.communicate(timeout=20)
     assert sender.returncode == 143
     assert board.state == State.IDLE
+    assert "the arm stands" in stop.err  # the board itself was asked
+    finish(board)
+
+
+def test_stop_beside_a_suspended_sender(board: PtyBoard) -> None:
+    sender = moving(board, "--assume-home", "--speed", 5)
+    sender.send_signal(signal.SIGSTOP)
+    began = time.monotonic()
+    stop = process("stop", "--port", board.port)
+    assert stop.code == 0, stop.err
+    assert time.monotonic() - began < 6  # with both programs' start on a busy computer
+    assert "the arm stands" in stop.err
+    sender.communicate(timeout=20)
+    assert sender.returncode == 143
     finish(board)
 
 

@@ -185,12 +185,17 @@ class _Lock:
             message = f"port {name} is in use by armkin (process {holder})"
             raise PortInUseError(message, advice="wait for it", port=name, process=holder)
         self._lock = lock
-        with suppress(OSError), open(_path(name, "pid"), "w", encoding="ascii") as file:
+        self._pid = _path(name, "pid")
+        with suppress(OSError):
+            os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
+        with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
             file.write(str(os.getpid()))
 
     def release(self) -> None:
         """Let others have the port."""
         if self._lock is not None:
+            with suppress(OSError):
+                os.unlink(self._pid)  # before the lock goes: no process is taken for the holder afterwards
             self._lock.release()
             self._lock = None
 

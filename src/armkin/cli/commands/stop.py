@@ -35,9 +35,7 @@ def stop(
     process = holder(port)
     if process is not None:
         _end(process, port)
-        output.note(f"process {process} has stopped the arm and given the port back")
-        if not power_cut:
-            return
+        output.note(f"process {process} has given the port back")
     from armkin.board.firmware import protocol
     from armkin.board.firmware.session import Session
     from armkin.board.stopping import stoppable
@@ -76,6 +74,8 @@ def _end(process: int, port: str) -> None:
 
     try:
         os.kill(process, signal.SIGTERM)
+        if hasattr(signal, "SIGCONT"):
+            os.kill(process, signal.SIGCONT)  # a suspended one hears it only when it goes on
     except OSError as error:
         raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
     end = time.monotonic() + _PATIENCE
