@@ -26,6 +26,17 @@ DOF = THREE_DOF
         (f"grip {DOF} close --port sim", "did you mean closed?"),
         (f"grip {DOF} opne --port sim", "did you mean open?"),
         (f"workspace {DOF} --grid 10x10x10", "with commas: 10,10,10"),
+        ("three_dof fk 1 2 3", "the command comes first: armkin fk three_dof ..."),
+        (f"ik {DOF} 390 80 300 --all", "did you mean --all-branches?"),
+        (f"ik {DOF} targets.csv", "--batch targets.csv"),
+        (f"send {DOF} home --speed 50% --dry-run", "write 50,"),
+        (f"send {DOF} park --dry-run", "its poses: home"),
+        (f"path {DOF} --via 390 80 300 --via 390 160 300", "commas and no spaces, as 390,80,300"),
+        ("new myarm --dh 90 0 170", "commas and no spaces"),
+        ("info", "a robot file or the name of a shipped robot (armkin robots)"),
+        ("import robots/ur5e.yaml", "armkin info robots/ur5e.yaml"),
+        ("import ur5e", "armkin info ur5e"),
+        ("export iiwa7 --c -o arm.c", "ik --lock and Python's armkin.lock hold joints"),
     ],
 )
 def test_a_slip_is_answered_with_what_is_meant(line: str, says: str) -> None:
@@ -89,3 +100,48 @@ def test_a_variable_in_the_table_is_left_out(variable: str) -> None:
     text = (ROOT / THREE_DOF).read_text().replace("d: 170, theta: 0", f"d: 170, theta: {variable}")
     with pytest.raises(RobotFileError, match="leave the variable out: theta is the constant part"):
         robot_file.parse(text, "arm.yaml")
+
+
+def test_a_path_file_in_the_robots_place_is_called_one() -> None:
+    result = run("path", "examples/pick_and_place.yaml", "three_dof")
+    assert (result.code, result.out) == (4, "")
+    assert "a path file, not a robot; write armkin path ROBOT FILE" in result.err
+    assert result.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("puma", "did you mean puma560?"),
+        ("kuka", "did you mean kuka_kr6_r700?"),
+        ("ur", "did you mean ur10e or ur3e or ur5e?"),
+    ],
+)
+def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str, tmp_path: Path) -> None:
+    result = run("fk", name, "home")
+    assert result.code == 1
+    assert says in result.err
+
+
+def test_a_new_robots_note_can_be_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("new", "my arm", "--dh", "90,0,170", "--convention", "standard")
+    assert result.code == 0
+    assert "armkin info 'my arm.yaml'" in result.err
+
+
+def test_answers_of_ik_are_corners_of_a_path(tmp_path: Path) -> None:
+    (tmp_path / "targets.csv").write_text("390,80,300\n400,0,250\n")
+    rows = tmp_path / "rows.csv"
+    assert run("ik", DOF, "--batch", str(tmp_path / "targets.csv"), "--out", str(rows)).code == 0
+    result = run("path", DOF, str(rows))
+    assert (result.code, result.err) == (0, "")
+
+
+def test_a_path_ends_for_each_reason_once(tmp_path: Path) -> None:
+    moves = tmp_path / "far.yaml"
+    moves.write_text("moves:\n  - point: [390, 80, 300]\n  - line: [900, 80, 300]\n")
+    result = run("path", DOF, str(moves))
+    assert result.code == 3
+    lines = [line for line in result.out.splitlines() if line.startswith("  at ")]
+    assert len(lines) == len(set(lines)) > 0

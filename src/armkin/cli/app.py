@@ -18,6 +18,7 @@ from armkin import errors
 from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
+from armkin.cli.numbers import is_number
 
 RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED = 1, 2, 3, 4, 5, 130
 
@@ -96,10 +97,16 @@ class Commands(TyperGroup):
         if name not in COMMANDS and ctx.resilient_parsing:  # Tab was pressed: no command, no complaint
             return name, None, args[1:]
         if name not in COMMANDS:
-            close = get_close_matches(name.lower(), COMMANDS, 1)
-            hint = f"did you mean {close[0]}?" if close else "armkin --help lists them"
-            raise errors.UsageError(f"there is no command '{name}'; {hint}")
+            raise errors.UsageError(f"there is no command '{name}'; {_other_command(name, args[1:])}")
         return name, load(name), args[1:]
+
+
+def _other_command(name: str, rest: list[str]) -> str:
+    """What to type in place of a word that is no command."""
+    if rest and rest[0] in COMMANDS:
+        return f"the command comes first: armkin {rest[0]} {name} ..."
+    close = get_close_matches(name.lower(), COMMANDS, 1)
+    return f"did you mean {close[0]}?" if close else "armkin --help lists them"
 
 
 def load(name: str) -> Any:
@@ -230,14 +237,30 @@ def _drop_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _meant(error: Any, context: Any) -> list[str]:
+    """Options that a mistyped one is near to, or begins: --all for --all-branches."""
+    word = getattr(error, "option_name", None)
+    if not isinstance(word, str) or context is None:
+        return []
+    known = [name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")]
+    begun = [name for name in known if len(word) > 3 and name.startswith(f"{word}-")]
+    return list(getattr(error, "possibilities", None) or begun)
+
+
 def _unexpected(error: Exception) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
         message = str(error.format_message()).rstrip(".")
-        if possible := getattr(error, "possibilities", None):
-            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
         context = getattr(error, "ctx", None)
+        if possible := _meant(error, context):
+            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
+        if message.endswith("'ROBOT'"):
+            message += ": a robot file or the name of a shipped robot (armkin robots)"
         if context is not None:
+            if "unexpected extra argument" in message and any(
+                map(is_number, message.rstrip(")").split("(")[-1].split())
+            ):
+                message += "; an option's numbers have commas and no spaces, as 390,80,300"
             message = f"{message}\nsee {context.command_path} --help"
         code = int(getattr(error, "exit_code", USAGE))
         output.error(message[:1].lower() + message[1:], "usage", code)

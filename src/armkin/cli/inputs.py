@@ -68,7 +68,7 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", word) or word.lower() in (*NOT_FINITE, "pi"):
         return None
     close = get_close_matches(word, poses, 1)
-    hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(poses)}"
+    hint = f"did you mean {close[0]}?" if close else f"its poses: {', '.join(poses)}"
     example = " ".join(arm.joint_names)
     raise UsageError(f"{where}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
 

@@ -52,7 +52,11 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
     from armkin.board.firmware.finding import answering
     from armkin.board.stopping import stoppable
 
-    kind = "a board" if configuration is None else f"an {configuration.board.kind}"
+    kind = (
+        "a board"
+        if configuration is None
+        else f"{'an' if configuration.board.kind[0] in 'aeiou' else 'a'} {configuration.board.kind}"
+    )
     with stoppable() as stop:
         found = answering(None if configuration is None else configuration.board.number, baud, stop)
     if len(found) == 1:

@@ -85,6 +85,8 @@ def _why_not(plain: str, shown: str) -> str:
         return "a number is missing"
     if bare in NOT_FINITE:
         return f"'{shown}' is not finite; give a number"
+    if bare.endswith("%") and _NUMBER.fullmatch(bare.removesuffix("%").strip()):
+        return f"'{shown}': write {plain[:-1].strip()}, without a sign for its unit"
     for unit in ("mm", "degrees", "deg", "\u00b0"):
         if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
             return f"'{shown}': units are fixed (mm, degrees); write {plain[: -len(unit)].strip()}"
@@ -110,6 +112,8 @@ def of_pi(text: str) -> float | None:
 
 
 def _separator_hint(words: Sequence[str], names: Sequence[str]) -> str:
+    if len(words) == 1 and words[0].lower().endswith(".csv"):
+        return f"; rows of a file: --batch {words[0]}"
     if len(words) == 1 and len(names) > 1 and len(words[0].replace(",", " ").split()) == len(names):
         return "; separate them with spaces: " + " ".join(words[0].replace(",", " ").split())
     return ""

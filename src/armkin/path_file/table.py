@@ -12,6 +12,8 @@ from armkin.path_file.model import Move, PathFile
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
+# What `armkin ik --batch` says beside the joints.
+_OF_ANSWERS = ("row", "status", "branch", "within_limits", "residual_mm", "residual_deg", "motion")
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
 MOST = 50_000  # rows
 
@@ -20,7 +22,8 @@ def parse(raw: bytes, name: str) -> PathFile:
     """Rows as moves: a point first, then lines (targets), or joint moves (joint names).
 
     The header names the columns: x,y,z[,roll,pitch,yaw] or whatever the task's labels are, or joint names, plus
-    optional blend and tool_speed. Without a header the columns are a target's, in the task's order.
+    optional blend and tool_speed; what `armkin ik --batch` says beside the joints is passed over. Without a
+    header the columns are a target's, in the task's order.
     """
     try:
         text = raw.decode("utf-8-sig")
@@ -37,6 +40,8 @@ def parse(raw: bytes, name: str) -> PathFile:
         raise PathFileError(f"{name}: has {len(rows)} rows; a path takes up to {MOST}: give it in parts", file=name)
     header: list[str] | None = None
     if any(_value(cell) is None for cell in rows[0][1]):
+        kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
+        rows = [(number, [row[i] for i in kept if i < len(row)]) for number, row in rows]
         header = [_bare(cell) for cell in rows.pop(0)[1]]
         doubled = sorted({key for key in header if header.count(key) > 1})
         if doubled:

@@ -65,6 +65,9 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
         document = strict_yaml.loads(raw)
     except strict_yaml.StrictYamlError as error:
         raise _invalid(name, [(error.line, error.problem)]) from None
+    if "moves" in document.data and "joints" not in document.data:
+        line = document.line(("moves",))
+        raise _invalid(name, [(line, "moves: this is a path file, not a robot; write armkin path ROBOT FILE")])
     try:
         robot = _validated(document.data)
     except ValidationError as error:

@@ -58,21 +58,21 @@ def locate(robot: str) -> str:
 
 def _missing(robot: str) -> str:
     near = _near(robot)
-    if near is not None:
-        return f"there is no robot {robot}; did you mean {near}?"
+    if near:
+        return f"there is no robot {robot}; did you mean {' or '.join(near)}?"
     if os.path.dirname(robot) or robot.endswith(_SUFFIXES):
         return f"{robot}: cannot read the robot file: No such file or directory"
-    return f"there is no robot {robot}: neither a file nor a shipped robot (three_dof, ur5e, ...)"
+    return f"there is no robot {robot}: neither a file nor a shipped robot (three_dof, ur5e, ...: armkin robots)"
 
 
-def _near(robot: str) -> str | None:
-    """What may have been meant: a file beside it, or a shipped robot."""
+def _near(robot: str) -> list[str]:
+    """What may have been meant: a file beside it, a shipped robot, or those whose names it begins."""
     from difflib import get_close_matches
 
     folder, base = os.path.split(robot)
     stem = os.path.splitext(base)[0] if base.endswith(_SUFFIXES) else base
     if not stem or len(stem) > 100:
-        return None
+        return []
     try:
         beside = [entry for entry in sorted(os.listdir(folder or ".")) if entry.endswith(_SUFFIXES)]
     except OSError:
@@ -82,8 +82,9 @@ def _near(robot: str) -> str | None:
         plain = {_plain(choice): choice for choice in choices}
         close = get_close_matches(_plain(base), plain, n=1, cutoff=0.75)
         if close:
-            return os.path.join(where, plain[close[0]])
-    return None
+            return [os.path.join(where, plain[close[0]])]
+    begun = [name for name in names() if len(stem) > 1 and name.startswith(_plain(base))]
+    return begun[:4]
 
 
 def _plain(name: str) -> str:

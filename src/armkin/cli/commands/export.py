@@ -10,7 +10,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.options import Out, Robot, TaskName
-from armkin.errors import UsageError
+from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -95,6 +95,10 @@ def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     try:
         texts = program(arm, path.name, task, single)
     except UsageError as error:
+        if isinstance(error, RedundantArmError):  # ik's advice is --lock, which a file of C cannot take
+            raise UsageError(
+                f"{error.message}: no C for that; ik --lock and Python's armkin.lock hold joints"
+            ) from None
         if error.fields.get("precision") != "double":
             raise
         raise UsageError(error.message, advice="leave --float away", **error.fields) from None

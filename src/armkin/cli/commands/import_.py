@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -35,9 +36,11 @@ def import_(
     from armkin import robot_file
     from armkin.export import tables
     from armkin.model.build import build
-    from armkin.robot_file import urdf
+    from armkin.robot_file import catalogue, urdf
     from armkin.robot_file.writing import text
 
+    if file.endswith((".yaml", ".yml")) or (catalogue.shipped(file) and not os.path.exists(file)):
+        raise UsageError(f"{file} is a robot, and import reads URDFs: armkin info {file} says what it is")
     files.keep(file)
     try:
         found = urdf.read(file, base=base, tip=tip, snap=snap)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -76,7 +77,8 @@ def new(
     with output.destination(path) as write:
         write(made)
     if path != "-":
-        output.note(f"wrote {path}; armkin info {path} prints it as papers do, armkin fk {path} home where it stands")
+        word = shlex.quote(path)
+        output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
 
 
 def _path(name: str, out: str | None) -> str:

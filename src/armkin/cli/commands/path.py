@@ -68,7 +68,7 @@ def path(
     out: Out = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume_home: AssumeHome = False,
-    baud: Baud = linking.BAUD,
+    baud: Baud = None,
     json: Json = False,
 ) -> None:
     """Plan a path through space, and move along it.
@@ -305,7 +305,9 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
     for one in plan.reconfigurations:
         from armkin.motion.report import words
 
-        lines.append(f"  at {one.s:.3f} mm: {words(arm, one)}")
+        line = f"  at {one.s:.3f} mm: {words(arm, one)}"
+        if line not in lines:  # several branches end there for one reason
+            lines.append(line)
     if found["branches"]:
         rows = [["branch at the start", "carries/mm", ""]]
         rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]

@@ -58,7 +58,10 @@ def plot(
     if out is not None:
         canvas.check(out)
     else:
-        canvas.windows()  # says at once that there is no display
+        try:
+            canvas.windows()  # says at once that there is no display
+        except UsageError as error:
+            raise UsageError(error.message, advice="for example -o arm.png") from None
     canvas.require()
     if target is None and (task is not None or lock):
         raise UsageError("--task and --lock belong to --target")

@@ -65,7 +65,7 @@ def rank(arm: Arm, task: Task, tolerance: float = 1e-4) -> int:
 
 def _joints(arm: Arm) -> str:
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
-    return f"{arm.n} joints ({kinds})"
+    return f"{arm.n} joint{'s' * (arm.n > 1)} ({kinds})"
 
 
 def _plain(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
