@@ -12,7 +12,7 @@ from armkin.path_file.model import Move, PathFile
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
-# What `armkin ik --batch` says beside the joints.
+# What a batch of `armkin ik` says beside the joints.
 _OF_ANSWERS = ("row", "status", "branch", "within_limits", "residual_mm", "residual_deg", "motion")
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
 MOST = 50_000  # rows
@@ -22,7 +22,7 @@ def parse(raw: bytes, name: str) -> PathFile:
     """Rows as moves: a point first, then lines (targets), or joint moves (joint names).
 
     The header names the columns: x,y,z[,roll,pitch,yaw] or whatever the task's labels are, or joint names, plus
-    optional blend and tool_speed; what `armkin ik --batch` says beside the joints is passed over. Without a
+    optional blend and tool_speed; what a batch of `armkin ik` says beside the joints is passed over. Without a
     header the columns are a target's, in the task's order.
     """
     try:
