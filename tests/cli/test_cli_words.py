@@ -117,17 +117,17 @@ def test_a_path_file_in_the_robots_place_is_called_one() -> None:
         ("ur", "did you mean ur10e or ur3e or ur5e?"),
     ],
 )
-def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str, tmp_path: Path) -> None:
+def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str) -> None:
     result = run("fk", name, "home")
     assert result.code == 1
     assert says in result.err
 
 
-def test_a_new_robots_note_can_be_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = run("new", "my arm", "--dh", "90,0,170", "--convention", "standard")
+def test_a_new_robots_note_can_be_typed(tmp_path: Path) -> None:
+    file = tmp_path / "my arm.yaml"
+    result = run("new", "my arm", "--dh", "90,0,170", "--convention", "standard", "--out", str(file))
     assert result.code == 0
-    assert "armkin info 'my arm.yaml'" in result.err
+    assert f"armkin info '{file}'" in result.err
 
 
 def test_answers_of_ik_are_corners_of_a_path(tmp_path: Path) -> None:
