@@ -124,6 +124,21 @@ def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str) -> No
     assert says in result.err
 
 
+@pytest.mark.parametrize(
+    "line", ["send moveo home --dry-run", "path ur5e --via 390,80,300,0,180,0 --via 390,160,300,0,180,0"]
+)
+def test_what_a_shipped_robot_lacks_is_added_to_a_copy(line: str, tmp_path: Path) -> None:
+    result = run(*line.split())
+    assert (result.code, result.out) == (2, "")
+    name = line.split()[1]
+    copy = f"armkin export {name} --dh -o my_{name}.yaml"
+    assert copy in result.err
+    again = run(*line.replace(name, f"robots/{name}.yaml").split())
+    assert f"add to robots/{name}.yaml" in again.err
+    assert "copy" not in again.err
+    assert run(*copy.split()[1:-1], str(tmp_path / "copy.yaml")).code == 0
+
+
 def test_a_new_robots_note_can_be_typed() -> None:
     with tempfile.TemporaryDirectory() as folder:  # tmp_path is so long that the note is cut
         file = Path(folder) / "my arm.yaml"

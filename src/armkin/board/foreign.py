@@ -122,7 +122,11 @@ def foreign(arm: Arm) -> Foreign | None:
     lines = rate_lines(arm)
     if lines:
         raise UsageError(
-            "".join([f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)])
+            "".join(
+                [f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]
+            ),
+            robot_file=arm.path,
+            lines_to_add=lines,
         )
     if board.kind == "grbl":
         from armkin.board.grbl.axes import axes_of

@@ -6,6 +6,7 @@ options and commands instead.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 from armkin.errors import (
@@ -19,7 +20,9 @@ from armkin.errors import (
     PositionKnownError,
     PositionLostError,
     RedundantArmError,
+    UsageError,
 )
+from armkin.robot_file.catalogue import shipped
 
 
 def next_step(error: ArmkinError) -> str:
@@ -40,6 +43,8 @@ def message(error: ArmkinError) -> str:
     if not step:
         return error.message
     lines = error.message.count("\n") + 1
+    if error.fields.get("lines_to_add"):
+        return f"{error.message}\n{step}"
     return f"{error.message}{': ' if lines > 1 or isinstance(error, _ONE_LINE) else chr(10)}{step}"
 
 
@@ -47,6 +52,14 @@ def _redundant(error: ArmkinError) -> str:
     joints = ", ".join(error.fields["joints"])
     fix = f"fix {error.fields['surplus']} of {joints} with --lock JOINT=VALUE"
     return f"{fix}, or try values with --sweep JOINT=LOW:HIGH:COUNT"
+
+
+def _incomplete(error: ArmkinError) -> str:
+    """What a shipped robot lacks is added to a copy of its file."""
+    name = error.fields.get("robot_file")
+    if not error.fields.get("lines_to_add") or not name or shipped(name) is None or os.path.isfile(name):
+        return error.advice
+    return f"{name} comes with armkin: add them to a copy, armkin export {name} --dh -o my_{name}.yaml"
 
 
 def _lost(error: ArmkinError) -> str:
@@ -74,4 +87,5 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     PositionKnownError: lambda error: "leave --assume-home out",
     GripperLostError: lambda error: "add --assume open (or closed, or a value)",
     GripperKnownError: lambda error: "leave --assume out",
+    UsageError: _incomplete,  # the last: NoHomingError and others are such, too
 }

@@ -99,7 +99,10 @@ def check_rates(arm: Arm) -> None:
     if absent:
         said_of = [f"joint{'s' * (len(n) > 1)} {', '.join(n)} ha{'ve' if len(n) > 1 else 's'} no {key}"
                    for key, n in absent.items()]  # fmt: skip
-        raise UsageError(f"{', '.join(said_of)}: motion needs one{_add(arm, rate_lines(arm))}")
+        lines = rate_lines(arm)
+        raise UsageError(
+            f"{', '.join(said_of)}: motion needs one{_add(arm, lines)}", robot_file=arm.path, lines_to_add=lines
+        )
 
 
 def _add(arm: Arm, lines: list[str]) -> str:

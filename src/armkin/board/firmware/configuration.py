@@ -79,7 +79,9 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         said = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]
         raise UsageError(
-            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)])
+            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
+            robot_file=arm.path,
+            lines_to_add=lines,
         )
     made_up = rehearsal and bool(_without_board(arm))
     motors = arm.motors
