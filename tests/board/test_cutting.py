@@ -21,6 +21,7 @@ from armkin.motors import joints, pulses
 
 CLOCK, MIN_INTERVAL = segments.CLOCK, segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
+RAMPS = st.floats(0.03, 3.0)  # [s] to full speed
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     end = [x + data.draw(st.integers(-900, 900)) for x in start]
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
     rate = data.draw(st.floats(500, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
-    accel = data.draw(st.floats(500, 400_000))
+    accel = min(400_000, rate / data.draw(RAMPS))
     move = segments.line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
@@ -100,21 +101,32 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(1, 20_000), st.floats(50, 40_000), st.floats(200, 400_000))
+@given(st.integers(1, 20_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 400_000))
 def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
     move = segments.line([0], [n], rate / n, accel / n)
-    # Wherever the interval changes as fast as it does in a segment, and where a segment meets the next but one.
     times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
     place = np.cumsum([0, *(s.ticks * s.rates[0] / 2**23 for s in move.segments)])
+    # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
+    # rounding of a step: the definition of an acceleration that whole steps allow.
     for i in range(len(times) - 2):
         t0, t1, t2 = times[i : i + 3]
         p0, p1, p2 = place[i : i + 3]
         bend = (p2 - p1) / (t2 - t1) - (p1 - p0) / (t1 - t0)
-        assert abs(bend) <= accel * 1.02 * (t2 - t0) / 2 + 0.02 * rate
+        assert abs(bend) <= accel * (t2 - t0) / 2 + 0.02 * rate + 1 / (t2 - t0)
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(1, 30_000), st.floats(50, 35_000), st.floats(200, 200_000))
+@given(st.integers(1, 5_000), st.floats(500, CLOCK / MIN_INTERVAL), st.floats(0.002, 0.03))
+def test_a_short_ramp_pays_for_no_long_cruise(n: int, rate: float, ramp: float) -> None:
+    """Whole cycles an interval once left a long cruise 0.1 ms too long, and the next piece a quarter too fast."""
+    move = segments.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
+    gaps = np.diff(np.array(tick_times(move.segments)), prepend=0)
+    per_tick = np.repeat([abs(s.rates[0]) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
+    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.12
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 30_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 200_000))
 def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
     move = segments.line([0], [n], rate / n, accel / n)

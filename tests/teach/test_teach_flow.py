@@ -55,7 +55,9 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         page.fill("#speed", "20")
         page.click("#send")
         until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        end = time.monotonic() + 20
         while net(board)[1] < COUNTS[1] + 200:
+            assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
             page.wait_for_timeout(20)
         page.click("#stop")
         idle(page, "stopped")

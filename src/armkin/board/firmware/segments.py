@@ -97,8 +97,9 @@ class Cutter:
         exact = seconds * self.clock + self.late
         ticks = self._ticks(exact, most)
         add, bend = _parabola(exact / ticks, ticks, change)
-        slack = _added(ticks, add, bend)
-        interval = round((exact - slack) / ticks)
+        interval = round((exact - _added(ticks, add, bend)) / ticks)
+        if add == 0 and ticks > 1:
+            interval, add = _even(exact, ticks)
         segment = Segment(ticks, interval, add, tuple(nearest_rate(x / ticks) for x in left), bend)
         short = self.min_interval - min(segment.interval, segment.last_interval)
         if short > 0:
@@ -118,6 +119,20 @@ class Cutter:
         elif over == 0 and each < math.inf:
             tick = each
         return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
+
+
+def _even(cycles: float, ticks: int) -> tuple[int, int]:
+    """Interval and `add` of a segment of one speed that lasts so many cycles.
+
+    A whole number of cycles an interval is up to half a cycle a tick off, which the next segment would have to make
+    up for: a tenth of a short ramp. The device adds floor(k a), a = add / 65536: over A = a ticks cycles in all the
+    mean of that is 1 - 1 / A up to A = 2, and 2 - 3 / A up to 3.
+    """
+    interval = int(cycles // ticks)
+    part = cycles / ticks - interval  # of a cycle, that the mean interval is longer
+    if part * ticks < 1:
+        return interval, 0
+    return interval, round((1 / (1 - part) if part < 0.5 else 3 / (2 - part)) * 65536 / ticks)
 
 
 def _parabola(mean: float, ticks: int, change: float) -> tuple[int, int]:
