@@ -5,40 +5,28 @@ from __future__ import annotations
 import os
 import random
 import select
-import threading
 import time
-import tty
 
 from armkin.board.firmware.protocol import State
 from armkin.board.sim.board import SimBoard
 from armkin.hardware import BOARDS
+from pty_port import Pty
 
 
-class PtyBoard:
-    """From `with` to the end of its block: `port` is what armkin opens."""
+class PtyBoard(Pty):
+    """A simulated board with armkin's firmware behind it."""
 
     def __init__(self, kind: str = "uno_cnc_shield", *, noise: float = 0.0, seed: int = 1) -> None:
+        super().__init__()
         self.board = SimBoard(BOARDS[kind])
         self.noise = noise  # probability that a byte is flipped, and that it is dropped
         self.cut = False
-        self.lock = threading.Lock()
         self._random = random.Random(seed)
-        self._end = threading.Event()
 
-    def __enter__(self) -> PtyBoard:
-        self._master, self._slave = os.openpty()  # the slave stays open: else the master fails between hosts
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.port = os.ttyname(self._slave)
-        self._thread = threading.Thread(target=self._serve)
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._end.set()
-        self._thread.join()
-        os.close(self._slave)
-        os.close(self._master)
+    @property
+    def port(self) -> str:
+        """What armkin opens."""
+        return self.name
 
     @property
     def net(self) -> list[int]:

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 import tty
-from typing import Protocol
+from typing import Protocol, Self
 
 
 class Simulated(Protocol):
@@ -22,15 +22,14 @@ class Simulated(Protocol):
         """Simulated seconds."""
 
 
-class PtyPort:
-    """From `with` to the end of its block: `name` is what a program opens."""
+class Pty:
+    """A pseudo-terminal from `with` to the end of its block, served by a thread; `name` is what a program opens."""
 
-    def __init__(self, board: Simulated) -> None:
-        self.board = board
+    def __init__(self) -> None:
         self.lock = threading.Lock()
         self._end = threading.Event()
 
-    def __enter__(self) -> PtyPort:
+    def __enter__(self) -> Self:
         self._master, self._slave = os.openpty()  # the slave stays open: else the master fails between programs
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -44,6 +43,17 @@ class PtyPort:
         self._thread.join()
         os.close(self._slave)
         os.close(self._master)
+
+    def _serve(self) -> None:
+        raise NotImplementedError
+
+
+class PtyPort(Pty):
+    """A simulated port behind it."""
+
+    def __init__(self, board: Simulated) -> None:
+        super().__init__()
+        self.board = board
 
     def _serve(self) -> None:
         began = time.monotonic() - self.board.now()

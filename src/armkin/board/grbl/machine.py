@@ -7,6 +7,7 @@ a reset clears it, and a position that was lost is never taken for zero.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -172,7 +173,7 @@ class GrblMachine:
 
             try:
                 # the dwell is answered when all before it has been carried out
-                whole = self.session.stream([*gcode.lines(job, self.axes, self._offset), "G4P0.01"], tick)
+                whole = self.session.stream(chain(gcode.lines(job, self.axes, self._offset), ["G4P0.01"]), tick)
             except GrblError as error:
                 raise self._explain(error) from None
             if not whole:
