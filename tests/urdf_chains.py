@@ -1,7 +1,8 @@
 """Real arms' URDF chains as numbers (robot_file/urdf_chains.json), as URDF text, and a forward kinematics of our own.
 
-`pose` shares no code with armkin: it walks the joints as http://wiki.ros.org/urdf/XML/joint describes them, in
-metres, with Rodrigues' formula.
+Each chain names its source; `expected` are poses that pinocchio 4.1 (yourdfpy for the first six) computed from the
+whole file. `pose` shares no code with armkin: it walks the joints as http://wiki.ros.org/urdf/XML/joint describes
+them, in metres, with Rodrigues' formula.
 """
 
 from __future__ import annotations

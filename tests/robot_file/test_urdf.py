@@ -12,6 +12,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
+from armkin.export.urdf import urdf as write_urdf
 from armkin.model.build import build
 from armkin.robot_file import urdf
 from armkin.robot_file.writing import angles, number, text
@@ -29,6 +30,7 @@ def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
 def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
     """To 1e-9 mm: against poses computed by pinocchio or yourdfpy (`expected`), and by tests/urdf_chains.py."""
     chain = CHAINS[name]
+    assert chain["expected"]
     arm = imported(chain)
     joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
     given = [(case["q_si"], np.array(case["T_m"])) for case in chain.get("expected", [])]
@@ -39,6 +41,31 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
         got = armkin.fk(arm, np.asarray(q) * np.where(slides, 1000.0, 1.0))
         assert np.abs(got[:3, 3] - 1000 * T[:3, 3]).max() < 1e-9
         assert np.abs(got[:3, :3] - T[:3, :3]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
+    """The same poses to 1e-9 mm, the same limits, and the same solver class."""
+    arm = imported(CHAINS[name])
+    again = build(robot_file.parse(text(urdf.parse(write_urdf(arm).encode()).data)))
+    slides = np.where(arm.prismatic, 100.0, 1.0)
+    q = np.random.default_rng(8).uniform(-2, 2, (20, arm.n)) * slides
+    off = np.abs(armkin.fk(again, q) - armkin.fk(arm, q))
+    assert off[:, :3, 3].max() < 1e-9
+    assert off[:, :3, :3].max() < 1e-12
+    for bound in ("lower", "upper"):
+        values, others = getattr(arm, bound), getattr(again, bound)
+        assert np.array_equal(np.isfinite(values), np.isfinite(others))
+        assert others[np.isfinite(others)] == pytest.approx(values[np.isfinite(values)], abs=1e-10)
+    assert solver(again) == solver(arm)
+
+
+def solver(arm: armkin.Arm) -> str:
+    """What ik solves the arm as; seven joints and more have no class of their own."""
+    try:
+        return armkin.method(arm)[0]
+    except UsageError:
+        return "none"
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -193,6 +220,12 @@ def test_a_joint_and_a_link_may_share_a_name_and_transmissions_do_not_count() ->
     assert [joint["name"] for joint in urdf.parse(body).data["joints"]] == ["shoulder", "upper", "wrist"]
 
 
+def test_an_empty_line_first_and_elements_of_simulators_do_no_harm() -> None:
+    body = document(("<axis", '<dynamics damping="nan"/><safety_controller k_velocity="x"/><axis'))
+    with_more = body.replace(b"</robot>", b'<gazebo reference="upper"><mu1>x</mu1></gazebo></robot>')
+    assert urdf.parse(b'\n <?xml version="1.0"?>' + with_more).data == urdf.parse(document()).data
+
+
 def test_base_and_tip_choose_a_part_of_the_chain() -> None:
     found = urdf.parse(document(), base="upper", tip="hand")
     assert [joint["name"] for joint in found.data["joints"]] == ["elbow", "wrist"]
@@ -315,5 +348,6 @@ def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
 
 
 def test_shipped_file_is_data_of_this_project() -> None:
+    assert len(CHAINS) >= 30
     assert all(chain["source"] for chain in CHAINS.values())
     assert (ROOT / "tests/robot_file/urdf_chains.json").exists()

@@ -87,7 +87,7 @@ def document(raw: bytes, name: str) -> tuple[str, list[str], list[Joint]]:
     reader = _Reader(name)
     parser = DefusedXMLParser(target=reader, forbid_dtd=True)
     try:
-        parser.feed(raw)
+        parser.feed(raw.lstrip())  # some real files begin with an empty line, which XML forbids
         parser.close()
     except DefusedXmlException:
         raise RobotFileError(f"{name}: has a DTD or entities, which no URDF needs; remove <!DOCTYPE ...>") from None
