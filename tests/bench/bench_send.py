@@ -39,7 +39,7 @@ def noisy(seed: int) -> str:
     with EmulatedBoard(seed=seed, reset_on_open=False) as board:
         port = SerialPort(board.port)
         machine = Machine(port, arm, configuration)
-        machine.prepare(assume_home=True)
+        machine.prepare(assume=machine.arm.home)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
         machine.session.probe()
         plans: list[Any] = []

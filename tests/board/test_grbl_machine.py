@@ -44,7 +44,7 @@ def pins(port: Grbl) -> list[int]:
 def test_200_random_moves_are_read_back_exact() -> None:
     port = board()
     one = machine(port)
-    assert one.prepare(assume_home=True)
+    assert one.prepare(assume=one.arm.home)
     rng = np.random.default_rng(3)
     for _ in range(200):
         goal = rng.uniform(ARM.lower, ARM.upper)
@@ -55,7 +55,7 @@ def test_200_random_moves_are_read_back_exact() -> None:
 def test_the_published_pose_puts_the_published_steps_on_the_pins() -> None:
     port = board()
     one = machine(port)
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     one.run([one.plan(one.counts(), np.deg2rad([-30, 5, -5]))])
     assert pins(port) == [-1067, -10144, 5667]
 
@@ -63,14 +63,14 @@ def test_the_published_pose_puts_the_published_steps_on_the_pins() -> None:
 def test_the_position_outlives_the_command_but_no_reset() -> None:
     port = board()
     one = machine(port)
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
     there = one.counts()
     again = machine(port)
     assert (again.position(), again.counts()) == ("known", there)
     assert not again.prepare()
     with pytest.raises(LinkError, match="position is known"):
-        again.prepare(assume_home=True)
+        again.prepare(assume=again.arm.home)
     port.boot()
     lost = machine(port)
     assert lost.position() == "lost"
@@ -83,12 +83,12 @@ def test_settings_that_do_not_fit_are_refused_and_setup_writes_them() -> None:
     port.simulated = False
     one = machine(port)
     with pytest.raises(LinkError, match=r"GRBL's settings do not fit three_dof: \$100 .* is 250.*, and 2 more"):
-        one.prepare(assume_home=True)
+        one.prepare(assume=one.arm.home)
     assert not port.history
     written = {difference.number for difference in one.setup()}
     assert {100, 101, 102, 110, 111, 112} <= written
     assert one.setup() == []
-    assert one.prepare(assume_home=True)
+    assert one.prepare(assume=one.arm.home)
 
 
 def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
@@ -98,7 +98,7 @@ def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
         asked = iter(range(10_000))
         port.boot()
         one = machine(port, lambda asked=asked, after=after: next(asked) > after)  # type: ignore[misc]
-        one.prepare(assume_home=True)
+        one.prepare(assume=one.arm.home)
         plan = one.plan(one.counts(), goal)
         with pytest.raises(StoppedError):
             one.run([plan])
@@ -134,7 +134,7 @@ def during(port: Grbl, what: Callable[[], None]) -> Callable[[], bool]:
 def test_what_loses_the_position_is_told(fault: Callable[[Grbl], None], message: str) -> None:
     port = board()
     one = machine(port, during(port, lambda: fault(port)))
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     with pytest.raises(LinkError, match=message):
         one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]))])
     if not port.dead:
@@ -160,7 +160,7 @@ def test_a_noisy_line_never_gives_a_false_position(seed: int) -> None:
     for _ in range(12):
         try:
             one = machine(port)
-            one.prepare(assume_home=one.position() == "lost")
+            one.prepare(assume=one.arm.home if one.position() == "lost" else None)
             origin = np.array(pins(port)) - one.counts()
             plan = one.plan(one.counts(), np.radians([rng.uniform(-90, 90), rng.uniform(0, 90), rng.uniform(-90, 0)]))
             one.run([plan])
@@ -186,7 +186,7 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
 def test_a_pause_of_a_path_is_a_dwell() -> None:
     port = board()
     one = machine(port)
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     plan = armkin.path(
         ARM, {"start": "home", "moves": [{"joint": [0, 80, -80]}, {"wait": 1.5}, {"joint": [0, 90, -90]}]}
     )

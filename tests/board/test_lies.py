@@ -92,7 +92,7 @@ RUN_LIES: list[dict[str, int | tuple[int, ...]]] = [
 def test_a_lie_in_motion_ends_the_sender_in_bounded_time(three_dof: Arm, lie: dict[str, int | tuple[int, ...]]) -> None:
     port = LyingPort(**lie)
     one = Machine(port, three_dof, configure(three_dof))
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     plan = plan_moves(three_dof, one.counts(), np.deg2rad([30, 60, -60]))
     port.lying = True
     begin = port.now()

@@ -98,7 +98,7 @@ def test_a_noisy_line_ends_at_exact_counts(three_dof: Arm, seed: int) -> None:
     board = SimBoard(BOARDS["uno_cnc_shield"])
     port = NoisyPort(board, 0.01, seed)
     one = machine(three_dof, port)
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     rng = np.random.default_rng(seed)
     plans, at = [], list(one.counts())
     for _ in range(5):
@@ -132,9 +132,9 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     port = NoisyPort(board, 0.0, 1)
     with pytest.raises(LinkError, match="position is lost"):
         machine(three_dof, port).prepare()
-    assert machine(three_dof, port).prepare(assume_home=True)
+    assert machine(three_dof, port).prepare(assume=three_dof.home)
     with pytest.raises(LinkError, match="position is known"):
-        machine(three_dof, port).prepare(assume_home=True)
+        machine(three_dof, port).prepare(assume=three_dof.home)
     assert machine(three_dof, port).position() == "known"
     board.reset()
     assert machine(three_dof, port).position() == "retained"
@@ -145,8 +145,8 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
         changed.prepare()
     assert machine(three_dof, port).position() == "retained"  # nothing was changed by asking
     with pytest.raises(ReplacedError, match="another program has taken over the board"):
-        changed.prepare(assume_home=True)
-    assert machine(other, port).prepare(assume_home=True)
+        changed.prepare(assume=changed.arm.home)
+    assert machine(other, port).prepare(assume=other.home)
     assert machine(three_dof, port).position() == "lost"
 
 

@@ -193,7 +193,7 @@ def _killed_often(seed: int, times: int) -> list[str]:
     goals = np.deg2rad([[-30, 5, -5], [25, 85, -60]])
     with EmulatedBoard(seed=seed) as board:
         with machine(board) as first:
-            first.prepare(assume_home=True)
+            first.prepare(assume=first.arm.home)
         for i in range(times):
             start = at_rest(board)
             try:

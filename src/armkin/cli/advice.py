@@ -64,7 +64,7 @@ def _incomplete(error: ArmkinError) -> str:
 
 def _lost(error: ArmkinError) -> str:
     home = f"armkin home {error.fields['robot_file']} --port {error.fields['port']}"
-    assume = "add --assume-home (the arm stands in its home pose)"
+    assume = "add --assume-home (the arm stands in its home pose; --assume Q,...: there)"
     return f"{home}, or {assume}" if error.fields["homing"] else f"put the arm in its home pose and {assume}"
 
 
@@ -84,7 +84,7 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     ),
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
     PositionLostError: _lost,
-    PositionKnownError: lambda error: "leave --assume-home out",
+    PositionKnownError: lambda error: "leave --assume-home (--assume) out",
     GripperLostError: lambda error: "add --assume open (or closed, or a value)",
     GripperKnownError: lambda error: "leave --assume out",
     UsageError: _incomplete,  # the last: NoHomingError and others are such, too

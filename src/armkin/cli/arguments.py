@@ -3,10 +3,11 @@
 from collections.abc import Collection
 
 _NOT_NUMBERS = ("inf", "infinity", "nan")
+_SHORT_FOR = {"--assume-home": ("--assume", "home")}
 
 
 def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
-    """Sort a command's words so that the parser cannot take ``-30`` for an option.
+    """Sort a command's words so that the parser cannot take ``-30`` for an option, and write out what is short.
 
     takes_value: options that are followed by a value, which is left as it is. Whatever begins with a
     dash and is no number stays an option, known or not, so that ``--jsn`` is still an error.
@@ -23,7 +24,7 @@ def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
         elif word[:1] != "-" or word == "-" or _looks_like_number(word):
             words.append(word)
         else:
-            options.append(word)
+            options.extend(_SHORT_FOR.get(word, (word,)))
             if word in takes_value:
                 value = next(rest, None)
                 if value is None:

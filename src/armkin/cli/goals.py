@@ -25,6 +25,7 @@ def goals(
     task: str | None,
     batch: str | None,
     lock: Sequence[str] | None = None,
+    near: str | None = None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     import numpy as np
@@ -37,8 +38,8 @@ def goals(
         inputs.target_list(arm, task_for(arm, task), target, q)  # 390 80 300 wants commas
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
-    if target is None and (branch is not None or task is not None or lock):
-        raise UsageError("--branch, --task and --lock belong to --target")
+    if target is None and (branch is not None or task is not None or near is not None or lock):
+        raise UsageError("--branch, --task, --near and --lock belong to --target")
     if not given:
         return _from_pipe(robot)
     if robot is None:
@@ -50,7 +51,8 @@ def goals(
         what = task_for(arm, task)
         values = inputs.target_list(arm, what, target)
         goal = units.targets_in(what.labels, np.array([values]))
-        return arm, Goals(None, [1], goal, what.name, branch, holding.locks(arm, lock))
+        close = None if near is None else inputs.joint_list(arm, near, "--near")
+        return arm, Goals(None, [1], goal, what.name, branch, holding.locks(arm, lock), close)
     if batch == "-":
         from armkin.board.moving import Stream
 
@@ -77,6 +79,7 @@ class Goals:
     task: str | None = None
     branch: str | None = None
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
+    near: Sequence[float] | None = None  # [deg | mm] what the branch is chosen by; None: where the arm stands
 
     def resolve(self, arm: Arm, near: Array) -> Array:
         """Joint values (w, n); near: where the arm stands [rad | mm]."""
@@ -84,7 +87,7 @@ class Goals:
             return self.joints
         from armkin.inverse import choose
 
-        at = units.joints_out(arm, near).tolist()
+        at = units.joints_out(arm, near).tolist() if self.near is None else self.near
         request = choose.Request(arm=arm, task=self.task, near=at, branch=self.branch, held=self.held)
         [answer] = choose.solve(request, self.target)  # type: ignore[arg-type]
         if answer.best is None:

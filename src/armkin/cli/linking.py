@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import completion, output, render
-from armkin.errors import UsageError
+from armkin.cli import completion, inputs, output, render
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
     from armkin.board.foreign import Foreign
+    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
 PortName = Annotated[
@@ -34,15 +36,19 @@ PortName = Annotated[
 Baud = Annotated[
     int | None, typer.Option("--baud", metavar="N", help="The port's rate. [default: what the kind of board uses]")
 ]
-AssumeHome = Annotated[
-    bool,
+Assume = Annotated[
+    str | None,
     typer.Option(
-        "--assume-home", help="The position is lost and the arm stands in its home pose. Refused while known."
+        "--assume",
+        metavar="home|POSE|Q,...",
+        help="The position is lost, and the arm stands there. Refused while it is known. "
+        "--assume-home is --assume home.",
+        autocompletion=completion.poses,
     ),
 ]
 BAUD = 250_000
 SIM = "sim"
-_AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
+AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
 
 def port_name(given: str | None, configuration: Configuration | None, baud: int) -> str:
@@ -71,7 +77,7 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
 
 @contextmanager
 def backend(
-    arm: Arm, board: Configuration | Foreign, port: str | None, baud: int | None, *, simulated: str = _AT_HOME
+    arm: Arm, board: Configuration | Foreign, port: str | None, baud: int | None, *, simulated: str = AT_HOME
 ) -> Iterator[Backend]:
     """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first."""
     from armkin.board.backend import StoppedError
@@ -114,9 +120,35 @@ def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
     return foreign(arm) or configured(arm, rehearsal=rehearsal)
 
 
+def simulated(assume: str | None) -> str:
+    """What to say of a board in this process, which knows no position before."""
+    return AT_HOME if assume in (None, "home") else "the simulated board forgets all at the end"
+
+
+def assumed(arm: Arm, text: str | None) -> Array | None:
+    """`--assume`: joint values (n,) [rad | mm] where a lost arm stands, which are within its limits."""
+    if text is None:
+        return None
+    from armkin.motion.plan import check_limits
+
+    q = units.joints_in(arm, inputs.joint_list(arm, text, "--assume"))
+    try:
+        check_limits(arm, q[None])
+    except NoSolutionError as error:
+        raise error.within("--assume") from None
+    return q
+
+
+def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) -> None:
+    """Get the board ready to move; says so if it takes the arm to stand somewhere on the operator's word."""
+    if machine.prepare(assume=assume) and text is not None:
+        where = "in its home pose" if text == "home" else f"in its pose {text}" if text in arm.poses else f"at {text}"
+        output.note(f"the board takes the arm to stand {where}")
+
+
 @contextmanager
 def machine(
-    arm: Arm, configuration: Configuration, port: str | None, baud: int | None, *, simulated: str = _AT_HOME
+    arm: Arm, configuration: Configuration, port: str | None, baud: int | None, *, simulated: str = AT_HOME
 ) -> Iterator[Machine]:
     """The arm on the board behind a port, given back at the end; a signal stops the arm first.
 

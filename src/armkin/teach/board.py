@@ -103,7 +103,7 @@ class Board:
         self.check_file()
 
         def job(machine: Backend) -> None:
-            machine.prepare(assume_home=True)
+            machine.prepare(assume=self.arm.home)
 
         self.pilot.submit("assume home", job)
         return {}

@@ -83,8 +83,11 @@ class Backend(Protocol):
     def hold(self) -> None:
         """Stop along the path, and stay."""
 
-    def prepare(self, *, assume_home: bool = False) -> bool:
-        """Get ready to move; True if the arm is taken to stand at home from now on."""
+    def prepare(self, *, assume: Array | None = None) -> bool:
+        """Get ready to move; True if the position was lost.
+
+        assume: (n,) [rad | mm] where an arm whose position is lost stands, on the operator's word.
+        """
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""

@@ -128,9 +128,9 @@ class ServoMachine:
 
     # Getting ready
 
-    def prepare(self, *, assume_home: bool = False) -> bool:
+    def prepare(self, *, assume: Array | None = None) -> bool:
         """Switch the motors on where they stand; False: the position is always known."""
-        if assume_home:
+        if assume is not None:
             joints = joints_out(self.arm, self.joints()).tolist()
             raise PositionKnownError("bus servos know their position: there is nothing to assume", joints=joints)
         self._read()

@@ -73,7 +73,7 @@ def searches(
     elif bare:
         raise NoHomingError(
             f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home pose",
-            advice="then Machine.prepare(assume_home=True)",
+            advice="then Machine.prepare(assume=arm.home)",
             joints=bare,
             file=arm.path,
             some=len(bare) < len(wanted),

@@ -121,27 +121,27 @@ class Machine:
 
     # Getting ready
 
-    def prepare(self, *, assume_home: bool = False) -> bool:
+    def prepare(self, *, assume: Array | None = None) -> bool:
         """Configure the board, settle the position, switch the motors on.
 
-        Returns True if the arm is taken to stand at home from now on. Raises LinkError if the position is
-        lost and nobody vouches for it, or if it is known and `assume_home` would overwrite it.
+        assume: (n,) [rad | mm] where an arm whose position is lost stands, on the operator's word. Returns True
+        if it was lost. Raises LinkError if it is lost and nobody vouches for it, or known and assumed.
         """
         lost = self.position() == "lost"
-        if assume_home and not lost:
+        if assume is not None and not lost:
             raise PositionKnownError(
                 f"the position is known ({self.describe()}), and only a lost one may be assumed\n"
                 "motion starts where the arm stands",
-                advice="leave assume_home out",
+                advice="leave assume out",
                 joints=joints_out(self.arm, self.joints()).tolist(),
             )
-        if lost and not assume_home and not self._simulated:
+        if lost and assume is None and not self._simulated:
             raise self._demand()
         if not self.configured:
             self.configure()
         if lost:
-            home = pulses(self.arm, self.arm.home).tolist()
-            self.vouch(dict(zip(self.configuration.axes, home, strict=True)))
+            counts = pulses(self.arm, self.arm.home if assume is None else assume).tolist()
+            self.vouch(dict(zip(self.configuration.axes, counts, strict=True)))
         self.enable(self.configuration.axes)
         self.session.probe()
         return lost
@@ -172,7 +172,7 @@ class Machine:
         missing = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
         if any(self.status.counts[axis] != count for axis, count in counts.items() if axis not in missing):
             raise LinkError(
-                "some axes know their position and do not stand at home: home the arm, or switch the board "
+                "some axes know their position and do not stand there: home the arm, or switch the board "
                 "off and on to forget all"
             )
         if missing:
@@ -194,7 +194,7 @@ class Machine:
 
     def _lost(self, message: str) -> PositionLostError:
         homing = all(self.arm.homing)
-        put = "put the arm in its home pose and prepare(assume_home=True)"
+        put = "put the arm in its home pose and prepare(assume=arm.home)"
         return PositionLostError(
             message,
             advice=f"home it, or {put}" if homing else put,

@@ -110,8 +110,8 @@ class GrblMachine:
             raise LinkError(f"GRBL did not keep what was written: {left[0]}")
         return before
 
-    def prepare(self, *, assume_home: bool = False) -> bool:
-        """Check settings and position; True if the arm is taken to stand at home from now on."""
+    def prepare(self, *, assume: Array | None = None) -> bool:
+        """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
         serious = [difference for difference in self.wrong() if difference.serious]
         if serious:
             more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
@@ -120,19 +120,19 @@ class GrblMachine:
         if status.state not in ("Idle", "Jog"):
             raise LinkError(f"GRBL is in state {status.state}, not Idle: home it, or unlock it once you know why")
         self._read()
-        if assume_home and self._offset is not None:
+        if assume is not None and self._offset is not None:
             joints = joints_out(self.arm, self.joints()).tolist()
             raise PositionKnownError(f"the position is known ({_listed(self.arm, joints)})", joints=joints)
         if self._offset is not None:
             return False
-        if not (assume_home or self.port.simulated):
+        if assume is None and not self.port.simulated:
             raise PositionLostError(
                 "the arm's position is lost",
                 robot_file=self.arm.path,
                 port=self.port.name,
                 homing=all(self.arm.homing),
             )
-        self.vouch(np.asarray(pulses(self.arm, self.arm.home), dtype=np.int64))
+        self.vouch(np.asarray(pulses(self.arm, self.arm.home if assume is None else assume), dtype=np.int64))
         return True
 
     def vouch(self, counts: Any) -> None:

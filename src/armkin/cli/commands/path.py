@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import holding, inputs, linking, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import SIM, AssumeHome, Baud
+from armkin.cli.linking import SIM, Assume, Baud
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError
@@ -67,7 +67,7 @@ def path(
     ] = None,
     out: Out = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
-    assume_home: AssumeHome = False,
+    assume: Assume = None,
     baud: Baud = None,
     json: Json = False,
 ) -> None:
@@ -116,7 +116,7 @@ def path(
         found = _found(plan, _rehearsed(plan) if not held else None)
         _print(plan, found, json=json)
         return
-    _carried_out(arm, moves, options, port, baud, out, plot, assume_home=assume_home, json=json)
+    _carried_out(arm, moves, options, port, baud, out, plot, assume=assume, json=json)
 
 
 def sent(
@@ -129,7 +129,7 @@ def sent(
     trace: str | None,
     baud: int | None,
     *,
-    assume_home: bool,
+    assume: str | None,
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
@@ -139,7 +139,7 @@ def sent(
     moves = _moves(arm, file, None, None)
     options: dict[str, Any] = {"speed": (_positive(speed, "--speed") or 100.0) / 100}
     if not dry_run:
-        _carried_out(arm, moves, options, port, baud, trace, None, assume_home=assume_home, json=json)
+        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, json=json)
         return
     if start is not None:
         options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--from"))
@@ -157,17 +157,16 @@ def _carried_out(
     out: str | None,
     plot: str | None,
     *,
-    assume_home: bool,
+    assume: str | None,
     json: bool,
 ) -> None:
     """Plan from where the arm stands, then move it."""
     from armkin.board import following
     from armkin.board.moving import where
 
-    board = linking.board_of(arm, rehearsal=port == SIM)
-    with linking.backend(arm, board, port, baud) as machine:
-        if machine.prepare(assume_home=assume_home) and assume_home:
-            output.note("the board takes the arm to stand in its home pose")
+    board, stands = linking.board_of(arm, rehearsal=port == SIM), linking.assumed(arm, assume)
+    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume)) as machine:
+        linking.prepare(arm, machine, assume, stands)
         plan = _planned(arm, moves, {**options, "start": machine.joints()}, json=json)
         following.check_gripper(plan, board)
         laid = following.parts(plan, machine.counts(), machine.lay)

@@ -10,7 +10,7 @@ import typer
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import goals as read_goals
-from armkin.cli.linking import SIM, AssumeHome, Baud, PortName
+from armkin.cli.linking import SIM, Assume, Baud, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.errors import UsageError
@@ -30,6 +30,10 @@ def send(
     target: Annotated[
         str | None,
         typer.Option("--target", metavar="X,Y,Z", help="Solve for a target, and take the branch nearest to the arm."),
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option("--near", metavar="Q,...", help="Take the branch nearest to this pose. [default: to the arm]"),
     ] = None,
     branch: BranchName = None,
     task: TaskName = None,
@@ -54,7 +58,7 @@ def send(
         str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
     ] = None,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
-    assume_home: AssumeHome = False,
+    assume: Assume = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan from --from, move nothing.")] = False,
     start: Annotated[
         str | None,
@@ -85,16 +89,16 @@ def send(
     if path is not None:
         from armkin.cli.commands.path import sent
 
-        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend}
+        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        sent(robot, path, port, speed, dry_run, start, trace, baud, assume_home=assume_home, json=json)
+        sent(robot, path, port, speed, dry_run, start, trace, baud, assume=assume, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, target, branch, task, batch, lock)
+    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
     board = linking.board_of(arm, rehearsal=dry_run or port == SIM)
-    planner = Planner(arm, board, fraction, radius)
+    planner, stands = Planner(arm, board, fraction, radius), linking.assumed(arm, assume)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
@@ -105,9 +109,8 @@ def send(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
             )
         return
-    with linking.backend(arm, board, port, baud) as machine:
-        if machine.prepare(assume_home=assume_home) and assume_home:
-            output.note("the board takes the arm to stand in its home pose")
+    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume)) as machine:
+        linking.prepare(arm, machine, assume, stands)
         began = machine.counts()
         if isinstance(machine, Machine):
             planner.use(machine.info.clock, machine.info.min_interval)
