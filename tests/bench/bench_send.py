@@ -68,7 +68,7 @@ def noisy(seed: int) -> str:
         line = board.stats()["line"]["in"]
     return (
         f"{seed:4d}  {segments:5d}  {total:6.1f} s  {line['flipped'] + line['dropped']:6d} bytes damaged  "
-        f"queue never below {lowest[0]:4d} ms  {machine.session.resent:5d} resent  "
+        f"queue never below {lowest[0]:4d} ms  {machine.session.line.resent:5d} resent  "
         f"counts {'exact' if exact else f'WRONG {net}'}  {outcome}"
     )
 

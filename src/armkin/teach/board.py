@@ -248,7 +248,9 @@ class Board:
         if machine.position() == "lost":
             share = float(np.clip(share, -1 / jogging.SLOW, 1 / jogging.SLOW))
         speed = share * float(units.joints_out(self.arm, self.arm.max_speed)[joint])
-        machine.jog(jogging.rates(machine, joint, speed), _LONGEST_JOG, more=lambda: time.monotonic() < self._alive)
+        jogging.jog(
+            machine, jogging.rates(machine, joint, speed), _LONGEST_JOG, more=lambda: time.monotonic() < self._alive
+        )
 
     def _follow(self, machine: Backend) -> None:
         """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""

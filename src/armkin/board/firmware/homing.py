@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware import protocol
+from armkin.board.firmware.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock import joint_index
 from armkin.motors import joints, pulses
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Progress
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.protocol import Status
     from armkin.model.arm import Arm
 
 _SLOW = 26  # /256: the second approach runs at a tenth
@@ -106,7 +108,7 @@ def home(
     for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
-            status, edge = machine.home(search.frame, search.time / 10)
+            status, edge = _found(machine, search)
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
@@ -114,6 +116,19 @@ def home(
     if rest_at_home:
         left = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
         machine.vouch(dict(zip([axes[k] for k in left], pulses(arm, q)[left].tolist(), strict=True)))
+
+
+def _found(machine: Machine, search: Search) -> tuple[Status, Status]:
+    """Carry out one search; status at rest, and at the switch's edge (page 1)."""
+    session = machine.session
+    try:
+        session.call(search.frame)
+        for _ in session.arrivals(search.time / 10):
+            pass
+        machine.status = session.status()
+        return machine.status, session.status(page=1)
+    except DeviceError as error:
+        raise machine.explain(error) from None
 
 
 def lost_joints(machine: Machine) -> list[str]:

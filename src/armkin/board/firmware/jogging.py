@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import State
+from armkin.board.firmware.session import DeviceError
 from armkin.errors import PositionLostError, UsageError
 from armkin.model import units
 
@@ -40,3 +44,27 @@ def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
     if not any(found.values()):
         raise UsageError(f"SPEED: {speed:g} is less than one count a second")
     return found
+
+
+def jog(machine: Machine, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> None:
+    """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
+
+    more: asked every 10 ms; the motion ends when it says no.
+    """
+    vector = [rate.get(axis, 0) for axis in range(len(machine.configuration.board.axes))]
+    port, session = machine.port, machine.session
+    begin = port.now()
+    try:
+        while (left := seconds - (port.now() - begin)) > 0 and more():
+            session.call(lambda tag: protocol.jog(tag, vector))
+            if session.state != State.JOGGING:
+                break  # at a limit
+            pause = port.now() + min(0.08, left)
+            while port.now() < pause and more():
+                session.pump(max(0.001, min(0.01, pause - port.now())))
+        session.call(lambda tag: protocol.jog(tag, [0] * len(vector)))
+        for _ in session.arrivals():
+            pass
+    except DeviceError as error:
+        raise machine.explain(error) from None
+    machine.status = session.status()

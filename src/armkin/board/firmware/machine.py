@@ -5,16 +5,15 @@ Everything here is said in the arm's words (joints, the robot file); `session` b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from armkin.board.firmware import cutting, protocol
-from armkin.board.firmware.batch import WHY, Batch
-from armkin.board.firmware.protocol import Error, Flag, Segment, State, Status
+from armkin.board.firmware import cutting, protocol, streaming
+from armkin.board.firmware.batch import WHY
+from armkin.board.firmware.protocol import Error, Flag, State, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.hardware import board_name
@@ -32,10 +31,6 @@ if TYPE_CHECKING:
 
 Position = Literal["known", "retained", "lost"]
 Progress = Callable[[float, float], None]  # seconds done, seconds in all
-
-# Standing still while the queue fills: 100 ms, or half a second on a bad line.
-_LEAD = (Segment(80, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
-_BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
 
 
 class Machine:
@@ -219,32 +214,14 @@ class Machine:
 
         Returns the status at the end, where the last plan ends, or raises LinkError.
         """
-        end: Counts | None = None
-        total = begun = done = 0.0
-
-        def frames() -> Iterator[Batch | None]:
-            nonlocal end, total, begun
-            for plan in plans:
-                if plan is None:
-                    yield None
-                    continue
-                total += plan.duration
-                for move in plan.moves(lambda: self.session.noisy):
-                    for batch in self._batches(move, self.configuration.axes, plan.clock):
-                        begun += batch.seconds
-                        yield batch
-                end = plan.end
-
-        def tell(left: float) -> None:
-            nonlocal done
-            done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
-            progress(done, total)
-
-        self._stream(frames(), tell)
+        try:
+            self.status, end = streaming.carry_out(self.session, plans, self.configuration.axes, progress)
+        except DeviceError as error:
+            raise self.explain(error) from None
         if self.position() == "lost":
             raise self._lost("the board has lost the arm's position on the way")
-        if self.status.overruns:
-            raise LinkError(f"the board reports {self.status.overruns} late ticks: lower the speed\n{self.standing()}")
+        if late := self.status.overruns:
+            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing()}")
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "
@@ -254,92 +231,12 @@ class Machine:
 
     def run_axis(self, move: Move, axis: int, clock: int) -> Status:
         """Carry out the move of a single axis: the gripper."""
-        self._stream(iter(self._batches(move, (axis,), clock)), lambda left: None)
+        try:
+            frames = streaming.batches(self.session, move, (axis,), clock)
+            self.status = streaming.stream(self.session, frames, lambda left: None)
+        except DeviceError as error:
+            raise self.explain(error) from None
         return self.status
-
-    def _stream(self, frames: Iterator[Batch | None], left: Callable[[float], None]) -> None:
-        session, more = self.session, True
-        try:
-            while more or session.backlog:
-                while more and session.backlog < 2:
-                    batch = next(frames, _DONE)
-                    if batch is _DONE:
-                        more = False
-                    if batch is None or not more:
-                        break
-                    assert isinstance(batch, Batch)
-                    session.submit(batch.payload, len(batch.segments), batch.seconds)
-                session.pump()
-                left(session.under_way + session.queued / 1000)
-            for seconds in session.arrivals():
-                left(seconds)
-            self.status = session.status()
-        except DeviceError as error:
-            raise self.explain(error) from None
-
-    def _batches(self, move: Move, axes: Sequence[int], clock: int) -> Iterator[Batch]:
-        """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
-        moving = sorted(move.moving, key=lambda k: axes[k])
-        at = [int(move.start[k]) for k in moving]
-        room = self.info.frame - 4
-        places = [count * protocol.STEP + protocol.HALF for count in at]
-        source = (s.of(moving) for s in move.segments)
-        todo: list[Segment] = []
-        resting = self.session.state == State.IDLE and not self.session.under_way
-        if move.segments and (resting or self.session.damaged):
-            lead = _LEAD[self.session.damaged]
-            todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
-        while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-            most = _BATCH[0] if self.session.noisy else _BATCH[1]
-            n = 1
-            while (
-                n < min(most, len(todo))
-                and todo[n].narrow == todo[0].narrow
-                and protocol.motion_size(len(moving), todo[: n + 1]) <= room
-            ):
-                n += 1
-            part, todo = todo[:n], todo[n:]
-            if not todo:
-                todo = list(islice(source, 1))
-            places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
-            end = [p // protocol.STEP for p in places]
-            yield Batch([axes[k] for k in moving], at, end, part, not todo, clock)
-            at = end
-
-    def jog(self, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> Status:
-        """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
-
-        more: asked every 10 ms; the motion ends when it says no.
-        """
-        vector = [rate.get(axis, 0) for axis in range(len(self.configuration.board.axes))]
-        port, session = self.session.port, self.session
-        begin = port.now()
-        try:
-            while (left := seconds - (port.now() - begin)) > 0 and more():
-                session.call(lambda tag: protocol.jog(tag, vector))
-                if session.state != State.JOGGING:
-                    break  # at a limit
-                pause = port.now() + min(0.08, left)
-                while port.now() < pause and more():
-                    session.pump(max(0.001, min(0.01, pause - port.now())))
-            session.call(lambda tag: protocol.jog(tag, [0] * len(vector)))
-            for _ in session.arrivals():
-                pass
-        except DeviceError as error:
-            raise self.explain(error) from None
-        self.status = session.status()
-        return self.status
-
-    def home(self, make: Callable[[int], bytes], seconds: float) -> tuple[Status, Status]:
-        """Carry out one HOME that takes so long at most; status at rest, and at the switch's edge (page 1)."""
-        try:
-            self.session.call(make)
-            for _ in self.session.arrivals(seconds):
-                pass
-            self.status = self.session.status()
-            return self.status, self.session.status(page=1)
-        except DeviceError as error:
-            raise self.explain(error) from None
 
     # Words
 
@@ -377,9 +274,6 @@ class Machine:
             self.session.call(make)
         except DeviceError as error:
             raise self.explain(error) from None
-
-
-_DONE = object()
 
 
 def describe(arm: Arm, q: Array) -> str:

@@ -58,7 +58,7 @@ def jog(
         if machine.position() == "lost" and abs(rate) > slow:
             rate = slow if rate > 0 else -slow
             output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
-        machine.jog(jogging.rates(machine, j, rate), time)
+        jogging.jog(machine, jogging.rates(machine, j, rate), time)
         found = where(machine)
     with output.destination(None) as write:
         write(

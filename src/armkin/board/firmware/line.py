@@ -1,0 +1,70 @@
+"""The bytes between host and board: how much of them is damaged, and when all that was written will have left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armkin.board.firmware import protocol
+from armkin.board.firmware.protocol import Ack, Info, Status
+from armkin.board.ports import Port
+
+_COPIES = 3  # of every frame, on a bad line
+_LATE = 0.03  # [s] an answer may take
+
+
+class Line:
+    """Frames over a port."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.splitter = protocol.Splitter()
+        self.resent = 0  # frames
+        self.clear = 0.0  # when all that was written will have left, and something was last acknowledged
+        self.slowest = 0.0  # [s] that an answer took beyond its bytes, of those measured
+        self._written = 0  # frames in sequence
+        self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the line damages so much that short frames, sent several times, get through sooner."""
+        damaged = self.splitter.bad + self.resent
+        return damaged > max(2.0, 0.03 * self._written)
+
+    @property
+    def damaged(self) -> bool:
+        """Whether anything at all was damaged or lost so far."""
+        return self.splitter.bad + self.resent > 0
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self.port.write(data)
+        self.clear = max(self.clear, self.port.now()) + len(data) * 10 / self.port.baud
+
+    def write_frame(self, data: bytes, room: int) -> int:
+        """Send a frame, on a bad line as often as `room` bytes allow; the bytes written."""
+        self._written += 1
+        copies = max(1, min(_COPIES, room // len(data))) if self.noisy else 1
+        self.write(data * copies)  # a copy too many moves nothing
+        return copies * len(data)
+
+    def replies(self, timeout: float) -> Iterator[Ack | Info | Status]:
+        """What has come, or comes within `timeout` seconds."""
+        for payload in self.splitter.feed(self.port.read(timeout)):
+            reply = protocol.parse(payload)
+            if isinstance(reply, Ack | Info | Status):
+                yield reply
+
+    def asked(self, tag: int) -> None:
+        """Note that a STATUS? of this tag is being written."""
+        self._asked_at[tag] = self.port.now()
+
+    def answered(self, tag: int) -> None:
+        """Wait as long as an answer was late: so long the line is behind what was written already."""
+        asked = self._asked_at.pop(tag, None)
+        if asked is None:
+            return
+        self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
+        took = self.port.now() - asked
+        self.slowest = max(self.slowest, took)
+        if took > _LATE:
+            self.clear = max(self.clear, self.port.now() + took - _LATE)

@@ -1,0 +1,106 @@
+"""Plans to the board while it moves: segments in frames, frames as the queue takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from armkin.board.firmware import protocol
+from armkin.board.firmware.batch import Batch
+from armkin.board.firmware.protocol import Segment, State, Status
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Progress
+    from armkin.board.firmware.cutting import Cut
+    from armkin.board.firmware.segments import Counts, Move
+    from armkin.board.firmware.session import Session
+
+# Standing still while the queue fills: 100 ms, or half a second on a bad line.
+_LEAD = (Segment(80, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
+_BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
+
+
+def carry_out(
+    session: Session, plans: Iterable[Cut | None], axes: Sequence[int], progress: Progress
+) -> tuple[Status, Counts | None]:
+    """Carry out plans, one after another; None in between: nothing to do yet. axes: the motors' on the board.
+
+    Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session.
+    """
+    end: Counts | None = None
+    total = begun = done = 0.0
+
+    def frames() -> Iterator[Batch | None]:
+        nonlocal end, total, begun
+        for plan in plans:
+            if plan is None:
+                yield None
+                continue
+            total += plan.duration
+            for move in plan.moves(lambda: session.line.noisy):
+                for batch in batches(session, move, axes, plan.clock):
+                    begun += batch.seconds
+                    yield batch
+            end = plan.end
+
+    def tell(left: float) -> None:
+        nonlocal done
+        done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
+        progress(done, total)
+
+    return stream(session, frames(), tell), end
+
+
+def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
+    """Send frames until there are no more and the arm stands; left: told the seconds of motion to come."""
+    more = True
+    while more or session.backlog:
+        while more and session.backlog < 2:
+            batch = next(frames, _DONE)
+            if batch is _DONE:
+                more = False
+            if batch is None or not more:
+                break
+            assert isinstance(batch, Batch)
+            session.submit(batch.payload, len(batch.segments), batch.seconds)
+        session.pump()
+        left(session.under_way + session.queued / 1000)
+    for seconds in session.arrivals():
+        left(seconds)
+    return session.status()
+
+
+_DONE = object()
+
+
+def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> Iterator[Batch]:
+    """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
+    assert session.info is not None
+    line = session.line
+    moving = sorted(move.moving, key=lambda k: axes[k])
+    at = [int(move.start[k]) for k in moving]
+    room = session.info.frame - 4
+    places = [count * protocol.STEP + protocol.HALF for count in at]
+    source = (s.of(moving) for s in move.segments)
+    todo: list[Segment] = []
+    resting = session.state == State.IDLE and not session.under_way
+    if move.segments and (resting or line.damaged):
+        lead = _LEAD[line.damaged]
+        todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
+    while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
+        most = _BATCH[0] if line.noisy else _BATCH[1]
+        n = 1
+        while (
+            n < min(most, len(todo))
+            and todo[n].narrow == todo[0].narrow
+            and protocol.motion_size(len(moving), todo[: n + 1]) <= room
+        ):
+            n += 1
+        part, todo = todo[:n], todo[n:]
+        if not todo:
+            todo = list(islice(source, 1))
+        places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
+        end = [p // protocol.STEP for p in places]
+        yield Batch([axes[k] for k in moving], at, end, part, not todo, clock)
+        at = end

@@ -1,0 +1,140 @@
+"""Frames in sequence: go-back-N, with credit in segments and in bytes (firmware/PROTOCOL.md, section 3).
+
+What is submitted is sent in order, kept until it is acknowledged, and sent again when it is not. A frame is executed
+once or not at all, however often it is sent.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from armkin.board.firmware import heed, protocol
+from armkin.board.firmware.line import Line
+from armkin.board.firmware.protocol import Ack, Error, Info, Status
+
+_RESEND = 0.03  # [s] without progress
+_GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
+_EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
+_UNDER_WAY = 16  # frames
+_BYTES = (240, 700)  # under way, on a bad line and on a good one
+_QUESTION = 12  # [bytes] of a STATUS? on the line
+
+
+@dataclass
+class _Frame:
+    make: Callable[[int], bytes]
+    segments: int
+    seconds: float  # of motion
+
+
+class Window:
+    """Frames on their way to the board."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._waiting: deque[_Frame] = deque()  # not sent yet
+        self._sent: deque[tuple[_Frame, bytes]] = deque()  # not acknowledged yet
+        self._next = 0  # sequence number of the first of them
+        self._free = 0
+        self._receive = 0
+        self._gap = False
+        self._bytes = _BYTES[1]  # that may be under way
+
+    def begin(self, info: Info) -> None:
+        """Start with a new session: nothing is under way, the queue is empty."""
+        self._waiting.clear()
+        self._sent.clear()
+        self._next, self._free, self._receive = 0, info.queue, info.receive
+        self._gap = False
+
+    def clear(self) -> None:
+        """Forget what was not sent."""
+        self._waiting.clear()
+
+    def submit(self, make: Callable[[int], bytes], segments: int, seconds: float) -> None:
+        """Put a frame in line; make: its payload for a sequence number; segments: credit that it takes."""
+        self._waiting.append(_Frame(make, segments, seconds))
+
+    def __len__(self) -> int:
+        """Frames that are not acknowledged."""
+        return len(self._waiting) + len(self._sent)
+
+    @property
+    def backlog(self) -> int:
+        """Frames that wait to be sent."""
+        return len(self._waiting)
+
+    @property
+    def out_of_credit(self) -> bool:
+        """Whether something waits for credit, and nothing is under way that would bring it."""
+        return bool(self._waiting) and not self._sent
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of motion that are not acknowledged."""
+        return sum(f.seconds for f in self._waiting) + sum(f.seconds for f, _ in self._sent)
+
+    def send(self) -> None:
+        """Send new frames as far as credit and window allow, and all of them again when nothing has come for long."""
+        begun = self._line.port.now()
+        self._fill()
+        patience = _EAGER if self._line.noisy else _GAP if self._gap else _RESEND
+        if self._sent and begun - self._line.clear > patience:
+            self._again()
+
+    def _room(self, size: int, first: int) -> int:
+        """Bytes that may be sent when `size` are under way, of which the first frame has `first`.
+
+        What follows the frame that the board is busy with must fit into its receive buffer, a STATUS? included.
+        """
+        return min(self._bytes, first + self._receive - _QUESTION) - size
+
+    def _fill(self) -> None:
+        credit = self._free - sum(frame.segments for frame, _ in self._sent)
+        size = sum(len(data) for _, data in self._sent)
+        while self._waiting and len(self._sent) < _UNDER_WAY:
+            if self._waiting[0].segments > credit:
+                return
+            data = protocol.wire(self._waiting[0].make((self._next + len(self._sent)) & 255))
+            first = len(self._sent[0][1]) if self._sent else len(data)
+            room = self._room(size, first)
+            if self._sent and len(data) > room:
+                return
+            frame = self._waiting.popleft()
+            self._sent.append((frame, data))
+            credit -= frame.segments
+            size += self._line.write_frame(data, room)
+
+    def _again(self) -> None:
+        """Go back to the first frame that was not acknowledged."""
+        self._gap = False
+        self._bytes = _BYTES[0] if self._line.noisy else max(_BYTES[0], self._bytes // 2)
+        self._line.write(b"\0")
+        size, first = 0, len(self._sent[0][1])
+        for _, data in self._sent:
+            room = self._room(size, first)
+            if size and len(data) > room:
+                break  # what follows it would wait for it
+            self._line.resent += 1
+            size += self._line.write_frame(data, room)
+
+    def check(self, reply: Ack | Status) -> None:
+        """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
+        heed.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
+
+    def acknowledge(self, reply: Ack | Status) -> bool:
+        """Take a reply's `next` and `free`; True if that acknowledges something."""
+        done = (reply.next - self._next) & 255
+        if done > len(self._sent):
+            return False
+        for _ in range(done):
+            self._sent.popleft()
+        self._next, self._free = reply.next, reply.free
+        if done:
+            self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
+            self._bytes = _BYTES[0] if self._line.noisy else min(_BYTES[1], self._bytes + 20)
+        elif self._sent and (type(reply) is Ack or (reply.detail == Error.SPILL and not reply.error)):
+            self._gap = True  # something behind the first frame has arrived, the first has not
+        return done > 0
