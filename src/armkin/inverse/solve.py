@@ -61,11 +61,15 @@ class _Out(NamedTuple):
         )
 
 
-def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Solutions:
+def ik(
+    arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None, examine: bool = True
+) -> Solutions:
     """All real branches of inverse kinematics.
 
     targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
-    arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home.
+    arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home;
+    examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
+    them: some of their branches may be missing.
     Raises UsageError if the task does not fit the arm or a target is malformed.
 
     >>> import armkin, numpy as np
@@ -75,7 +79,7 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
     if (turned := actual(arm)) is not arm:
-        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near)))
+        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine))
     definition, geometry = solver(arm, task)
     target, lead, rounding = read_targets(definition, targets)
     close = arm.home if near is None else arrays.real(near, "near")
@@ -87,9 +91,9 @@ def ik(arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike
     each = np.broadcast_to(close, (len(target), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count = _closed(arm, definition, geometry, target, each, one)
+        out, count = _closed(arm, definition, geometry, target, each, one, examine)
     else:
-        out, count = _rows(arm, definition, geometry, target, each)
+        out, count = _rows(arm, definition, geometry, target, each, examine)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
@@ -141,7 +145,7 @@ def _empty(N: int, B: int, n: int) -> _Out:
 
 
 def _closed(
-    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None
+    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None, examine: bool
 ) -> tuple[_Out, int]:
     """Closed forms: chunks of poses that stay in the cache, entry by entry. Also the number of branch columns."""
     out: _Out | None = None
@@ -182,7 +186,7 @@ def _closed(
             part.status[count == 0] = Status.UNREACHABLE
             _pack(part, count < B)
     assert out is not None
-    if doubts:
+    if doubts and examine:
 
         def candidates(rows: NDArray[np.intp]) -> tuple[Array, Bool]:
             """Again, with the preferred values for joints that are free; those that other values would change."""
@@ -245,7 +249,7 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
     return value, (value >= lower - SLACK) & (value <= upper + SLACK)
 
 
-def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) -> tuple[_Out, int]:
+def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool) -> tuple[_Out, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
     q, doubt, complete = geometry.rows(target)
@@ -259,7 +263,7 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array) 
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
     _pack(out, count < B)
-    if doubt.any():
+    if examine and doubt.any():
         out = _examined(
             arm,
             task,

@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.columns import ENDS, TURN, Columns, Int, change
+from armkin.motion.columns import ENDS, TURN, Columns, Int
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -37,34 +37,54 @@ class Chain:
         return self.first + len(self.q) - 1
 
     @cached_property
-    def _copies(self) -> list[tuple[Array, Int]]:
-        """For every joint the offsets of its copies (k,), and the first illegal sample from each on: (k, len)."""
-        out = []
+    def extent(self) -> tuple[Array, Array]:
+        """Least and greatest value of every joint: (n,) each."""
+        return self.q.min(axis=0), self.q.max(axis=0)
+
+    @cached_property
+    def _copies(self) -> list[tuple[Array, Int | None]]:
+        """For every joint the offsets of its copies (k,), and the first illegal sample from each on: (k, len).
+
+        None: all are legal everywhere.
+        """
+        out: list[tuple[Array, Int | None]] = []
+        least, most = self.extent
         for j in range(self.arm.n):
-            lower, upper, value = self.arm.lower[j], self.arm.upper[j], self.q[:, j]
+            lower, upper, value = self.arm.lower[j] - SLACK, self.arm.upper[j] + SLACK, self.q[:, j]
             offsets = np.zeros(1)
             if not self.arm.prismatic[j] and np.isfinite(lower) and np.isfinite(upper):
-                first = np.ceil((lower - SLACK - value.max()) / TURN)
-                last = np.floor((upper + SLACK - value.min()) / TURN)
+                first = np.ceil((lower - most[j]) / TURN)
+                last = np.floor((upper - least[j]) / TURN)
                 offsets = TURN * np.arange(first, last + 1)
             elif not self.arm.prismatic[j] and (np.isfinite(lower) or np.isfinite(upper)):
                 middle = np.rint((self.arm.home[j] - value[0]) / TURN)
                 offsets = TURN * (middle + np.arange(-2, 3))
-            moved = value + offsets[:, None]
-            illegal = (moved < lower - SLACK) | (moved > upper + SLACK)
-            end = np.where(illegal, np.arange(len(value)), len(value))
-            out.append((offsets, np.minimum.accumulate(end[:, ::-1], axis=1)[:, ::-1]))
+            legal = (least[j] + offsets >= lower) & (most[j] + offsets <= upper)
+            if len(offsets) and legal.all():
+                out.append((offsets, None))
+                continue
+            end = np.full((len(offsets), len(value)), len(value))
+            moved = value + offsets[~legal, None]
+            illegal = (moved < lower) | (moved > upper)
+            until = np.where(illegal, np.arange(len(value)), len(value))
+            end[~legal] = np.minimum.accumulate(until[:, ::-1], axis=1)[:, ::-1]
+            out.append((offsets, end))
         return out
 
     @cached_property
     def _joint_reach(self) -> Int:
         """The first sample, counted from `first`, that each joint cannot go on to, from every sample: (len, n)."""
-        ends = [end.max(axis=0) if len(end) else np.arange(len(self.q)) for _, end in self._copies]
+        N = len(self.q)
+        ends = [
+            np.full(N, N) if end is None else end.max(axis=0) if len(end) else np.arange(N) for _, end in self._copies
+        ]
         return np.stack(ends, axis=1)
 
     @cached_property
     def reach(self) -> Int:
         """The last sample that each sample's run carries to, absolute; one less than itself: illegal. (len,)."""
+        if all(end is None for _, end in self._copies):
+            return np.full(len(self.q), self.last)
         return np.asarray(self._joint_reach.min(axis=1) - 1 + self.first)
 
     def carries(self, i: int) -> int:
@@ -84,7 +104,7 @@ class Chain:
             if not self.arm.prismatic[j] and not np.isfinite([self.arm.lower[j], self.arm.upper[j]]).any():
                 offsets[j] = TURN * np.rint((near[j] - here) / TURN)
                 continue
-            legal = choices[ends[:, i - self.first] > e - self.first]
+            legal = choices if ends is None else choices[ends[:, i - self.first] > e - self.first]
             wanted = near[j] if fixed is None else fixed[j]
             offsets[j] = legal[np.abs(here + legal - wanted).argmin()]
         return np.asarray(self.q[i - self.first : e - self.first + 1] + offsets)
@@ -115,10 +135,18 @@ def chains(arm: Arm, columns: Columns) -> list[Chain]:
 
 
 def _assembled(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
-    q = np.concatenate([columns.q[a : b + 1, c] for a, b, c in blocks])
+    size = blocks[-1][1] + 1 - blocks[0][0]
+    # one joint after another in memory: whatever is asked of a chain is asked of its joints
+    q = np.concatenate([columns.q[a : b + 1, c].T for a, b, c in blocks], axis=1, out=np.empty((arm.n, size))).T
     labels = np.concatenate([columns.name[a : b + 1, c] for a, b, c in blocks])
-    steps = change(arm, q[:-1], q[1:])
-    return Chain(arm, blocks[0][0], np.concatenate([q[:1], q[:1] + np.cumsum(steps, axis=0)]), labels.astype(np.intp))
+    made = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
+    least, most = made.extent
+    for j in np.flatnonzero(~arm.prismatic & (most - least > np.pi)):  # principal values may jump by a turn
+        turns = np.rint(np.diff(q[:, j]) / TURN)
+        if turns.any():
+            q[1:, j] -= TURN * np.cumsum(turns)
+            made.__dict__.pop("extent", None)
+    return made
 
 
 @dataclass(frozen=True)
@@ -138,12 +166,17 @@ def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> lis
     """
     runs: list[Run] = []
     i = 0
+    alive = np.zeros(N + 1, bool)  # samples at which some run may begin
+    alive[N] = True
+    for chain in all_:
+        i0, i1 = min(chain.first, N), min(chain.last + 1, N)
+        alive[i0:i1] |= chain.reach[: i1 - i0] >= np.arange(i0, i1)
     while i < N:
         choices = allowed if allowed is not None and i == 0 else all_
         reach = {chain: chain.carries(i) for chain in choices}
         far = max(reach.values(), default=i - 1)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
-            i += 1
+            i += 1 + int(alive[i + 1 :].argmax())
             continue
         best = min((c for c, e in reach.items() if e == far), key=lambda c: least_time(c, i, far))
         runs.append(Run(best, i, far))
@@ -157,7 +190,10 @@ def least_time(chain: Chain, i: int, e: int) -> float:
     """A lower bound of the seconds from sample i to e: no joint faster than its max_speed."""
     q = chain.q[i - chain.first : e - chain.first + 1]
     speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
-    return float((np.abs(np.diff(q, axis=0)) / speed).max(axis=1, initial=0.0).sum())
+    seconds = np.zeros(max(len(q) - 1, 0))
+    for j in range(chain.arm.n):  # joint by joint: numpy's maximum over a short last axis is slow
+        np.maximum(seconds, np.abs(np.diff(q[:, j])) / speed[j], out=seconds)
+    return float(seconds.sum())
 
 
 def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:

@@ -27,7 +27,8 @@ TURN = 2 * np.pi
 LEAST_LEVER = 30.0  # [mm] of a turn that does not move the tip: the tool's direction counts, too
 SHORTEST = 1e-9  # of the route: what is not linked there is a jump
 ENDS = 0.002  # [mm] how finely the end of a branch, or the crossing of a limit, is found
-_PARTS = 8  # of a step that is divided
+_PARTS = (8, 32)  # of a step that is divided: with many such steps, and with few
+_AT_ONCE = 1024  # samples that are solved at once, if the parts are no fewer
 _MOST = 50_000  # samples added
 
 
@@ -79,6 +80,13 @@ def chord_bound(lever: Array, D: Array) -> Array:
     return np.asarray(0.125 * np.einsum("...i,...i->...", size @ lever, size))
 
 
+def largest_form(arm: Arm, lever: Array) -> tuple[Array | None, float]:
+    """Scales of joints (n,) (None: all 1) and c, with `chord_bound` at most c |scaled D|^2: cheap to compute."""
+    scale = np.where(arm.prismatic, 1.0 / arm.reach, 1.0)
+    top = 0.125 * float(np.linalg.eigvalsh(lever / np.outer(scale, scale)).max())
+    return (np.asarray(scale) if arm.prismatic.any() else None), top
+
+
 def change(arm: Arm, a: Array, b: Array) -> Array:
     """From joint values to others, the shorter way round: (..., n)."""
     D: Array = b - a
@@ -116,6 +124,7 @@ class _Linking:
     ) -> None:
         self.arm, self.targets, self.task, self.tolerance, self.near = arm, targets, task, tolerance, near
         self.lever = levers(arm)
+        self.scale, self.top = largest_form(arm, self.lever)
         self.length = length
         self.added = 0
         self.fresh = np.zeros(0, bool)  # samples that were added
@@ -134,6 +143,7 @@ class _Linking:
         self.columns.partner = np.full((N - 1, B), -1, np.int16)
         self.open = np.ones(N - 1, bool)  # steps to look at
         self.torn = np.zeros(N - 1, bool)  # steps with a branch that has no partner
+        self.both = np.zeros(N - 1, bool)  # steps with one at either end, which may be the same branch
         self.crossing = np.zeros(N - 1, bool)  # steps in which a joint passes a limit
         self._link()
 
@@ -149,8 +159,9 @@ class _Linking:
         part.columns.partner = c.partner[rows[:-1]]
         part.columns.partner[2::3] = -1  # between the groups
         part.open = np.zeros(len(rows) - 1, bool)
-        part.torn, part.crossing = part.open.copy(), part.open.copy()
-        part.torn[1::3], part.crossing[1::3] = self.torn[steps], self.crossing[steps]
+        part.torn, part.both, part.crossing = part.open.copy(), part.open.copy(), part.open.copy()
+        part.torn[1::3], part.both[1::3] = self.torn[steps], self.both[steps]
+        part.crossing[1::3] = self.crossing[steps]
         part.fresh = np.zeros(len(rows), bool)
         group = np.repeat(np.arange(len(steps)), 3)
         while part.divide():
@@ -181,17 +192,27 @@ class _Linking:
         )
 
     def divide(self) -> bool:
-        """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done."""
+        """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done.
+
+        A branch without a partner of which the step's other end knows nothing ends in that step, whatever is found
+        inside: where it does is all that is asked.
+        """
         c = self.columns
         h = np.diff(c.s)
-        least = np.where(self.torn, max(SHORTEST * self.length, 1e-9), ENDS)
+        least = np.where(self.both, max(SHORTEST * self.length, 1e-9), ENDS)
         todo = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
+        # Ends need no more than the formulas; their samples on edges are dear to examine.
+        singular = c.status == Status.SINGULAR
+        plain = ~(self.both | singular[:-1] | singular[1:])[todo]
+        quick = bool(plain.any())
+        todo = todo[plain] if quick else todo
         if not len(todo) or self.added > _MOST:
             return False
-        f = np.arange(1, _PARTS) / _PARTS
+        parts = int(np.clip(_AT_ONCE // len(todo), *_PARTS))
+        f = np.arange(1, parts) / parts
         new = (c.s[todo, None] + h[todo, None] * f).ravel()
-        found = self._solved(new)
-        self.where = where = np.repeat(todo + 1, _PARTS - 1)
+        found = self._solved(new, examine=not quick)
+        self.where = where = np.repeat(todo + 1, parts - 1)
         self.fresh = np.insert(self.fresh, where, True)
         self.added += len(new)
         B = max(c.q.shape[1], found.q.shape[1])
@@ -210,12 +231,13 @@ class _Linking:
         fresh[todo] = True
         self.open = np.insert(fresh, where, True)
         self.torn = np.insert(self.torn & ~fresh, where, False)
+        self.both = np.insert(self.both & ~fresh, where, False)
         self.crossing = np.insert(self.crossing & ~fresh, where, False)
         self._link()
         return True
 
-    def _solved(self, s: Array) -> Columns:
-        found = ik(self.arm, self.targets(s), self.task, near=self.near)
+    def _solved(self, s: Array, examine: bool = True) -> Columns:
+        found = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
         q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
         singular = np.flatnonzero(found.status == Status.SINGULAR)
         if len(singular):
@@ -238,20 +260,36 @@ class _Linking:
         valid = c.valid
         every = len(rows) == len(self.open)
         left, right = (slice(None, -1), slice(1, None)) if every else (rows, rows + 1)
-        D = change(self.arm, c.q[left], c.q[right])
-        with np.errstate(invalid="ignore"):
-            good = chord_bound(self.lever, D) <= self.tolerance
+        good, wrapped = self._certified(c.q[left], c.q[right], valid[left] & valid[right])
         column = np.arange(c.q.shape[1], dtype=np.int16)
         c.partner[rows] = np.where(good, column, np.int16(-1))
         straight = (good == (valid[left] | valid[right])).all(axis=1)
-        self.torn[rows] = False
+        self.torn[rows], self.both[rows] = False, False
         flips = (c.within[left] != c.within[right]) & good
         if self.wide:
-            flips |= self._crosses(c.q[left], D, good)
+            flips |= self._crosses(c.q, left, right, wrapped) & good
         self.crossing[rows] = flips.any(axis=1)
         for i in rows[~straight]:
             self._match(int(i), valid)
         self.open[:] = False
+
+    def _certified(self, a: Array, b: Array, there: Bool) -> tuple[Bool, Bool]:
+        """Which branches (M, B, n) at steps' ends are one, by a cheap bound and where that is too coarse by the bound.
+
+        there: (M, B). Returns that, and which of the cheaply refused ones go the other way round: (M, B) each.
+        """
+        D = b - a
+        if self.scale is not None:
+            D *= self.scale
+        with np.errstate(invalid="ignore"):
+            good = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
+        k, j = np.nonzero(there & ~good)
+        wrapped = np.zeros(good.shape, bool)
+        if len(k):
+            shorter = change(self.arm, a[k, j], b[k, j])
+            good[k, j] = chord_bound(self.lever, shorter) <= self.tolerance
+            wrapped[k, j] = np.abs(b[k, j] - a[k, j] - shorter).max(axis=1) > 1.0
+        return good, wrapped
 
     def _match(self, i: int, valid: Bool) -> None:
         """Partners of one step, whatever their columns: certified pairs, the smoothest first."""
@@ -275,15 +313,24 @@ class _Linking:
             cost[a, :], cost[:, b] = np.inf, np.inf
             matched += 1
         self.torn[i] = matched < max(len(left), len(right))
+        self.both[i] = matched < min(len(left), len(right))
 
-    def _crosses(self, q: Array, D: Array, good: Bool) -> Bool:
-        """Which linked columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
-        out = np.zeros(good.shape, bool)
+    def _crosses(self, q: Array, left: Int | slice, right: Int | slice, wrapped: Bool) -> Bool:
+        """Which columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
+        out = wrapped.copy()
         for j in self.wide:
+            value = q[:, :, j]
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                a = (q[..., j] - limit) / TURN
-                with np.errstate(invalid="ignore"):
-                    out |= (np.floor(a) != np.floor(a + D[..., j] / TURN)) & good
+                turn = np.floor((value - limit) / TURN)
+                out |= turn[left] != turn[right]
+        k, b = np.nonzero(wrapped)  # these go the other way round
+        if len(k):
+            start, end = q[left][k, b], q[right][k, b]
+            there = start + change(self.arm, start, end)
+            out[k, b] = False
+            for j in self.wide:
+                for limit in (self.arm.lower[j], self.arm.upper[j]):
+                    out[k, b] |= np.floor((start[:, j] - limit) / TURN) != np.floor((there[:, j] - limit) / TURN)
         return out
 
 

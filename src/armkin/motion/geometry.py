@@ -97,7 +97,8 @@ class Piece:
         n, k = self.task.position, len(self.task.sums)
         if self.first.turned is None:
             return y[:, : n + k]
-        R = turn(y[:, n + k :])
+        w = y[:, n + k :]
+        R = turn(w) if w.any() else np.broadcast_to(np.eye(3), (len(y), 3, 3))
         if self.task.orientation == "axis":
             return np.concatenate([y[:, : n + k], R @ self.first.turned], axis=1)
         T = np.zeros((len(y), 4, 4))
