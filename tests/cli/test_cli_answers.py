@@ -85,6 +85,7 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Calibrate, ("calibrate", DOF, "CSV")),
     (answers.StatusOfBoard, ("status", DOF, "--port", "sim")),
     (answers.Stands, ("jog", DOF, "q1", 5, "--seconds", 0.2, "--port", "sim")),
+    (answers.Home, ("home", "SWITCHED", "--port", "sim")),
     (answers.Grip, ("grip", DOF, "closed", "--port", "sim")),
     (answers.StatusOfGrbl, ("status", GRBL, "--port", "sim")),
     (answers.StatusOfServos, ("status", BUS, "--port", "sim")),
@@ -101,7 +102,8 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     ("kind", "words"), CASES, ids=lambda part: " ".join(map(str, part)) if type(part) is tuple else ""
 )
 def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...], tmp_path: Path) -> None:
-    result = run(*(measured(tmp_path) if word == "CSV" else word for word in words), "--json")
+    made = {"CSV": measured, "SWITCHED": switched}
+    result = run(*(made[str(word)](tmp_path) if word in made else word for word in words), "--json")
     assert result.code in (0, 3), result.err
     check(result.json, kind, kind.__name__)
     if result.code:
@@ -117,6 +119,16 @@ def measured(folder: Path) -> Path:
     tips[7] += 40.0
     np.savetxt(folder / "tips.csv", np.hstack([np.rad2deg(q), tips]), delimiter=",")
     return folder / "tips.csv"
+
+
+def switched(folder: Path) -> Path:
+    """The arm with a limit switch on every joint."""
+    text = (ROOT / "robots" / "three_dof.yaml").read_text()
+    for axis, at in zip("XYZ", (-20, 75, -105), strict=True):
+        homing = f"homing: {{switch: {axis}, direction: -1, at: {at}, speed: 40, backoff: 3, normally: open}}"
+        text = text.replace(f"    drive: {{axis: {axis},", f"    {homing}\n    drive: {{axis: {axis},")
+    (folder / "switched.yaml").write_text(text)
+    return folder / "switched.yaml"
 
 
 def test_a_batch_has_one_a_row() -> None:

@@ -108,3 +108,30 @@ def test_a_wrong_board_is_called_by_its_name() -> None:
         result = run("status", THREE_DOF, "--port", board.port)
     assert result.code == 5
     assert f"{board.port} is uno_servos, three_dof's board is uno_cnc_shield" in result.err
+
+
+def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arm is pushed 40 steps while its count goes on; the switch, met again, tells."""
+    path = arm_with_switches(tmp_path, four=False)
+    arm = armkin.load(path)
+    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
+
+    class Wire(SimPort):
+        simulated = False
+
+    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    first = run("home", path, "--port", "COM3", "--json")
+    assert [one["steps"] for one in first.json["lost_steps"]] == [None, None, None]  # nothing was known before
+    again = run("home", path, "--port", "COM3", "--json")
+    assert all(abs(one["steps"]) <= 1 for one in again.json["lost_steps"]), again.json["lost_steps"]
+    assert "lost" not in again.err
+    board.motors.net[0] -= 40
+    pushed = run("home", path, "--port", "COM3", "--json")
+    x, y, z = pushed.json["lost_steps"]
+    assert x["steps"] == pytest.approx(40, abs=1)
+    assert x["difference"] == pytest.approx(x["steps"] / arm.motor_gain[0, 0] * 180 / np.pi)
+    assert max(abs(y["steps"]), abs(z["steps"])) <= 1
+    board.motors.net[0] -= 40
+    told = run("home", path, "--port", "COM3")
+    assert f"q1: {x['steps']} steps were lost since its position was last set ({x['difference']:.3f} deg)" in told.err
+    assert "q2" not in told.err.replace("homing q2", "")

@@ -18,19 +18,25 @@ if TYPE_CHECKING:
 
 
 def open_port(
-    name: str, *, board: Board, baud: int = BAUD, paced: bool = False, switches: Switches | None = None
+    name: str,
+    *,
+    board: Board,
+    baud: int = BAUD,
+    paced: bool = False,
+    switches: Switches | None = None,
+    reset: bool = True,
 ) -> Port:
     """Open a port by name: /dev/ttyACM0, COM3, socket://host:4000, sim.
 
     board: what `sim` pretends to be; paced: `sim` takes the time that a real board would; switches: the levels
-    of its limit inputs. Raises LinkError with what to do.
+    of its limit inputs; reset: see `SerialPort`. Raises LinkError with what to do.
     """
     if name == SIM:
         from armkin.board.sim.board import SimBoard
         from armkin.board.sim.port import PacedSimPort, SimPort
 
         return (PacedSimPort if paced else SimPort)(SimBoard(board, switches))
-    return SerialPort(name, baud)
+    return SerialPort(name, baud, reset=reset)
 
 
 Switches = Callable[[int, Sequence[int]], bool]  # number of an input, net steps of all axes -> level
@@ -44,13 +50,14 @@ def open_backend(
     *,
     baud: int | None = None,
     stop: Callable[[], bool] = lambda: False,
+    reset: bool = True,
 ) -> Iterator[Backend]:
     """The arm on a board of any kind behind a port, given back at the end; baud: by default the kind's own."""
     if not isinstance(board, Foreign):
-        with open_machine(arm, board, port, baud=baud or BAUD, stop=stop) as machine:
+        with open_machine(arm, board, port, baud=baud or BAUD, stop=stop, reset=reset) as machine:
             yield machine
         return
-    link = board.simulated() if port == SIM else SerialPort(port, baud or board.board.baud)
+    link = board.simulated() if port == SIM else SerialPort(port, baud or board.board.baud, reset=reset)
     try:
         yield board.machine(link, stop)
     finally:
@@ -65,6 +72,7 @@ def open_machine(
     *,
     baud: int = BAUD,
     stop: Callable[[], bool] = lambda: False,
+    reset: bool = True,
 ) -> Iterator[Machine]:
     """The arm on the board behind a port, given back at the end.
 
@@ -73,7 +81,7 @@ def open_machine(
     """
     from armkin.board.firmware.homing import switches
 
-    link = open_port(port, board=configuration.board, baud=baud, switches=switches(arm, configuration))
+    link = open_port(port, board=configuration.board, baud=baud, switches=switches(arm, configuration), reset=reset)
     try:
         machine = Machine(link, arm, configuration, stop)
         try:

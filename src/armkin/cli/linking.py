@@ -36,6 +36,14 @@ PortName = Annotated[
 Baud = Annotated[
     int | None, typer.Option("--baud", metavar="N", help="The port's rate. [default: what the kind of board uses]")
 ]
+NoReset = Annotated[
+    bool,
+    typer.Option(
+        "--no-reset",
+        help="Leave DTR low while the port is opened, so that an Uno is not reset: Windows and rfc2217://. "
+        "Linux and macOS reset it with the first opening after plugging in, and never again.",
+    ),
+]
 Assume = Annotated[
     str | None,
     typer.Option(
@@ -51,7 +59,7 @@ SIM = "sim"
 AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
 
-def port_name(given: str | None, configuration: Configuration | None, baud: int) -> str:
+def port_name(given: str | None, configuration: Configuration | None, baud: int, *, reset: bool = True) -> str:
     """The port given (or ARMKIN_PORT), else the only one where a board answers as the robot file's kind."""
     if given is not None:
         return given
@@ -64,7 +72,7 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
         else f"{'an' if configuration.board.kind[0] in 'aeiou' else 'a'} {configuration.board.kind}"
     )
     with stoppable() as stop:
-        found = answering(None if configuration is None else configuration.board.number, baud, stop)
+        found = answering(None if configuration is None else configuration.board.number, baud, stop, reset=reset)
     if len(found) == 1:
         output.note(f"using {found[0]}, the only port where {kind} answers")
         return found[0]
@@ -77,7 +85,13 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int)
 
 @contextmanager
 def backend(
-    arm: Arm, board: Configuration | Foreign, port: str | None, baud: int | None, *, simulated: str = AT_HOME
+    arm: Arm,
+    board: Configuration | Foreign,
+    port: str | None,
+    baud: int | None,
+    *,
+    simulated: str = AT_HOME,
+    reset: bool = True,
 ) -> Iterator[Backend]:
     """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first."""
     from armkin.board.backend import StoppedError
@@ -85,10 +99,12 @@ def backend(
     from armkin.board.opening import open_backend
     from armkin.board.stopping import stoppable
 
-    port = foreign_port(port, board) if isinstance(board, Foreign) else port_name(port, board, baud or BAUD)
+    port = (
+        foreign_port(port, board) if isinstance(board, Foreign) else port_name(port, board, baud or BAUD, reset=reset)
+    )
     if port == SIM:
         output.note(simulated)
-    with stoppable() as stop, open_backend(arm, board, port, baud=baud, stop=stop) as one:
+    with stoppable() as stop, open_backend(arm, board, port, baud=baud, stop=stop, reset=reset) as one:
         for difference in one.differences if port != SIM else ():
             output.note(difference)
         try:
@@ -148,7 +164,13 @@ def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) 
 
 @contextmanager
 def machine(
-    arm: Arm, configuration: Configuration, port: str | None, baud: int | None, *, simulated: str = AT_HOME
+    arm: Arm,
+    configuration: Configuration,
+    port: str | None,
+    baud: int | None,
+    *,
+    simulated: str = AT_HOME,
+    reset: bool = True,
 ) -> Iterator[Machine]:
     """The arm on the board behind a port, given back at the end; a signal stops the arm first.
 
@@ -159,10 +181,10 @@ def machine(
     from armkin.board.stopping import stoppable
 
     baud = baud or BAUD
-    port = port_name(port, configuration, baud)
+    port = port_name(port, configuration, baud, reset=reset)
     if port == SIM:
         output.note(simulated)
-    with stoppable() as stop, open_machine(arm, configuration, port, baud=baud, stop=stop) as one:
+    with stoppable() as stop, open_machine(arm, configuration, port, baud=baud, stop=stop, reset=reset) as one:
         try:
             yield one
         except StoppedError as error:

@@ -9,13 +9,15 @@ from armkin.board.ports import BAUD, SerialPort, list_ports
 from armkin.errors import LinkError
 
 
-def answering(number: int | None = None, baud: int = BAUD, stop: Callable[[], bool] = lambda: False) -> list[str]:
+def answering(
+    number: int | None = None, baud: int = BAUD, stop: Callable[[], bool] = lambda: False, *, reset: bool = True
+) -> list[str]:
     """Names of the ports behind which a board with armkin's firmware answers.
 
     number: the board's as INFO says it; None: any. Only ports that look like an Arduino are opened (which
     resets most of them: an arm that stands still keeps its position), and none that another program holds.
     """
-    return [name for name in likely() if _answers(name, number, baud, stop)]
+    return [name for name in likely() if _answers(name, number, baud, stop, reset)]
 
 
 def likely() -> Iterable[str]:
@@ -23,9 +25,9 @@ def likely() -> Iterable[str]:
     return [port.device for port in list_ports() if port.board]
 
 
-def _answers(name: str, number: int | None, baud: int, stop: Callable[[], bool]) -> bool:
+def _answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
     try:
-        link = SerialPort(name, baud)
+        link = SerialPort(name, baud, reset=reset)
     except LinkError:
         return False
     try:

@@ -58,6 +58,15 @@ class Search:
         )
 
 
+@dataclass(frozen=True)
+class Lost:
+    """What a switch that was met again tells of the counts."""
+
+    joint: str
+    steps: int | None  # of its motor, that the counts were ahead of the arm; None: its position was not known
+    difference: float | None  # the same [rad | mm]
+
+
 def searches(
     arm: Arm, configuration: Configuration, names: Sequence[str] = (), *, rest_at_home: bool = False
 ) -> list[Search]:
@@ -91,10 +100,11 @@ def home(
     announce: Callable[[str], None] = lambda name: None,
     *,
     rest_at_home: bool = False,
-) -> None:
+) -> list[Lost]:
     """Home joints and tell the board where they stand; all positions of theirs are lost until then.
 
-    rest_at_home: the joints that have no switch stand in their home pose, says the operator.
+    rest_at_home: the joints that have no switch stand in their home pose, says the operator. Counts go on through
+    homing: where they were known before, the result tells how far they were from where the switches are.
     """
     arm = machine.arm
     todo = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
@@ -103,12 +113,14 @@ def home(
     machine.enable(machine.configuration.axes)
     q = arm.home.copy()
     axes = list(machine.configuration.axes)
+    lost_before, found = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
     turn = {search.joint: i for i, search in enumerate(todo)}
     for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
             status, edge = _found(machine, search)
+            found.append(_lost(machine, search, edge, known=arm.joint_names[search.joint] not in lost_before))
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
@@ -116,6 +128,19 @@ def home(
     if rest_at_home:
         left = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
         machine.vouch(dict(zip([axes[k] for k in left], pulses(arm, q)[left].tolist(), strict=True)))
+    return found
+
+
+def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> Lost:
+    """The counts at a switch's edge, against where the robot file says that it is."""
+    arm, j = machine.arm, search.joint
+    if not known:
+        return Lost(arm.joint_names[j], None, None)
+    counts = [edge.counts[axis] for axis in machine.configuration.axes]
+    gain = arm.motor_gain[:, j]
+    leader = gain[np.abs(gain).argmax()]
+    steps = round(float((joints(arm, counts)[j] - _at(arm, j)) * leader))
+    return Lost(arm.joint_names[j], steps, steps / float(leader))
 
 
 def _found(machine: Machine, search: Search) -> tuple[Status, Status]:

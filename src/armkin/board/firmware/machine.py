@@ -96,6 +96,7 @@ class Machine:
             "drivers_on": Flag.DRIVERS in flags,
             "servo_pulses_on": Flag.SERVOS in flags,
             "abort_input": Flag.ABORT in flags,
+            "motor_power": Flag.POWER_CUT not in flags if self.configuration.image.power_sensed else None,
             "switches": {name: bool(status.switches >> i & 1) for i, name in enumerate(board.switches)},
             "boots": info.boots,
             "reset_cause": info.cause,

@@ -29,15 +29,20 @@ _MOST = 4096  # bytes of one read: what never falls silent must not keep it from
 
 
 class SerialPort:
-    """A port that pyserial opens."""
+    """A port that pyserial opens.
+
+    reset: an Arduino's reset follows DTR. False leaves it low where the system lets a program choose: Windows, and
+    rfc2217://. Linux and macOS raise it with the first opening after the board was plugged in, whatever a program
+    wants; from then on it is held, and no opening resets.
+    """
 
     simulated = False
 
-    def __init__(self, name: str, baud: int = BAUD) -> None:
+    def __init__(self, name: str, baud: int = BAUD, *, reset: bool = True) -> None:
         self.name, self.baud = name, baud
         self._lock = _Lock(name)
         try:
-            self._serial = _open_serial(name, baud)
+            self._serial = _open_serial(name, baud, reset)
         except BaseException:
             self._lock.release()
             raise
@@ -85,14 +90,17 @@ class SerialPort:
             ) from None
 
 
-def _open_serial(name: str, baud: int) -> Any:
+def _open_serial(name: str, baud: int, reset: bool) -> Any:
     import serial
 
-    settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ, "write_timeout": 2.0}
+    settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ, "write_timeout": 2.0, "do_not_open": True}
     if "://" not in name:
         settings["exclusive"] = True if os.name == "posix" else None
     try:
         port = serial.serial_for_url(name, **settings)
+        if not reset and (sys.platform == "win32" or "://" in name):
+            port.dtr = port.rts = False
+        port.open()
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_cannot_open(name, error)) from None
     except Exception as error:  # what pyserial makes of a malformed URL: KeyError, re.error, AttributeError, ...
@@ -189,7 +197,7 @@ class _Lock:
         with suppress(OSError):
             os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
         with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
-            file.write(str(os.getpid()))
+            file.write(f"{os.getpid()} {_born(os.getpid())}")
 
     def release(self) -> None:
         """Let others have the port."""
@@ -233,9 +241,19 @@ def _path(name: str, end: str) -> str:
 
 
 def _read_pid(name: str) -> int | None:
+    """The process that wrote the file beside a lock, if it still is that process: by its number and its birth."""
     try:
         with open(_path(name, "pid"), encoding="ascii") as file:
-            text = file.read(20)
+            number, _, born = file.read(60).partition(" ")
     except (OSError, ValueError):
         return None
-    return int(text) if text.isdigit() else None
+    return int(number) if number.isdigit() and born == _born(int(number)) else None
+
+
+def _born(process: int) -> str:
+    """When a process was started, in ticks since this boot (Linux); elsewhere the lock alone is asked."""
+    try:
+        with open(f"/proc/{process}/stat", "rb") as file:
+            return file.read().rpartition(b")")[2].split()[19].decode()  # proc(5): field 22, and 3 follows the name
+    except (OSError, IndexError):
+        return ""

@@ -34,6 +34,8 @@ from armkin.cli.answers.moving import Difference as Difference
 from armkin.cli.answers.moving import DryRun as DryRun
 from armkin.cli.answers.moving import Grip as Grip
 from armkin.cli.answers.moving import GripOfServo as GripOfServo
+from armkin.cli.answers.moving import Home as Home
+from armkin.cli.answers.moving import LostSteps as LostSteps
 from armkin.cli.answers.moving import NearestSingularity as NearestSingularity
 from armkin.cli.answers.moving import Path as Path
 from armkin.cli.answers.moving import PathBranch as PathBranch
@@ -61,7 +63,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "send": (DryRun, Send),
     "path": (Path, PathMoved),
     "status": (StatusOfBoard, StatusOfGrbl, StatusOfServos),
-    "home": (Stands,),
+    "home": (Home,),
     "jog": (Stands,),
     "grip": (Grip, GripOfServo),
     "calibrate": (Calibrate, Suggested),

@@ -113,6 +113,20 @@ class Stands(Head, Where):
     port: str
 
 
+class LostSteps(TypedDict):
+    """A switch that was met again, against the count that was held."""
+
+    joint: str
+    steps: Annotated[int | None, "that the count was ahead of the arm; null: the position was not known"]
+    difference: Annotated[float | None, "the same [deg or mm]"]
+
+
+class Home(Stands):
+    """`home`: where the arm stands after it, and the steps that were lost before."""
+
+    lost_steps: Annotated[NotRequired[list[LostSteps]], "one a joint that was homed; boards with armkin's firmware"]
+
+
 class StatusOfBoard(Stands):
     """`status`: what the board says."""
 
@@ -124,6 +138,7 @@ class StatusOfBoard(Stands):
     drivers_on: bool
     servo_pulses_on: bool
     abort_input: bool
+    motor_power: Annotated[bool | None, "null: no input senses it, so a cut goes unnoticed"]
     switches: Annotated[dict[str, bool], "levels of the limit inputs"]
     boots: int
     reset_cause: int

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.numbers import is_number, number
 from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
@@ -36,6 +36,7 @@ def grip(
         ),
     ] = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
@@ -43,13 +44,13 @@ def grip(
 
     arm = inputs.load(robot)
     if (other := linking.foreign(arm)) is not None:
-        _grip_servo(arm, other, value, port, baud, json)
+        _grip_servo(arm, other, value, port, baud, not no_reset, json)
         return
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     gripper = gripping.gripper_of(arm.name, configuration)
     target = _count(gripper, value, "VALUE")
     start = None if assume is None else _count(gripper, assume, "--assume")
-    with linking.machine(arm, configuration, port, baud) as machine:
+    with linking.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
         gripping.prepare(machine, gripper, start)
         at = gripping.grip(machine, gripper, target)
     if at != target:
@@ -65,7 +66,9 @@ def grip(
         write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
 
 
-def _grip_servo(arm: Arm, other: Foreign, value: str, port: str | None, baud: int | None, json: bool) -> None:
+def _grip_servo(
+    arm: Arm, other: Foreign, value: str, port: str | None, baud: int | None, reset: bool, json: bool
+) -> None:
     """A gripper on a bus of servos, which may close on something before it is where it was sent."""
     gripper = arm.gripper
     if other.board.kind != "feetech" or gripper is None or gripper.kind != "bus":
@@ -77,7 +80,7 @@ def _grip_servo(arm: Arm, other: Foreign, value: str, port: str | None, baud: in
         raise UsageError(f"VALUE: {value} is outside of the gripper's {low:g} to {high:g}")
     from armkin.board.feetech.machine import ServoMachine
 
-    with linking.backend(arm, other, port, baud) as machine:
+    with linking.backend(arm, other, port, baud, reset=reset) as machine:
         assert isinstance(machine, ServoMachine)
         at = machine.grip(gripper, target)
     found = {**render.head(arm), "port": machine.port.name, "gripper": at, "target": target}

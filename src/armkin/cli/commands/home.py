@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import completion, inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.options import Json, Robot
 from armkin.errors import HomingIncompleteError, UsageError
+from armkin.model import units
 
 if TYPE_CHECKING:
+    from armkin.board.firmware.homing import Lost
     from armkin.board.foreign import Foreign
     from armkin.model.arm import Arm
 
@@ -34,26 +36,28 @@ def home(
     ] = False,
     stay: Annotated[bool, typer.Option("--stay", help="Stay at the switches; do not move to the home pose.")] = False,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Find the limit switches, and with them the position.
 
     Each joint approaches its switch, backs off and touches it again slowly, in the order of the robot
-    file's homing; then the arm moves to its home pose. Keep clear of it: it moves as far as it must. With
+    file's homing; then the arm moves to its home pose. Where the position was known,
+    steps lost since are told. Keep clear of it: it moves as far as it must. With
     --port sim the switches are where the robot file says.
     """
     arm = inputs.load(robot)
     other = linking.foreign(arm)
     if other is not None:
-        found = _of_others(arm, other, port, baud, joints, rest_at_home)
+        found = _of_others(arm, other, port, baud, joints, rest_at_home, not no_reset)
     else:
-        found = _ours(arm, port, baud, joints or (), rest_at_home, stay)
+        found = _ours(arm, port, baud, joints or (), rest_at_home, stay, not no_reset)
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else linking.where_text(arm, found))
 
 
 def _ours(
-    arm: Arm, port: str | None, baud: int | None, joints: Sequence[str], rest_at_home: bool, stay: bool
+    arm: Arm, port: str | None, baud: int | None, joints: Sequence[str], rest_at_home: bool, stay: bool, reset: bool
 ) -> dict[str, Any]:
     """Home the arm on a board with armkin's firmware."""
     from armkin.board.firmware import homing
@@ -61,8 +65,8 @@ def _ours(
 
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     homing.searches(arm, configuration, joints, rest_at_home=rest_at_home)  # refuses before a port is opened
-    with linking.machine(arm, configuration, port, baud, simulated=_REHEARSAL) as machine:
-        homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
+    with linking.machine(arm, configuration, port, baud, simulated=_REHEARSAL, reset=reset) as machine:
+        steps = homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
         lost = homing.lost_joints(machine)
         if lost:
             done = [name for name in arm.joint_names if name not in lost]
@@ -76,11 +80,30 @@ def _ours(
         if not stay:
             output.note("moving to the home pose")
             homing.go_home(machine)
-        return {**render.head(arm), "port": machine.port.name, **where(machine)}
+        return {**render.head(arm), "port": machine.port.name, **where(machine), "lost_steps": _told(arm, steps)}
+
+
+def _told(arm: Arm, found: Sequence[Lost]) -> list[dict[str, Any]]:
+    """What the switches tell of the counts, as JSON; a warning where more than a step is missing."""
+    told = []
+    for one in found:
+        slides = arm.prismatic[arm.joint_names.index(one.joint)]
+        difference = None if one.difference is None else one.difference / (1.0 if slides else units.DEGREE)
+        told.append({"joint": one.joint, "steps": one.steps, "difference": difference})
+        if one.steps is not None and abs(one.steps) > 1:
+            off = f"({difference:.3f} {'mm' if slides else 'deg'})"
+            output.warn(f"{one.joint}: {abs(one.steps)} steps were lost since its position was last set {off}")
+    return told
 
 
 def _of_others(
-    arm: Arm, other: Foreign, port: str | None, baud: int | None, joints: Sequence[str] | None, rest_at_home: bool
+    arm: Arm,
+    other: Foreign,
+    port: str | None,
+    baud: int | None,
+    joints: Sequence[str] | None,
+    rest_at_home: bool,
+    reset: bool,
 ) -> dict[str, Any]:
     """Home the arm on a board that homes by itself, all joints at once."""
     from armkin.board.moving import where
@@ -90,6 +113,6 @@ def _of_others(
         raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(joints)} out")
     if rest_at_home:
         raise UsageError(f"boards of kind {kind} home all joints at once: leave --rest-at-home out")
-    with linking.backend(arm, other, port, baud) as backend:
+    with linking.backend(arm, other, port, baud, reset=reset) as backend:
         other.home(backend)
         return {**render.head(arm), "port": backend.port.name, **where(backend)}

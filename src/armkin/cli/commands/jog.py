@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import completion, inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
@@ -23,6 +23,7 @@ def jog(
     port: PortName = None,
     seconds: Annotated[str, typer.Option("--seconds", metavar="S", help="How long; Ctrl-C ends it earlier.")] = "0.5",
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Move one joint at a constant speed, for a short time.
@@ -45,14 +46,14 @@ def jog(
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     if other is not None:
-        with linking.backend(arm, other, port, baud) as backend:
+        with linking.backend(arm, other, port, baud, reset=not no_reset) as backend:
             other.jog(backend, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
             told = {**render.head(arm), "port": backend.port.name, **where(backend)}
         with output.destination(None) as write:
             write(render.to_json(told) + "\n" if json else linking.where_text(arm, told))
         return
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
-    with linking.machine(arm, configuration, port, baud) as machine:
+    with linking.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
         jogging.prepare(machine)
         slow = top / jogging.SLOW
         if machine.position() == "lost" and abs(rate) > slow:

@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import holding, inputs, linking, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import SIM, Assume, Baud
+from armkin.cli.linking import SIM, Assume, Baud, NoReset
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError
@@ -69,6 +69,7 @@ def path(
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume: Assume = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Plan a path through space, and move along it.
@@ -116,7 +117,7 @@ def path(
         found = _found(plan, _rehearsed(plan) if not held else None)
         _print(plan, found, json=json)
         return
-    _carried_out(arm, moves, options, port, baud, out, plot, assume=assume, json=json)
+    _carried_out(arm, moves, options, port, baud, out, plot, assume=assume, reset=not no_reset, json=json)
 
 
 def sent(
@@ -130,6 +131,7 @@ def sent(
     baud: int | None,
     *,
     assume: str | None,
+    reset: bool,
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
@@ -139,7 +141,7 @@ def sent(
     moves = _moves(arm, file, None, None)
     options: dict[str, Any] = {"speed": (_positive(speed, "--speed") or 100.0) / 100}
     if not dry_run:
-        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, json=json)
+        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json)
         return
     if start is not None:
         options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--from"))
@@ -158,6 +160,7 @@ def _carried_out(
     plot: str | None,
     *,
     assume: str | None,
+    reset: bool,
     json: bool,
 ) -> None:
     """Plan from where the arm stands, then move it."""
@@ -165,7 +168,7 @@ def _carried_out(
     from armkin.board.moving import where
 
     board, stands = linking.board_of(arm, rehearsal=port == SIM), linking.assumed(arm, assume)
-    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume)) as machine:
+    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=reset) as machine:
         linking.prepare(arm, machine, assume, stands)
         plan = _planned(arm, moves, {**options, "start": machine.joints()}, json=json)
         following.check_gripper(plan, board)

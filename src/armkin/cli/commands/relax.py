@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import inputs, linking, output
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Out, Robot
 from armkin.errors import UsageError
@@ -26,6 +26,7 @@ def relax(
     ] = "0",
     out: Out = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
 ) -> None:
     """Switch bus servos off, to move the arm by hand and read it.
 
@@ -41,7 +42,7 @@ def relax(
     time = number(seconds, "--seconds")
     if not 0 <= time <= _LONGEST:
         raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
-    with linking.backend(arm, other, port, baud) as machine, output.destination(out) as write:
+    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
         assert isinstance(machine, ServoMachine)
         machine.relax()
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")

@@ -10,7 +10,7 @@ import typer
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import goals as read_goals
-from armkin.cli.linking import SIM, Assume, Baud, PortName
+from armkin.cli.linking import SIM, Assume, Baud, NoReset, PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.errors import UsageError
@@ -69,6 +69,7 @@ def send(
         typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Move the arm.
@@ -93,7 +94,7 @@ def send(
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        sent(robot, path, port, speed, dry_run, start, trace, baud, assume=assume, json=json)
+        sent(robot, path, port, speed, dry_run, start, trace, baud, assume=assume, reset=not no_reset, json=json)
         return
     radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
@@ -109,7 +110,7 @@ def send(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
             )
         return
-    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume)) as machine:
+    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=not no_reset) as machine:
         linking.prepare(arm, machine, assume, stands)
         began = machine.counts()
         if isinstance(machine, Machine):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
 
@@ -22,6 +22,7 @@ def setup(
         bool, typer.Option("--write", help="Write what differs, and read it back. The position is lost with it.")
     ] = False,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """A board's settings against the robot file.
@@ -35,7 +36,7 @@ def setup(
     other = linking.foreign(arm)
     if other is None or other.board.kind != "grbl":
         raise UsageError(f"{arm.name}'s board has no settings to compare: setup is for board: {{kind: grbl}}")
-    with linking.backend(arm, other, port, baud) as machine:
+    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine:
         assert isinstance(machine, GrblMachine)
         found = machine.wrong()
         if write:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.options import Json, Robot
 
 
-def status(robot: Robot, port: PortName = None, baud: Baud = None, json: Json = False) -> None:
+def status(
+    robot: Robot, port: PortName = None, baud: Baud = None, no_reset: NoReset = False, json: Json = False
+) -> None:
     """Where the board says that the arm stands.
 
     Moves nothing and changes nothing. (Opening its port resets an Uno the first time: an arm that stood
@@ -20,7 +22,7 @@ def status(robot: Robot, port: PortName = None, baud: Baud = None, json: Json = 
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
     board = linking.board_of(arm, rehearsal=port == linking.SIM)
-    with linking.backend(arm, board, port, baud, simulated=new) as machine:
+    with linking.backend(arm, board, port, baud, simulated=new, reset=not no_reset) as machine:
         found = {
             **render.head(arm),
             "port": machine.port.name,
@@ -53,6 +55,13 @@ def _grbl(found: dict[str, Any]) -> str:
     return render.table(rows, left=(0, 1)) + "\n"
 
 
+_POWER = {
+    True: "on",
+    False: "off: the position is lost",
+    None: "not sensed: after a cut the position above is wrong; armkin stop --power-cut declares it lost",
+}
+
+
 def _text(found: dict[str, Any]) -> str:
     high = [name for name, level in found["switches"].items() if level]
     low = [name for name, level in found["switches"].items() if not level]
@@ -64,5 +73,6 @@ def _text(found: dict[str, Any]) -> str:
         ["drivers", f"{on[found['drivers_on']]}, servo pulses {on[found['servo_pulses_on']]}"],
         ["switches", f"high: {', '.join(high) or 'none'}; low: {', '.join(low) or 'none'}"],
         ["abort input", "active" if found["abort_input"] else "not active"],
+        ["motor power", _POWER[found["motor_power"]]],
     ]
     return render.table(rows, left=(0, 1)) + "\n"

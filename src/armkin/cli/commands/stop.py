@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import linking, output
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.errors import LinkError, UsageError
 
 _PATIENCE = 15.0  # [s] for an arm to come to rest
@@ -16,6 +16,7 @@ _PATIENCE = 15.0  # [s] for an arm to come to rest
 def stop(
     port: PortName = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
     power_cut: Annotated[
         bool,
         typer.Option("--power-cut", help="The motors' power was cut: declare the arm's position lost, drivers off."),
@@ -29,7 +30,7 @@ def stop(
     from armkin.board.ports import SIM, SerialPort, holder
 
     baud = baud or linking.BAUD
-    port = _port(port, baud)
+    port = _port(port, baud, not no_reset)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
     process = holder(port)
@@ -41,7 +42,7 @@ def stop(
     from armkin.board.stopping import stoppable
 
     with stoppable() as asked:
-        link = SerialPort(port, baud)
+        link = SerialPort(port, baud, reset=not no_reset)
         try:
             session = Session(link, asked)
             session.open()  # a former session's motion is held by that alone
@@ -53,7 +54,7 @@ def stop(
     output.note("the arm stands" + ("; its position is lost: home it, or say --assume-home" if power_cut else ""))
 
 
-def _port(given: str | None, baud: int) -> str:
+def _port(given: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
     from armkin.board.firmware.finding import likely
     from armkin.board.ports import holder
@@ -62,7 +63,7 @@ def _port(given: str | None, baud: int) -> str:
         held = [name for name in likely() if holder(name) is not None]
         if len(held) == 1:
             return held[0]
-    return linking.port_name(given, None, baud)
+    return linking.port_name(given, None, baud, reset=reset)
 
 
 def _end(process: int, port: str) -> None:

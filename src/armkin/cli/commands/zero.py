@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, PortName
+from armkin.cli.linking import Baud, NoReset, PortName
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
 
@@ -21,6 +21,7 @@ def zero(
     ] = "home",
     out: Out = None,
     baud: Baud = None,
+    no_reset: NoReset = False,
     json: Json = False,
 ) -> None:
     """Record where the zero of bus servos is.
@@ -43,7 +44,7 @@ def zero(
     if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
     q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
-    with linking.backend(arm, other, port, baud) as machine:
+    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine:
         assert isinstance(machine, ServoMachine)
         counts, name = list(machine.counts()), machine.port.name
     found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()

@@ -1,0 +1,99 @@
+"""Serial ports: what resets a board, and who holds one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armkin.board.ports import SerialPort, holder, serial_port
+from command_line import THREE_DOF, run
+
+
+class FakeSerial:
+    """A port that notes what was done to it, in order."""
+
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in ("dtr", "rts"):
+            self.done.append(f"{name} {value}")
+        object.__setattr__(self, name, value)
+
+    def open(self) -> None:
+        self.done.append("open")
+
+    def close(self) -> None:
+        self.done.append("close")
+
+
+class FakeLock:
+    """The right to a port that is not there."""
+
+    def __init__(self, name: str) -> None:
+        pass
+
+    def release(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("platform", "name", "reset", "done"),
+    [
+        ("win32", "COM3", False, ["dtr False", "rts False", "open"]),
+        ("win32", "COM3", True, ["open"]),
+        ("linux", "rfc2217://host:4000", False, ["dtr False", "rts False", "open"]),
+        (
+            "linux",
+            "/dev/ttyACM0",
+            False,
+            ["open"],
+        ),  # the kernel raises DTR; dropping it here would cost the next opening
+    ],
+)
+def test_no_reset_leaves_dtr_low_before_the_port_opens(
+    monkeypatch: pytest.MonkeyPatch, platform: str, name: str, reset: bool, done: list[str]
+) -> None:
+    import serial
+
+    fake = FakeSerial()
+    monkeypatch.setattr(serial, "serial_for_url", lambda name, **_: fake)
+    monkeypatch.setattr("armkin.board.ports.serial_port.sys.platform", platform)
+    monkeypatch.setattr(serial_port, "_Lock", FakeLock)
+    SerialPort(name, reset=reset).close()
+    assert fake.done == [*done, "close"]
+
+
+WORDS = {"home": "q1", "send": "0 90 -90", "jog": "q1 5", "grip": "open", "path": "--via 390,80,300 --via 390,90,300"}
+
+
+@pytest.mark.parametrize("command", ["status", "home", "send", "jog", "grip", "path"])
+def test_every_command_that_opens_a_port_takes_no_reset(monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+    opened: list[bool] = []
+
+    def open_port(name: str, *, reset: bool, **_: object) -> None:
+        opened.append(reset)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("armkin.board.opening.open_port", open_port)
+    robot = "examples/every_key.yaml" if command == "home" else THREE_DOF
+    words = [command, robot, *WORDS.get(command, "").split()]
+    assert run(*words, "--port", "COM9", "--no-reset").code == 130
+    assert run(*words, "--port", "COM9").code == 130
+    assert opened == [False, True]
+
+
+def test_a_holder_is_known_by_its_birth_too(tmp_path: Path) -> None:
+    """A process number that was given to another process since is not taken for the holder."""
+    name = str(tmp_path / "ttyX")
+    lock = serial_port._Lock(name)
+    try:
+        assert holder(name) == os.getpid()
+        note = Path(serial_port._path(name, "pid"))
+        note.write_text(f"{os.getpid()} 12345")  # an earlier process of this number
+        assert holder(name) is None
+    finally:
+        lock.release()

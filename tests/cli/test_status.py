@@ -1,0 +1,39 @@
+"""`armkin status`: what it says of the motors' power."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.port import SimPort
+from armkin.hardware import BOARDS
+from command_line import ROOT, THREE_DOF, run
+
+
+def test_status_says_that_a_power_cut_cannot_be_seen() -> None:
+    said = run("status", THREE_DOF, "--port", "sim")
+    assert "motor power" in said.out
+    assert "not sensed" in said.out
+    assert "armkin stop --power-cut" in said.out
+    assert run("status", THREE_DOF, "--port", "sim", "--json").json["motor_power"] is None
+
+
+def test_status_tells_the_power_that_an_input_senses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / THREE_DOF).read_text()
+    assert "driver: A4988" in text
+    path = tmp_path / "sensed.yaml"
+    path.write_text(text.replace("driver: A4988", "driver: A4988, power: A1"))
+    board = SimBoard(BOARDS["uno_cnc_shield"])
+
+    class Wire(SimPort):
+        simulated = False
+
+    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    assert run("send", path, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
+    assert run("status", path, "--port", "COM3", "--json").json["motor_power"] is True
+    board.power_level = False
+    cut = run("status", path, "--port", "COM3")
+    assert "off: the position is lost" in cut.out
+    assert "position lost" in cut.out or "position is lost" in cut.out
