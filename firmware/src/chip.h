@@ -1,4 +1,4 @@
-// What differs from chip to chip and must be known at compile time: src/avr/chip.h, or the PC's for the tests.
+// What differs from chip to chip and must be known at compile time: src/avr/chip.h, src/rp2040/chip.h, or the PC's for the tests.
 //
 // A chip's header defines
 //   HAL_LOCK() … HAL_UNLOCK()  a block that the tick interrupt stays out of; also a memory barrier both ways
@@ -18,6 +18,8 @@
 
 #ifdef __AVR__
 #include "avr/chip.h"
+#elif defined(__arm__)
+#include "rp2040/chip.h"
 #else
 #include "pc/chip.h"
 #endif

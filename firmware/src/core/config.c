@@ -73,8 +73,8 @@ static bool image_valid(uint16_t length) {
     const struct image *image = &memory.image;
     if (length < HEAD || image->layout != 2 || image->axes != AXES || image->rows > ROWS ||
         length != offsetof(struct image, row) + image->rows * sizeof image->row[0] ||
-        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH | POWER_SENSED)) || image->step_high > 80 ||
-        image->step_low > 50 || image->dir_setup > 100) {
+        (image->flags & ~(ABORT_CLOSED | ENABLE_HIGH | POWER_SENSED)) || image->step_high > STEP_HIGH_MAX ||
+        image->step_low > STEP_LOW_MAX || image->dir_setup > DIR_SETUP_MAX) {
         return false;
     }
     for (uint8_t n = 0; n < SWITCHES; n++) {

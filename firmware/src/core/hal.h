@@ -1,4 +1,4 @@
-// What the core asks of the chip, by calls; chip.h has the rest. src/avr implements it; so does the PC test bench.
+// What the core asks of the chip, by calls; chip.h has the rest. src/avr and src/rp2040 implement it; so does the PC test bench.
 #pragma once
 #include <stdbool.h>
 #include <stdint.h>

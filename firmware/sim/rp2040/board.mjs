@@ -1,0 +1,121 @@
+// simboard for the Pico: what firmware/sim is for the AVR boards, with the same options, commands and answers (firmware/sim/README.md).
+// Started by simboard.py, which holds the pseudo-terminal; the port's bytes go through descriptor 3.
+import fs from 'node:fs';
+import net from 'node:net';
+import readline from 'node:readline';
+import { parseArgs } from 'node:util';
+import { CLOCK_HZ, Chip, readUf2 } from './chip.mjs';
+import { Commands } from './commands.mjs';
+import { Line } from './line.mjs';
+import { Pins } from './pins.mjs';
+
+const SLICE = CLOCK_HZ / 4000;
+
+const { values: options } = parseArgs({
+  options: {
+    board: { type: 'string' }, elf: { type: 'string' }, port: { type: 'string', default: '' }, stdin: { type: 'boolean' },
+    speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, 'no-reset-on-open': { type: 'boolean' },
+    driver: { type: 'string', default: 'a4988' }, do: { type: 'string', multiple: true, default: [] }, baud: { type: 'string', default: '250000' },
+    trace: { type: 'string' }, seed: { type: 'string', default: '1' }, bootloader: { type: 'string' },
+  },
+});
+
+const stepped = options.speed === 'step';
+const pace = { speed: options.speed === 'max' || stepped ? 0 : Number(options.speed), ahead: Number(options.ahead) / 1e3 };
+const heard = []; // bytes from the board that nobody has taken yet
+
+const pins = new Pins(options.driver, options.trace);
+const line = new Line(
+  Number(options.baud),
+  (byte, cycle) => {
+    heard.push(byte);
+    pins.record(251, byte, cycle);
+  },
+  (byte, cycle) => pins.record(250, byte, cycle),
+);
+const chip = new Chip(
+  readUf2(fs.readFileSync(options.elf)),
+  (rp2040, self) => {
+    pins.attach(rp2040, self);
+    line.attach(rp2040, self);
+  },
+  Number(options.seed),
+);
+const commands = new Commands({ chip, pins, line, heard, stepped });
+chip.outside = {
+  get next() {
+    return Math.min(line.next, commands.next);
+  },
+  due(cycle) {
+    line.due(cycle);
+    commands.due(cycle);
+  },
+};
+
+function say(answer) {
+  process.stdout.write(JSON.stringify(answer) + '\n');
+}
+
+for (const command of options.do) {
+  const answer = commands.carryOut(command);
+  if (answer.error) {
+    process.stderr.write(`simboard: ${command}: ${answer.error}\n`);
+    process.exit(2);
+  }
+}
+say({ ok: true, port: options.port, board: 'pico6' });
+if (options.stdin) {
+  const lines = readline.createInterface({ input: process.stdin });
+  lines.on('line', (text) => say(commands.carryOut(text)));
+  lines.on('close', end);
+}
+
+function end() {
+  pins.flush();
+  process.exit(0);
+}
+
+// ---- free time: it follows the clock, or the host
+
+let port = null;
+let spoken = 0; // cycle at which the host last said something
+let from = { cycle: chip.cycle, time: process.hrtime.bigint() };
+
+/** Cycles that may have passed by now. */
+function allowed() {
+  const seconds = Number(process.hrtime.bigint() - from.time) / 1e9;
+  return from.cycle + seconds * (pace.speed || 1) * CLOCK_HZ;
+}
+
+function free() {
+  return pace.speed === 0 && chip.cycle < spoken + pace.ahead * CLOCK_HZ;
+}
+
+function turn() {
+  const until = process.hrtime.bigint() + 2_000_000n; // then the host gets a look
+  while (process.hrtime.bigint() < until && (free() || chip.cycle < allowed())) {
+    chip.runUntil(chip.cycle + SLICE);
+    if (heard.length) {
+      port.write(Buffer.from(heard.splice(0)));
+    }
+  }
+  if (free() || allowed() - chip.cycle > 0.05 * CLOCK_HZ) {
+    from = { cycle: chip.cycle, time: process.hrtime.bigint() }; // a busy machine lets time slip
+  }
+  if (free() || chip.cycle < allowed()) {
+    setImmediate(turn);
+  } else {
+    setTimeout(turn, 1);
+  }
+}
+
+if (!stepped) {
+  port = new net.Socket({ fd: 3, readable: true, writable: true });
+  port.on('data', (data) => {
+    line.write(data);
+    spoken = chip.cycle;
+  });
+  port.on('error', end);
+  port.on('close', end);
+  turn();
+}

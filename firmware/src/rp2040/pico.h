@@ -1,0 +1,23 @@
+// The parts of the chip, and the main loop's way to them.
+#pragma once
+#include "../board.h"
+#include "rp2040.h"
+
+extern volatile bool awake;  // an interrupt has left something for the main loop
+
+void stepper_setup(void);
+
+void serial_setup(void);
+bool serial_get(uint8_t *byte);
+void serial_pump(void);  // bytes to send, as the line takes them
+
+void servo_setup(void);
+void servo_frame(void);  // every 20 ms
+
+void pins_setup(void);
+void pin_function(uint8_t pin, uint8_t function, uint8_t pad);
+
+void clocks_setup(void);
+void watchdog_start(void);
+void watchdog_feed(void);
+uint8_t reset_cause(void);  // in MCUSR's bits

@@ -1,0 +1,87 @@
+// The serial line: UART 0 on GP0 and GP1.
+#ifdef __arm__
+#include "../core/hal.h"
+#include "pico.h"
+
+#ifndef BAUD
+#define BAUD 250000UL
+#endif
+
+enum { RING = HAL_RECEIVE + 1, MASK = RING - 1, SENDING = 1024, SENDING_MASK = SENDING - 1 };
+_Static_assert((RING & MASK) == 0, "powers of two");
+
+enum { RX_EMPTY = 1 << 4, TX_FULL = 1 << 5 };              // FR
+enum { RECEIVED = 1 << 4, TIMED_OUT = 1 << 6 };            // IMSC: four bytes wait, or fewer and nothing follows
+enum { OVERRUN = 1 << 11 };                                // DR
+
+static uint8_t received[RING], sending[SENDING];
+static volatile bool spilled;
+static volatile uint16_t received_head, received_tail;
+static uint16_t sending_head, sending_tail;
+
+void uart_interrupt(void) {
+    while (!(REG(UART_FR) & RX_EMPTY)) {
+        const uint32_t data = REG(UART_DR);
+        const uint16_t next = (received_head + 1) & MASK;
+        if (next == received_tail || data & OVERRUN) {
+            spilled = true;
+        }
+        if (next != received_tail) {
+            received[received_head] = data;
+            received_head = next;
+        }
+    }
+    REG(UART_ICR) = RECEIVED | TIMED_OUT;
+    awake = true;
+}
+
+bool serial_get(uint8_t *byte) {
+    const uint16_t tail = received_tail;
+    if (tail == received_head) {
+        return false;
+    }
+    *byte = received[tail];
+    received_tail = (tail + 1) & MASK;
+    return true;
+}
+
+bool hal_spilled(void) {
+    const bool since = spilled;
+    if (since) {
+        spilled = false;
+    }
+    return since;
+}
+
+uint8_t hal_send_room(void) {
+    const uint16_t room = SENDING_MASK - ((sending_head - sending_tail) & SENDING_MASK);
+    return room < 255 ? room : 255;
+}
+
+void hal_send(uint8_t byte) {
+    sending[sending_head] = byte;
+    sending_head = (sending_head + 1) & SENDING_MASK;
+}
+
+// The UART keeps 32 bytes: 1.3 ms at 250000 baud, and the main loop turns once a millisecond.
+void serial_pump(void) {
+    while (sending_tail != sending_head && !(REG(UART_FR) & TX_FULL)) {
+        REG(UART_DR) = sending[sending_tail];
+        sending_tail = (sending_tail + 1) & SENDING_MASK;
+    }
+}
+
+void serial_setup(void) {
+    enum { EIGHT_BITS = 3 << 5, FIFOS = 1 << 4, ON = 1, TRANSMIT = 1 << 8, RECEIVE_ON = 1 << 9 };
+    const uint32_t divider = (SYSTEM_MHZ * 1000000UL * 4 + BAUD / 2) / BAUD;  // 1/64 (DS 4.2.7.1); exact for 250000
+    REG(UART_IBRD) = divider >> 6;
+    REG(UART_FBRD) = divider & 63;
+    REG(UART_LCR_H) = EIGHT_BITS | FIFOS;
+    REG(UART_IFLS) = 0;  // 4 bytes
+    REG(UART_CR) = ON | TRANSMIT | RECEIVE_ON;
+    REG(UART_IMSC) = RECEIVED | TIMED_OUT;
+    pin_function(UART_TX_PIN, F_UART, PAD_4MA);
+    pin_function(UART_RX_PIN, F_UART, PAD_INPUT | PAD_UP | PAD_SCHMITT);
+    irq_enable(IRQ_UART0, 1);
+}
+#endif
