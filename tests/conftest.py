@@ -16,7 +16,8 @@ if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
 
 # Helpers that compile the firmware, or run it in the emulator.
 _HELPERS = {"emulator", "measure", "bare_host"}
-_NO_COMPILER = "needs avr-gcc and simavr: install the packages of the README's apt-get line"
+_TOOLS = ("avr-gcc", "arm-none-eabi-gcc", "npm")
+_NO_COMPILER = "needs avr-gcc, simavr, arm-none-eabi-gcc and npm: install the packages of the README's apt-get line"
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.emulator)
         # One worker has them all: they keep real time, and share what is compiled.
         item.add_marker(pytest.mark.xdist_group("emulator"))
-        if shutil.which("avr-gcc") is None:
+        if any(shutil.which(tool) is None for tool in _TOOLS):
             item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
 
 

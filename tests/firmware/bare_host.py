@@ -17,10 +17,10 @@ from armkin.board.firmware.protocol import HALF, STEP, Ack, GuardImage, Info, Se
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)
 CREDIT = 0x83  # an ACK that comes unasked
-AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6}
-SWITCHES = {"uno_cnc_shield": 3, "mega_ramps14": 6, "uno_servos": 0}
-RECEIVE = {"uno_cnc_shield": 127, "mega_ramps14": 255, "uno_servos": 127}
-STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0}
+AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6, "pico6": 8}
+SWITCHES = {"uno_cnc_shield": 3, "mega_ramps14": 6, "uno_servos": 0, "pico6": 6}
+RECEIVE = {"uno_cnc_shield": 127, "mega_ramps14": 255, "uno_servos": 127, "pico6": 2047}
+STEPPERS = {"uno_cnc_shield": 4, "mega_ramps14": 5, "uno_servos": 0, "pico6": 6}
 WIDE = protocol.AxisImage(True, False, -(1 << 30), 1 << 30, 0, 40_000, 400_000)
 SERVO = protocol.AxisImage(True, False, 500, 2500, 1500, 2000, 40_000)
 

@@ -18,6 +18,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -32,6 +33,8 @@ from numpy.typing import NDArray
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 BUILD = FIRMWARE / "build"
 CLOCK_HZ = 16_000_000
+PICO = "pico6"  # its emulator is another one: firmware/sim/rp2040
+CYCLES_HZ = {PICO: 125_000_000}  # of the emulator's cycles, where they are not CLOCK_HZ
 MCU = {"uno_cnc_shield": "atmega328p", "uno_servos": "atmega328p", "mega_ramps14": "atmega2560"}
 
 
@@ -49,14 +52,19 @@ def make(*arguments: str) -> None:
         raise BoardError(f"make {' '.join(arguments)}:\n{done.stdout}{done.stderr}")
 
 
-def build_simulator() -> Path:
+def build_simulator(board: str = "uno_cnc_shield") -> list[str]:
+    """The command that starts the emulator of a board."""
+    if board == PICO:
+        make("-C", str(FIRMWARE / "sim" / "rp2040"))
+        return [sys.executable, str(FIRMWARE / "sim" / "rp2040" / "simboard.py")]
     make("-C", str(FIRMWARE / "sim"))
-    return BUILD / "simboard"
+    return [str(BUILD / "simboard")]
 
 
 def build_firmware(board: str) -> Path:
+    """The program as its emulator takes it: an ELF, or a UF2 file."""
     make("-C", str(FIRMWARE), f"BOARD={board}")
-    return BUILD / f"{board}.elf"
+    return BUILD / f"{board}.{'uf2' if board == PICO else 'elf'}"
 
 
 def compile_program(source: Path, board: str, into: Path, *options: str) -> Path:
@@ -150,6 +158,7 @@ class EmulatedBoard:
         seed: int = 1,
     ) -> None:
         self.board = board
+        self.clock_hz = CYCLES_HZ.get(board, CLOCK_HZ)
         self.port = ""
         self._elf = elf
         self._options = ["--speed", str(speed), "--ahead", str(ahead_ms)]
@@ -168,10 +177,10 @@ class EmulatedBoard:
         self._unread = b""
 
     def __enter__(self) -> EmulatedBoard:
-        simulator = build_simulator()
+        simulator = build_simulator(self.board)
         elf = self._elf or build_firmware(self.board)
         self._folder = Path(tempfile.mkdtemp(prefix="armkin-board-"))
-        command = [str(simulator), "--board", self.board, "--elf", str(elf), "--stdin", *self._options]
+        command = [*simulator, "--board", self.board, "--elf", str(elf), "--stdin", *self._options]
         command += ["--link", str(self._folder / "port")]
         if self._traced:
             command += ["--trace", str(self._folder / "trace")]
@@ -249,7 +258,7 @@ class EmulatedBoard:
 
         An opening of the port, and the reset that goes with it, come before this time.
         """
-        end = self.control("cycles")["cycle"] + seconds * CLOCK_HZ
+        end = self.control("cycles")["cycle"] + seconds * self.clock_hz
         while self.control("cycles")["cycle"] < end:
             time.sleep(0.001)
 
@@ -266,7 +275,7 @@ class EmulatedBoard:
         Returns early when the board sends the byte `until`. `data` goes out at the line's rate, so that a
         long one may still be under way afterwards.
         """
-        command = f"run {round(seconds * CLOCK_HZ)}"
+        command = f"run {round(seconds * self.clock_hz)}"
         if until:
             command += f" until {until.hex()}"
         if data:

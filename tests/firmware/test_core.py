@@ -39,7 +39,7 @@ def test_flash_says_which_port_is_missing() -> None:
 def test_an_unknown_board_is_refused_by_name() -> None:
     done = subprocess.run(["make", "-C", str(FIRMWARE), "BOARD=uno"], capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "BOARD is one of: uno_cnc_shield mega_ramps14 uno_servos" in done.stderr
+    assert "BOARD is one of: uno_cnc_shield mega_ramps14 uno_servos pico6" in done.stderr
 
 
 def build_like_the_ide(folder: Path, mcu: str, variant: str, name: str) -> Path:

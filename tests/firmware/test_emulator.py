@@ -472,7 +472,7 @@ def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
     folder = Path(tempfile.mkdtemp(prefix="armkin-"))  # socket paths must be short
     link, control, figures = folder / "board", folder / "control", tmp_path / "figures.json"
     link.symlink_to("/nowhere")  # left by an emulator that was killed
-    command = [str(build_simulator()), "--board", "uno_cnc_shield", "--elf", str(probe)]
+    command = [*build_simulator(), "--board", "uno_cnc_shield", "--elf", str(probe)]
     command += ["--link", str(link), "--control", str(control), "--stats", str(figures), "--do", "pin A0 0"]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
     with process:

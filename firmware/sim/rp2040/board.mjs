@@ -1,5 +1,5 @@
 // simboard for the Pico: what firmware/sim is for the AVR boards, with the same options, commands and answers (firmware/sim/README.md).
-// Started by simboard.py, which holds the pseudo-terminal; the port's bytes go through descriptor 3.
+// Started by simboard.py, which holds the pseudo-terminal; the port's bytes go through the descriptor --fd.
 import fs from 'node:fs';
 import net from 'node:net';
 import readline from 'node:readline';
@@ -16,7 +16,7 @@ const { values: options } = parseArgs({
     board: { type: 'string' }, elf: { type: 'string' }, port: { type: 'string', default: '' }, stdin: { type: 'boolean' },
     speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, 'no-reset-on-open': { type: 'boolean' },
     driver: { type: 'string', default: 'a4988' }, do: { type: 'string', multiple: true, default: [] }, baud: { type: 'string', default: '250000' },
-    trace: { type: 'string' }, seed: { type: 'string', default: '1' }, bootloader: { type: 'string' },
+    trace: { type: 'string' }, seed: { type: 'string', default: '1' }, fd: { type: 'string' },
   },
 });
 
@@ -110,7 +110,7 @@ function turn() {
 }
 
 if (!stepped) {
-  port = new net.Socket({ fd: 3, readable: true, writable: true });
+  port = new net.Socket({ fd: Number(options.fd), readable: true, writable: true });
   port.on('data', (data) => {
     line.write(data);
     spoken = chip.cycle;

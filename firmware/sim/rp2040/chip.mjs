@@ -208,6 +208,9 @@ export class Chip {
     }
     while (this.cycle < end && !this.pendingReset) {
       let alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
+      if (core.waiting && core.pendingInterrupts & core.enabledInterrupts) {
+        core.waiting = false; // an interrupt that was pending before WFI ends it at once, which rp2040js misses
+      }
       if (core.waiting) {
         const next = Math.min(end, Math.ceil(alarm), this.pioNext);
         this.cycle = Math.max(next, this.cycle + 1);

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tty
+from contextlib import suppress
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -38,29 +39,29 @@ def main(arguments: list[str]) -> int:
 
 def _serve(master: int, ours: socket.socket, theirs: socket.socket, command: list[str]) -> int:
     os.set_blocking(master, False)
-    descriptor = theirs.fileno()
-
-    def as_three() -> None:
-        os.dup2(descriptor, 3)
-
-    with subprocess.Popen(command, pass_fds=(3,) if descriptor == 3 else (3, descriptor), preexec_fn=as_three) as board:
+    pipe = theirs.fileno()
+    with subprocess.Popen([*command, "--fd", str(pipe)], pass_fds=(pipe,)) as board:
         theirs.close()
         try:
-            while True:
-                ready, _, _ = select.select([master, ours], [], [])
-                if master in ready and (data := _read(master)):
-                    ours.sendall(data)
-                if ours in ready:
-                    data = ours.recv(1 << 16)
-                    if not data:
-                        break
-                    try:
-                        os.write(master, data)
-                    except BlockingIOError:
-                        pass  # nobody reads: it is gone
+            while _carry(master, ours):
+                pass
         except KeyboardInterrupt:
             board.terminate()
         return board.wait()
+
+
+def _carry(master: int, ours: socket.socket) -> bool:
+    """Waits for bytes and hands them on; False: the emulator has ended."""
+    ready, _, _ = select.select([master, ours], [], [])
+    if master in ready and (data := _read(master)):
+        ours.sendall(data)
+    if ours in ready:
+        data = ours.recv(1 << 16)
+        if not data:
+            return False
+        with suppress(BlockingIOError):  # nobody reads: it is gone
+            os.write(master, data)
+    return True
 
 
 def _read(master: int) -> bytes:

@@ -20,7 +20,7 @@ Triple = tuple[float, float, float]
 Convention = Literal["standard", "modified", "screws"]
 JointType = Literal["revolute", "prismatic"]
 Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_roll", "xyz_axis", "pose"]
-BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "grbl", "feetech"]
+BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "pico6", "grbl", "feetech"]
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 
 # Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
@@ -216,9 +216,9 @@ class Board(_Model):
     abort: Literal["open", "closed"] | None = Field(
         None, description="The abort input when it is not pressed: open (default), or closed to ground."
     )
-    power: Literal["A1", "A4"] | None = Field(
+    power: Literal["A1", "A4", "GP27"] | None = Field(
         None,
-        description="Input that is high while the motors have power (Uno A1, RAMPS A4): a cut is noticed.",
+        description="Input that is high while the motors have power (Uno A1, RAMPS A4, Pico GP27): a cut is noticed.",
     )
 
 
