@@ -183,8 +183,7 @@ def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
         page.evaluate("document.activeElement.blur(); document.querySelector('#panels').scrollTop = 0")
         page.mouse.move(5, 500)
         page.wait_for_timeout(500)
-        until(page, "!document.querySelector('#canvas').dataset.coarse")
-        page.wait_for_timeout(500)
+        until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
         page.screenshot(path=now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
         picture.write_bytes(now.read_bytes())

@@ -25,3 +25,12 @@ def test_every_vendored_byte_is_the_package_s() -> None:
 def test_the_version_is_the_one_that_is_named() -> None:
     assert f'"{VERSION.split(".")[1]}"' in (VENDOR / "three.core.min.js").read_text()  # three's REVISION
     assert "The MIT License" in (VENDOR / "LICENSE").read_text()
+
+
+def test_every_module_is_asked_for_at_once() -> None:
+    """A module that is found only by reading another one costs a request's time."""
+    page = (STATIC / "index.html").read_text()
+    for path in sorted(STATIC.rglob("*.js")):
+        name = "/" + path.relative_to(STATIC).as_posix()
+        if path.stem not in ("main", "types"):  # main is the script itself, types are for the editor
+            assert f'rel="modulepreload" nonce="{{{{nonce}}}}" href="{name}"' in page

@@ -9,7 +9,6 @@ from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import guard
 from armkin.teach.guard import RefusedError
-from armkin.teach.look import Question, look
 from armkin.teach.rehearsal import Rehearsal
 from armkin.teach.scene import first_lock, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
@@ -62,6 +61,8 @@ class Desk:
 
     def warm(self) -> None:
         """Have the first page's answer ready, while its browser still loads the files."""
+        from armkin.teach.look import Question, look
+
         with self._solving:
             if not self._shown:
                 held = first_lock(self.arm)
@@ -81,6 +82,8 @@ class Desk:
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a pose or a target is, with all branches; the other pages see it, too."""
+        from armkin.teach.look import Question, look  # the solver: imported while the browser loads the page
+
         arm = self.arm
         q = units.joints_in(arm, guard.numbers(fields, "q", arm.n))
         held = fields.get("held", [])

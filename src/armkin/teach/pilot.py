@@ -87,8 +87,8 @@ class Pilot:
 
     @property
     def doing(self) -> str:
-        """Name of the job that is carried out; empty if there is none."""
-        return self._doing
+        """Name of the job that is carried out; empty if there is none and the pages know how the last one ended."""
+        return self._doing or str(self._told.get("doing", ""))
 
     @property
     def stopping(self) -> bool:
@@ -178,8 +178,8 @@ class Pilot:
             except LinkError as error:
                 self._error = error.message
                 self._disconnect()
-        self._stop.clear()
         self._publish()
+        self._stop.clear()
 
     def _stopped(self, error: StoppedError) -> None:
         if isinstance(self.machine, Machine) and error.status is not None:

@@ -17,7 +17,6 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.teach import guard
-from armkin.teach.look import target_out
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -184,6 +183,8 @@ class Program:
         raise UsageError(f"kind: '{kind}' is none of joint, line, arc, wait, grip")
 
     def _target(self, values: Sequence[float]) -> list[float]:
+        from armkin.teach.look import target_out
+
         q = units.joints_in(self.arm, values)
         task = task_for(self.arm, self.head.get("task"))
         return _rounded(target_out(task, targets_of(task, fk(self.arm, q)[None], q[None])[0]))

@@ -1,9 +1,10 @@
 // @ts-check
 /** An arm as solid bodies: tubes along its skeleton, drums around its joints, rails for its slides. */
 import {
-  BoxGeometry, CapsuleGeometry, CylinderGeometry, Group, Matrix4, Mesh, Quaternion, SphereGeometry, Vector3,
+  BoxGeometry, BufferGeometry, CapsuleGeometry, CylinderGeometry, Float32BufferAttribute, Group, Matrix4, Mesh, Quaternion,
+  SphereGeometry, Vector3,
 } from "three";
-import { frames, same } from "./chain.js";
+import { frames } from "./chain.js";
 
 /** @typedef {import("./types.js").Arm} Arm */
 /** @typedef {{geometry: import("three").BufferGeometry, drum: boolean}} Part */
@@ -92,26 +93,47 @@ function along(/** @type {any} */ geometry, /** @type {Vector3} */ middle, /** @
   return geometry;
 }
 
-/** One arm in the scene: the solid one, or a ghost. */
+/**
+ * Parts as one geometry: one draw call. Where a computer draws in software, calls are what a picture costs.
+ * @param {Part[]} parts
+ */
+export function merged(parts) {
+  /** @type {number[]} */
+  const position = [];
+  /** @type {number[]} */
+  const normal = [];
+  /** @type {number[]} */
+  const index = [];
+  for (const { geometry } of parts) {
+    const first = position.length / 3;
+    position.push(...geometry.attributes.position.array);
+    normal.push(...geometry.attributes.normal.array);
+    for (const k of geometry.index?.array ?? []) index.push(first + k);
+  }
+  const whole = new BufferGeometry();
+  whole.setAttribute("position", new Float32BufferAttribute(position, 3));
+  whole.setAttribute("normal", new Float32BufferAttribute(normal, 3));
+  whole.setIndex(index);
+  return whole;
+}
+
+/** An arm in the scene: the solid one, or its shadow. */
 export class Figure {
   /**
    * @param {Shapes} shapes
    * @param {import("three").Material} tube
    * @param {import("three").Material} drum
-   * @param {boolean} shadows
    */
-  constructor(shapes, tube, drum, shadows) {
+  constructor(shapes, tube, drum) {
     this.shapes = shapes;
     this.group = new Group();
     /** @param {Part[]} parts */
     const body = (parts) => {
       const group = new Group();
       group.matrixAutoUpdate = false;
-      for (const part of parts) {
-        const mesh = new Mesh(part.geometry, part.drum ? drum : tube);
-        mesh.castShadow = shadows;
-        mesh.receiveShadow = shadows;
-        group.add(mesh);
+      for (const material of new Set([tube, drum])) {
+        const of = parts.filter((part) => (part.drum ? drum : tube) === material);
+        if (of.length) group.add(new Mesh(merged(of), material));
       }
       this.group.add(group);
       return group;
@@ -122,28 +144,19 @@ export class Figure {
     this.at = [];
   }
 
-  /**
-   * Take a pose; what coincides with `solid` is hidden.
-   * @param {number[]} q
-   * @param {Figure} [solid]
-   */
-  pose(q, solid) {
+  /** Take a pose. @param {number[]} q */
+  pose(q) {
     const { before, after, tool } = frames(this.shapes.arm, q);
     this.at = after;
     this.tool = tool;
-    const put = (/** @type {Group} */ group, /** @type {number[]} */ T) => {
+    const put = (/** @type {Group | null} */ group, /** @type {number[]} */ T) => {
+      if (!group) return;
       group.matrix.fromArray(T).transpose();
       group.matrixWorldNeedsUpdate = true;
     };
     after.forEach((T, i) => {
       put(this.bodies[i + 1], T);
-      this.bodies[i + 1].visible = !solid || !same(T, solid.at[i], this.shapes.arm.reach);
-      const rail = this.rails[i];
-      if (rail) {
-        put(rail, before[i]);
-        rail.visible = !solid;
-      }
+      put(this.rails[i], before[i]);
     });
-    if (solid) this.bodies[0].visible = false;
   }
 }

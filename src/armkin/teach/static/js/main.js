@@ -13,6 +13,8 @@ import { Tip } from "./tip.js";
 
 const NUDGE = 5; // [mm] of an arrow key
 
+const drawing = import("./view.js"); // while the server is asked for the arm
+
 class Page {
   /** @param {import("./types.js").Arm} arm @param {Look} look */
   constructor(arm, look) {
@@ -151,7 +153,7 @@ class Page {
   /** Draw in 3-D, where the browser can. */
   async draw() {
     const canvas = /** @type {HTMLCanvasElement} */ (get("canvas"));
-    const { View } = await import("./view.js");
+    const { View } = await drawing;
     try {
       this.view = new View(canvas, this.arm);
     } catch {

@@ -1,18 +1,26 @@
 // @ts-check
 /** The 3-D view: drawn when something has changed, never in a loop. */
 import {
-  AmbientLight, AxesHelper, Box3, BufferGeometry, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper,
-  HemisphereLight, Line, LineBasicMaterial, Mesh, MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry,
-  Scene, ShadowMaterial, Vector3, WebGLRenderer,
+  AmbientLight, AxesHelper, Box3, BufferGeometry, CustomBlending, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper,
+  HemisphereLight, Line, LineBasicMaterial, MeshBasicMaterial, MeshLambertMaterial, NotEqualStencilFunc, OneFactor,
+  PerspectiveCamera, ReplaceStencilOp, Scene, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
+import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
-const FINE = Math.min(devicePixelRatio, 2);
-const SLOW = 60; // [ms] between two pictures of something that moves
+const SUN = [1.2, -1.6, 3]; // where the light comes from
+
+// Points of the picture for one of the window's. Edges are smooth because there are more of them, at rest; the
+// browser's own smoothing would cost as much in every picture of a moving arm.
+const FINE = Math.max(devicePixelRatio, 2);
+const COARSE = 1;
+const SLOW = 50; // [ms] between two pictures of something that moves
+const REST = 300; // [ms] without a new picture until it is drawn finely
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // drawing without a graphics card
 
 export class View {
   /**
@@ -22,28 +30,26 @@ export class View {
   constructor(canvas, arm) {
     this.canvas = canvas;
     this.arm = arm;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.renderer.setPixelRatio(FINE);
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, stencil: true });
+    this.renderer.setPixelRatio(COARSE);
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(36, 1, arm.reach / 100, arm.reach * 30);
     this.camera.up.set(0, 0, 1);
     this.waiting = false;
     this.last = 0; // [ms] when it was drawn
-    this.slow = 0; // pictures in a row that came late
-    this.coarse = false;
+    this.late = 0; // pictures in a row that came late
+    this.slow = this.software(); // what moves is drawn coarsely
+    this.coarse = true;
+    canvas.dataset.coarse = "true";
     this.resting = 0;
     /** @type {Line | null} */
     this.way = null;
     this.shapes = new Shapes(arm);
-    this.tube = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.05 });
-    this.drum = new MeshStandardMaterial({ roughness: 0.5, metalness: 0.1 });
-    this.solid = new Figure(this.shapes, this.tube, this.drum, true);
-    this.scene.add(this.solid.group);
-    /** @type {Map<string, Figure>} colour and faintness -> spare ghosts */
-    this.ghosts = new Map();
-    this.shown = /** @type {Figure[]} */ ([]);
+    this.tube = new MeshLambertMaterial();
+    this.drum = new MeshLambertMaterial();
+    this.solid = new Figure(this.shapes, this.tube, this.drum);
+    this.ghosts = new Ghosts(this.shapes);
+    this.scene.add(this.solid.group, this.ghosts.group);
     this.lights();
     this.floor();
     const length = 0.14 * arm.reach;
@@ -62,17 +68,20 @@ export class View {
     new ResizeObserver(() => this.size()).observe(canvas);
   }
 
+  /** Whether the processor draws. */
+  software() {
+    const gl = this.renderer.getContext();
+    const names = gl.getExtension("WEBGL_debug_renderer_info");
+    return SOFTWARE.test(String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
+  }
+
   lights() {
-    const r = this.arm.reach;
     const sun = new DirectionalLight(0xffffff, 2.4);
-    sun.position.set(1.2 * r, -1.6 * r, 3 * r);
-    sun.castShadow = true;
-    sun.shadow.mapSize.set(1024, 1024);
-    sun.shadow.normalBias = 0.006 * r; // two texels: a tube does not shade itself in stripes
-    Object.assign(sun.shadow.camera, { left: -1.5 * r, right: 1.5 * r, top: 1.5 * r, bottom: -1.5 * r, far: 8 * r });
+    sun.position.set(SUN[0], SUN[1], SUN[2]);
     this.scene.add(sun, new HemisphereLight(0xffffff, 0x8090a0, 1.3), new AmbientLight(0xffffff, 0.25));
   }
 
+  /** A grid, and the arm's shadow on it: the arm itself, flattened along the light. */
   floor() {
     const r = this.arm.reach;
     const step = 10 ** Math.floor(Math.log10(r / 2));
@@ -81,10 +90,19 @@ export class View {
     this.grid = new GridHelper(2 * half, (2 * half) / step);
     this.grid.rotateX(Math.PI / 2);
     this.grid.position.z = z - 0.001 * r;
-    const shade = new Mesh(new PlaneGeometry(4 * r, 4 * r), new ShadowMaterial({ opacity: 0.22, side: DoubleSide }));
-    shade.position.z = z - 0.002 * r;
-    shade.receiveShadow = true;
-    this.scene.add(this.grid, shade);
+    // The stencil lets every point be darkened once, however many bodies lie above it.
+    const shade = new MeshBasicMaterial({
+      color: 0x000000, opacity: 0.2, side: DoubleSide, depthWrite: false,
+      blending: CustomBlending, blendSrcAlpha: OneFactor, // not "transparent", to be drawn first: nothing is under it
+      stencilWrite: true, stencilRef: 1, stencilFunc: NotEqualStencilFunc, stencilZPass: ReplaceStencilOp,
+    });
+    this.shadow = new Figure(this.shapes, shade, shade);
+    const [x, y] = [SUN[0] / SUN[2], SUN[1] / SUN[2]];
+    const ground = z - 0.002 * r;
+    this.shadow.group.matrixAutoUpdate = false;
+    this.shadow.group.traverse((one) => (one.renderOrder = -1));
+    this.shadow.group.matrix.set(1, 0, -x, x * ground, 0, 1, -y, y * ground, 0, 0, 0, ground, 0, 0, 0, 1);
+    this.scene.add(this.grid, this.shadow.group);
     this.step = step;
   }
 
@@ -95,7 +113,7 @@ export class View {
     this.drum.color.set(dark ? 0x4d9de0 : 0x0072b2);
     const lines = /** @type {any} */ (this.grid).material;
     lines.vertexColors = false;
-    lines.color.set(dark ? 0x38424d : 0xcfd6dd);
+    lines.color.set(dark ? 0x4a5663 : 0xb4bec8);
     lines.needsUpdate = true;
     this.draw();
   }
@@ -108,7 +126,7 @@ export class View {
     const [x, y, z] = /** @type {Object<string, number[]>} */ (EYES)[name];
     this.scene.updateMatrixWorld();
     const box = new Box3().setFromObject(this.solid.group);
-    for (const ghost of this.shown) box.expandByObject(ghost.group);
+    for (const body of this.ghosts.bodies.flat()) if (body.visible) box.expandByObject(body);
     const size = Math.max(0.9 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
@@ -120,45 +138,16 @@ export class View {
   /** @param {number[]} q */
   pose(q) {
     this.solid.pose(q);
+    this.shadow?.pose(q);
     if (this.solid.tool) this.tool.matrix.fromArray(this.solid.tool).transpose();
     this.tool.matrixWorldNeedsUpdate = true;
     this.draw();
   }
 
-  /**
-   * Show ghosts instead of those shown.
-   * @param {{joints: number[], colour: string, faint: boolean}[]} wanted
-   */
+  /** Show ghosts instead of those shown. @param {import("./ghosts.js").Ghost[]} wanted */
   haunt(wanted) {
-    for (const ghost of this.shown) ghost.group.visible = false;
-    this.shown = wanted.map(({ joints, colour, faint }) => {
-      const ghost = this.ghost(`${colour}${faint ? " faint" : ""}`, colour, faint);
-      ghost.group.visible = true;
-      ghost.pose(joints, this.solid);
-      return ghost;
-    });
+    this.ghosts.show(wanted, this.solid);
     this.draw();
-  }
-
-  /** @param {string} name @param {string} colour @param {boolean} faint */
-  ghost(name, colour, faint) {
-    let spare = this.ghosts.get(name);
-    while (spare && this.shownNow(spare)) spare = this.ghosts.get((name += "'"));
-    if (!spare) {
-      const skin = new MeshStandardMaterial({
-        color: colour, transparent: true, opacity: faint ? 0.13 : 0.36, depthWrite: false, roughness: 0.8,
-        polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2, // behind what it coincides with
-      });
-      spare = new Figure(this.shapes, skin, skin, false);
-      this.ghosts.set(name, spare);
-      this.scene.add(spare.group);
-    }
-    return spare;
-  }
-
-  /** @param {Figure} ghost */
-  shownNow(ghost) {
-    return ghost.group.visible;
   }
 
   /** Draw the tip's way through a program. @param {number[][]} tips */
@@ -191,20 +180,25 @@ export class View {
     const now = performance.now();
     const gap = now - this.last;
     this.last = now;
-    this.slow = gap < 400 && gap > SLOW ? this.slow + 1 : 0;
-    if (this.slow >= 3 && !this.coarse) {
-      this.coarse = true;
-      this.renderer.setPixelRatio(FINE / 2);
-      this.canvas.dataset.coarse = "yes";
-    }
-    if (!this.coarse) return;
+    this.late = gap < 400 && gap > SLOW ? this.late + 1 : 0;
+    if (this.late >= 3) this.slow = true;
+    if (this.slow) this.fine(false);
     clearTimeout(this.resting);
-    this.resting = setTimeout(() => {
-      this.coarse = false;
-      this.renderer.setPixelRatio(FINE);
-      delete this.canvas.dataset.coarse;
-      this.draw();
-    }, 400);
+    if (this.coarse) this.resting = setTimeout(() => this.rest(), REST);
+  }
+
+  /** Nothing moves any more. */
+  rest() {
+    this.fine(true);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /** @param {boolean} yes */
+  fine(yes) {
+    if (this.coarse === !yes) return;
+    this.coarse = !yes;
+    this.renderer.setPixelRatio(yes ? FINE : COARSE);
+    this.canvas.dataset.coarse = String(!yes);
   }
 
   /** Draw at the next opportunity. */
