@@ -6,11 +6,13 @@
     ├── UsageError         an argument that does not fit the arm or the command
     │   └── PathFileError  a path file that is not valid
     │   ├── RedundantArmError   more joints than the task has constraints
-    │   └── NoHomingError       joints without a limit switch
+    │   ├── NoHomingError       joints without a limit switch
+    │   └── NothingHeldError    there is no motion to go on with, or another one
     ├── NoSolutionError    no pose reaches the target, or none within the limits
     │   └── NoBranchError       branches reach the target, and none that may be taken
     ├── MissingExtraError  an optional package is not installed
     └── LinkError          the port, or the board behind it
+        ├── HeldError           a motion was held on its way, and the position is known
         ├── PortInUseError      another armkin has the port
         ├── PositionLostError   nobody knows where the arm stands
         ├── HomingIncompleteError  some joints were homed, others are still lost
@@ -87,6 +89,10 @@ class PathFileError(UsageError):
     """A path file is not valid; the message begins with ``file:line:`` where a line is known."""
 
 
+class NothingHeldError(UsageError):
+    """There is no motion to go on with, or it is another one than is asked for."""
+
+
 class NoSolutionError(ArmkinError):
     """No pose reaches the target, or none does so within the limits."""
 
@@ -104,6 +110,10 @@ class MissingExtraError(ArmkinError):
 
 class LinkError(ArmkinError):
     """The port, or the board behind it, does not answer as it must."""
+
+
+class HeldError(LinkError):
+    """The board has held a motion on its way, and knows where the arm stands; fields: joints."""
 
 
 class PortInUseError(LinkError):

@@ -47,10 +47,10 @@ def check_gripper(plan: PathPlan, board: Configuration | Foreign) -> None:
         gripping.count_of(gripping.gripper_of(plan.arm.name, board), marker.value)
 
 
-def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: Progress) -> None:
-    """Carry out a plan's parts, and what the gripper does between them."""
+def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: Progress, first: int = 0) -> None:
+    """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them."""
     done, total = 0.0, sum(one.duration for one in laid)
-    for k, one in enumerate(laid):
+    for k, one in enumerate(laid, first):
         if one.trajectory.stretches:
             begun = done
             machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]

@@ -13,9 +13,11 @@ from armkin.errors import (
     ArmkinError,
     GripperKnownError,
     GripperLostError,
+    HeldError,
     HomingIncompleteError,
     NoBranchError,
     NoHomingError,
+    NothingHeldError,
     PortInUseError,
     PositionKnownError,
     PositionLostError,
@@ -84,6 +86,12 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     ),
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
     PositionLostError: _lost,
+    HeldError: lambda error: (
+        "the same command with --resume goes on, any other starts there"
+        if error.fields.get("resumable")
+        else "the next command starts there"
+    ),
+    NothingHeldError: lambda error: "give the same arguments again, or leave --resume out",
     PositionKnownError: lambda error: "leave --assume-home (--assume) out",
     GripperLostError: lambda error: "add --assume open (or closed, or a value)",
     GripperKnownError: lambda error: "leave --assume out",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,10 +13,11 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend
+    from armkin.board.backend import Backend, Planned, Progress
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
     from armkin.board.foreign import Foreign
+    from armkin.board.resuming import Note
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -43,6 +44,10 @@ NoReset = Annotated[
         help="Leave DTR low while the port is opened, so that an Uno is not reset: Windows and rfc2217://. "
         "Linux and macOS reset it with the first opening after plugging in, and never again.",
     ),
+]
+Resume = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on with a motion that was held on its way: with the same arguments again."),
 ]
 Assume = Annotated[
     str | None,
@@ -110,8 +115,43 @@ def backend(
         try:
             yield one
         except StoppedError:
-            output.warn(f"stopped: {one.standing()}")
+            output.warn(f"stopped: {one.standing()}{_goes_on(one)}")
             raise
+
+
+def _goes_on(machine: Backend) -> str:
+    return "; --resume goes on with this motion" if getattr(machine, "resumable", False) else ""
+
+
+def can_resume(others: Mapping[str, object]) -> None:
+    """Raise UsageError for what makes no sense beside --resume: option -> whether it is given."""
+    for option, given in others.items():
+        if given:
+            raise UsageError(f"--resume and {option}: a motion that was held goes on from where the arm stands")
+
+
+@contextmanager
+def told(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
+    """A bar for the plans' time on a terminal, and the note of a motion under way."""
+    with output.progress("ms of motion", round(1000 * sum(plan.duration for plan in plans))) as tick:
+
+        def tell(done: float, _: float) -> None:
+            note(done)
+            tick(round(1000 * done))
+
+        yield tell
+
+
+def held(machine: Backend, resume: bool) -> Note | None:
+    """The note of the motion that `--resume` goes on with; None without that option."""
+    from armkin.board import resuming
+    from armkin.board.firmware.machine import Machine
+
+    if not resume:
+        return None
+    if not isinstance(machine, Machine):
+        raise UsageError("--resume is for boards with armkin's firmware: only they tell where a motion was held")
+    return resuming.recall(machine)
 
 
 def foreign_port(given: str | None, board: Foreign) -> str:

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from armkin.board.backend import StoppedError
 from armkin.board.firmware import cutting, protocol, streaming
 from armkin.board.firmware.batch import WHY
-from armkin.board.firmware.protocol import Error, Flag, State, Status
+from armkin.board.firmware.protocol import Error, Flag, Status
+from armkin.board.firmware.reporting import told
 from armkin.board.firmware.session import DeviceError, Session
-from armkin.errors import LinkError, PositionKnownError, PositionLostError
+from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
 from armkin.hardware import board_name
 from armkin.model.units import joints_out
 from armkin.motors import joints as joints_of
@@ -38,6 +40,8 @@ class Machine:
 
     `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.
     """
+
+    resumable = False  # whether what was held is noted: `armkin.board.resuming`
 
     def __init__(
         self, port: Port, arm: Arm, configuration: Configuration, stop: Callable[[], bool] = lambda: False
@@ -86,21 +90,7 @@ class Machine:
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        info, status, board = self.info, self.status, self.configuration.board
-        flags = Flag(status.flags)
-        return {
-            "firmware": ".".join(map(str, info.firmware)),
-            "configured": self.configured,
-            "state": State(status.state).name.lower(),
-            "error": Error(status.error).name.lower() if status.error else None,
-            "drivers_on": Flag.DRIVERS in flags,
-            "servo_pulses_on": Flag.SERVOS in flags,
-            "abort_input": Flag.ABORT in flags,
-            "motor_power": Flag.POWER_CUT not in flags if self.configuration.image.power_sensed else None,
-            "switches": {name: bool(status.switches >> i & 1) for i, name in enumerate(board.switches)},
-            "boots": info.boots,
-            "reset_cause": info.cause,
-        }
+        return {"configured": self.configured, **told(self.info, self.status, self.configuration)}
 
     def refresh(self) -> None:
         """Read again where the arm stands."""
@@ -217,6 +207,9 @@ class Machine:
         """
         try:
             self.status, end = streaming.carry_out(self.session, plans, self.configuration.axes, progress)
+        except StoppedError as stopped:
+            self.status = stopped.status or self.status
+            raise
         except DeviceError as error:
             raise self.explain(error) from None
         if self.position() == "lost":
@@ -262,7 +255,11 @@ class Machine:
             return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
         if self.position() == "lost":
             return self._lost(f"{why}\n{self.standing()}")
-        return LinkError(f"{why}\n{self.standing()}", joints=joints_out(self.arm, self.joints()).tolist())
+        return HeldError(
+            f"{why}\nthe arm stands at {self.describe()}, its position is known",
+            advice="the next motion starts there",
+            joints=joints_out(self.arm, self.joints()).tolist(),
+        )
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""

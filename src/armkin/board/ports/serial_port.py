@@ -222,6 +222,11 @@ def holder(name: str) -> int | None:
     return None
 
 
+def note_path(name: str) -> str:
+    """The file beside a port's lock that notes the motion under way."""
+    return _path(name, "motion")
+
+
 def _acquired(name: str) -> BaseFileLock | None:
     """The lock of a port, or None if another has it. (flock on POSIX, msvcrt.locking on Windows.)"""
     from filelock import FileLock, Timeout

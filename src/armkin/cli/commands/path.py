@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import holding, inputs, linking, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import SIM, Assume, Baud, NoReset
+from armkin.cli.linking import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError
@@ -68,6 +68,7 @@ def path(
     out: Out = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume: Assume = None,
+    resume: Resume = False,
     baud: Baud = None,
     no_reset: NoReset = False,
     json: Json = False,
@@ -109,6 +110,10 @@ def path(
         "split": split,
         "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
     }
+    if resume:
+        linking.can_resume(
+            {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
+        )
     if port is None or dry_run:
         if start is not None:
             options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--start"))
@@ -117,7 +122,9 @@ def path(
         found = _found(plan, _rehearsed(plan) if not held else None)
         _print(plan, found, json=json)
         return
-    _carried_out(arm, moves, options, port, baud, out, plot, assume=assume, reset=not no_reset, json=json)
+    _carried_out(
+        arm, moves, options, port, baud, out, plot, assume=assume, reset=not no_reset, json=json, resume=resume
+    )
 
 
 def sent(
@@ -132,6 +139,7 @@ def sent(
     *,
     assume: str | None,
     reset: bool,
+    resume: bool,
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
@@ -141,7 +149,7 @@ def sent(
     moves = _moves(arm, file, None, None)
     options: dict[str, Any] = {"speed": (_positive(speed, "--speed") or 100.0) / 100}
     if not dry_run:
-        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json)
+        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json, resume=resume)
         return
     if start is not None:
         options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--from"))
@@ -162,20 +170,24 @@ def _carried_out(
     assume: str | None,
     reset: bool,
     json: bool,
+    resume: bool = False,
 ) -> None:
-    """Plan from where the arm stands, then move it."""
-    from armkin.board import following
+    """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
+    from armkin.board import following, resuming
     from armkin.board.moving import where
+    from armkin.motors import joints as joints_of
 
     board, stands = linking.board_of(arm, rehearsal=port == SIM), linking.assumed(arm, assume)
     with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=reset) as machine:
         linking.prepare(arm, machine, assume, stands)
-        plan = _planned(arm, moves, {**options, "start": machine.joints()}, json=json)
+        held = linking.held(machine, resume)
+        began = machine.counts() if held is None else held.start
+        plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
         following.check_gripper(plan, board)
-        laid = following.parts(plan, machine.counts(), machine.lay)
+        laid = following.parts(plan, began, machine.lay)
         _files(plan, out, plot)
-        with output.progress("ms of motion", round(1000 * plan.duration)) as tick:
-            following.follow(machine, plan, laid, lambda done, _: tick(round(1000 * done)))
+        with resuming.under_way(machine, laid, held) as (left, first, note), linking.told(left, note) as tell:
+            following.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
     _print(plan, found, json=json)
     if not json:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,15 +10,16 @@ import typer
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.goals import goals as read_goals
-from armkin.cli.linking import SIM, Assume, Baud, NoReset, PortName
+from armkin.cli.linking import SIM, Assume, Baud, NoReset, PortName, Resume
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Planned
+    from armkin.board.backend import Backend, Planned
     from armkin.board.moving import Planner, Stream
+    from armkin.board.resuming import Note
     from armkin.cli.goals import Goals
     from armkin.model.arm import Arm
 
@@ -68,6 +69,7 @@ def send(
         str | None,
         typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
+    resume: Resume = False,
     baud: Baud = None,
     no_reset: NoReset = False,
     json: Json = False,
@@ -87,6 +89,9 @@ def send(
         raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
+    if resume:
+        beside = {"--dry-run": dry_run, "--assume": assume, "--batch -": batch == "-", "--port sim": port == SIM}
+        linking.can_resume(beside)
     if path is not None:
         from armkin.cli.commands.path import sent
 
@@ -94,7 +99,8 @@ def send(
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        sent(robot, path, port, speed, dry_run, start, trace, baud, assume=assume, reset=not no_reset, json=json)
+        how: dict[str, Any] = {"assume": assume, "reset": not no_reset, "resume": resume, "json": json}
+        sent(robot, path, port, speed, dry_run, start, trace, baud, **how)
         return
     radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
@@ -112,24 +118,32 @@ def send(
         return
     with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=not no_reset) as machine:
         linking.prepare(arm, machine, assume, stands)
-        began = machine.counts()
+        held = linking.held(machine, resume)
+        began = machine.counts() if held is None else held.start
         if isinstance(machine, Machine):
             planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
-            source: Iterable[Planned | None] = goals.plans(planner, began)
-            whole = None  # how many rows will come is not known
+            with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
+                machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
         else:
-            source = plans = _all(planner, goals, began)  # every refusal before anything moves
+            plans = _all(planner, goals, began)  # every refusal before anything moves
             _write_trace(arm, plans, trace)
-            whole = round(1000 * sum(plan.duration for plan in plans))
-        with output.progress("ms of motion", whole) as tick:
-            machine.run(planner.noted(source), lambda done, _: tick(round(1000 * done)))
+            began = machine.counts()
+            _carry_out(machine, planner, plans, held)
         planned = planner.summary(planner.done, began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     with output.beside(trace) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if isinstance(goals, Stream) and goals.problem is not None:
         raise goals.problem
+
+
+def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], held: Note | None) -> None:
+    """Move through the plans, or through what is left of them since they were held."""
+    from armkin.board import resuming
+
+    with resuming.under_way(machine, plans, held) as (left, _, note), linking.told(left, note) as tell:
+        machine.run(planner.noted(left), tell)
 
 
 def _blend(text: str | None, batch: str | None) -> float:

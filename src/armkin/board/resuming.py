@@ -1,0 +1,244 @@
+"""A motion that was held on its way, gone on with: what is noted of it, where it stands on its plan, what is left.
+
+The plan is made anew from the same start. The note, a small file beside the port's lock, says which plan that was:
+the robot file's digest, the counts where it began, a digest of the plan; and where the arm came to rest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from armkin.board.backend import StoppedError
+from armkin.board.firmware.cutting import Cut
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.protocol import STEP
+from armkin.board.ports import note_path
+from armkin.errors import HeldError, LinkError, NothingHeldError
+from armkin.motion.remainder import remainder
+from armkin.motion.trajectory import Trajectory
+from armkin.motors import places
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Backend, Planned
+
+_NEAR = 1.5  # steps that every motor of an arm on its plan is within
+_SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
+_NOTED = 0.5  # [s] between two notes while the arm moves
+_MOST = 65_536  # [bytes] of a note
+
+
+@dataclass(frozen=True)
+class Note:
+    """A motion under way, or held."""
+
+    robot: str  # the robot file's SHA-256
+    plan: str  # digest of the plan
+    start: list[int]  # counts where it began
+    seconds: float  # of the plan that were done, about
+    stands: list[int] | None = None  # counts where it came to rest; None: the sender ended before it was told
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an arm stands on its plan."""
+
+    part: int
+    stretch: int  # of the part
+    seconds: float  # since the stretch began
+    done: float  # seconds since the plan began
+
+
+def digest(parts: Sequence[Cut]) -> str:
+    """A digest of a plan: its ends, its time and its way, to what a board can tell apart."""
+    found = hashlib.sha256()
+    for part in parts:
+        q = part.trajectory.q(np.linspace(0.0, part.duration, 33))
+        found.update(repr((part.start.tolist(), part.ends.tolist(), round(part.duration, 3))).encode())
+        found.update(np.rint(q * 1e4).astype(np.int64).tobytes())
+    return found.hexdigest()
+
+
+class Trip:
+    """Keeps the note of a motion while it is carried out; of one that has arrived none is kept.
+
+    started: the note of the motion that is resumed, and the seconds of it that were done.
+    """
+
+    def __init__(self, machine: Machine, parts: Sequence[Cut], started: tuple[Note, float] | None = None) -> None:
+        self._machine, self._file = machine, note_path(machine.port.name)
+        self._kept = not machine.port.simulated
+        start = parts[0].start.tolist() if parts else list(machine.counts())
+        self._note, self._before = started or (Note(machine.arm.sha256, digest(parts), start, 0.0), 0.0)
+        self._note = replace(self._note, seconds=self._before, stands=None)
+
+    def __enter__(self) -> Self:
+        if self._kept:
+            _write(self._file, self._note)
+        return self
+
+    def progress(self, seconds: float) -> None:
+        """Note that so many seconds of what is left are done."""
+        done = self._before + seconds
+        if done - self._note.seconds >= _NOTED:
+            self._note = replace(self._note, seconds=done)
+            if self._kept:
+                _write(self._file, self._note)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if not self._kept:
+            return
+        if isinstance(error, StoppedError) and error.status is not None:
+            self._machine.status = error.status
+        known = self._machine.position() != "lost"
+        if kind is None or not known:
+            with suppress(OSError):
+                os.unlink(self._file)
+        elif isinstance(error, HeldError | StoppedError):
+            _write(self._file, replace(self._note, stands=list(self._machine.counts())))
+            self._machine.resumable = True
+            if isinstance(error, HeldError):
+                error.fields["resumable"] = True
+
+
+@contextmanager
+def under_way(
+    machine: Backend, parts: Sequence[Planned], note: Note | None
+) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
+    """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
+
+    note: of the motion that is gone on with; None: all of it. Other boards than ours keep no note.
+    """
+    if not isinstance(machine, Machine):
+        yield parts, 0, lambda seconds: None
+        return
+    cuts = [part for part in parts if isinstance(part, Cut)]
+    place = None if note is None else find(machine, note, cuts)
+    left = cuts if place is None else rest(machine, cuts, place)
+    started = None if note is None or place is None else (note, place.done)
+    with Trip(machine, cuts, started) as trip:
+        yield left, 0 if place is None else place.part, trip.progress
+
+
+def recall(machine: Machine) -> Note:
+    """The note of the motion that was held on this machine.
+
+    Raises NothingHeldError if there is none, or it is of another robot file; LinkError if the arm has moved since.
+    """
+    note = _read(note_path(machine.port.name))
+    if note is None or len(note.start) != len(machine.counts()):
+        raise NothingHeldError(f"no motion was held on {machine.port.name}: there is nothing to go on with")
+    if note.robot != machine.arm.sha256:
+        raise NothingHeldError(f"{machine.arm.path} is not the robot file of the motion that was held, or has changed")
+    if note.stands is not None and note.stands != list(machine.counts()):
+        raise LinkError(
+            f"the arm has moved since its motion was held: it stands at {list(machine.counts())} counts instead of "
+            f"{note.stands}",
+            advice="plan a new motion: it starts where the arm stands",
+        )
+    return note
+
+
+def find(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
+    """Where the arm stands on the plan that was made anew.
+
+    Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
+    """
+    if digest(parts) != note.plan:
+        raise NothingHeldError("this is another motion than the one that was held")
+    found = list(_places(parts, np.array(machine.counts())))
+    if not found:
+        raise LinkError(
+            f"the arm does not stand on the motion that was held: {machine.describe()}",
+            advice="plan a new motion: it starts where the arm stands",
+        )
+    nearest = min(abs(place.done - note.seconds) for place in found)
+    return next(place for place in found if abs(place.done - note.seconds) <= nearest + _SURE)
+
+
+def rest(machine: Machine, parts: Sequence[Cut], place: Place) -> list[Cut]:
+    """What is left of the parts from a place on: the first one from where the arm stands, the others as they are."""
+    part = parts[place.part]
+    here = machine.joints()
+    stretches = part.trajectory.stretches
+    first = remainder(machine.arm, stretches[place.stretch], place.seconds, here)
+    left = Trajectory(machine.arm, here, (first, *stretches[place.stretch + 1 :]))
+    counts = np.array(machine.counts(), dtype=np.int64)
+    return [machine.lay(left, counts), *parts[place.part + 1 :]]
+
+
+def _places(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
+    """All places on a plan where the counts lie, in order: one a segment that passes them."""
+    before = 0.0
+    for p, part in enumerate(parts):
+        for k, move in enumerate(part.moves()):
+            segments = list(move.segments)
+            stretch = part.trajectory.stretches[k]
+            begin = before + float(part.trajectory.begins[k])
+            if not segments:
+                if np.abs(move.start - counts).max(initial=0) <= _NEAR:
+                    yield Place(p, k, 0.0, begin)
+                continue
+            steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
+            ends = move.start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
+            ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
+            times = ticks / ticks[-1] * stretch.duration
+            for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
+                way = b - a
+                share = float(np.clip((counts - a) @ way / max(way @ way, 1e-12), 0.0, 1.0))
+                if np.abs(a + share * way - counts).max(initial=0) <= _NEAR:
+                    at = _refined(part, k, t0 + share * (t1 - t0), counts)
+                    yield Place(p, k, at, begin + at)
+        before += part.duration
+
+
+def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
+    """The time within a stretch when its motors are nearest to the counts (Gauss-Newton from a guess)."""
+    arm, stretch = part.trajectory.arm, part.trajectory.stretches[number]
+    t = guess
+    for _ in range(8):
+        when = np.array([t])
+        off = counts - places(arm, stretch.at(when))[0]
+        speed = stretch.at(when, 1)[0] @ arm.motor_gain.T
+        if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
+            break
+        t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
+    return t
+
+
+def _write(path: str, note: Note) -> None:
+    """Replace the note as a whole; a full disk costs the note, not the motion."""
+    new = f"{path}.{os.getpid()}"
+    with suppress(OSError):
+        with suppress(FileNotFoundError):
+            os.unlink(new)
+        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            json.dump(asdict(note), file)
+        os.replace(new, path)  # a link of that name is replaced, not followed
+
+
+def _read(path: str) -> Note | None:
+    """The note, if there is one that this user wrote."""
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+        with os.fdopen(handle, encoding="ascii") as file:
+            if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
+                return None
+            told = json.loads(file.read(_MOST))
+        start, stands = told["start"], told["stands"]
+        counts = [start] if stands is None else [start, stands]
+        if not all(type(x) is int for row in counts for x in row) or len(counts[-1]) != len(start):
+            return None
+        return Note(str(told["robot"]), str(told["plan"]), start, float(told["seconds"]), stands)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
