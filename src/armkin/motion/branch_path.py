@@ -19,7 +19,7 @@ from armkin.motion.chains import Chain, Run, chains, fewest
 from armkin.motion.columns import Columns, change, chord_bound, levers, linked
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, within
+from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
     if pace.jerk is not None:
         window = float((2 * accel / pace.jerk).max())
         cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
-    curve = Curve(path, within(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
+    curve = Curve(path, optimal(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
     return Smoothed(curve, window) if window else curve
 
 

@@ -13,7 +13,7 @@ from armkin.model import units
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve
 from armkin.motion.plan import check_limits, check_rates
-from armkin.motion.time_optimal import Bounds, Knots, hold_cap, within
+from armkin.motion.time_optimal import Bounds, Knots, hold_cap, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def rounded(
     if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = hold_cap(arm, path, hold)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
-    return Trajectory(arm, first, (Curve(path, within(path, bounds, coupled(arm, accel))),))
+    return Trajectory(arm, first, (Curve(path, optimal(path, bounds, coupled(arm, accel))),))
 
 
 def _grid(corners: Array, blend: float) -> Knots:

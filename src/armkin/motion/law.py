@@ -13,7 +13,7 @@ from armkin.forward import as_joints, position
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.plan import check_rates
-from armkin.motion.time_optimal import Bounds, hold_cap, knots, within
+from armkin.motion.time_optimal import Bounds, hold_cap, knots, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def time_law(
     if hold is not None:
         cap = np.minimum(cap, hold_cap(arm, path, hold))
     limits: Array = arm.max_accel * accel
-    curve = Curve(path, within(path, Bounds(arm.max_speed * speed, limits, cap), coupled(arm, accel)))
+    curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled(arm, accel)))
     made: Curve | Smoothed = curve
     if jerk is not None:
         made = Smoothed(curve, float((2 * limits / np.asarray(jerk, dtype=float)).max()))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 _TINY = 1e-300
 _MOST = 1e18  # of x, where nothing bounds it
+_EXCESS = 1.001  # of an acceleration, between grid points
+_ROUNDS = 6
+_FEW = 400  # grid points: their intervals are long, and bounded in the middle from the first round on
 
 
 @dataclass(frozen=True)
@@ -80,109 +83,120 @@ def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
 
 
 def _slopes(s: Array, q: Array) -> Array:
-    """Derivatives of the polynomials through up to five neighbours: (M,), (M, n) -> (M, n)."""
+    """Derivatives of the polynomials through up to five neighbours: (M,), (M, n) -> (M, n).
+
+    Barycentric: q'(x_i) = sum_j (l_j / l_i) (q_j - q_i) / (x_i - x_j), l_j = 1 / prod_m (x_j - x_m)
+    (Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, section 9).
+    """
     M = len(s)
     w = min(5, M)
-    base = np.clip(np.arange(M) - w // 2, 0, M - w)
-    at = base[:, None] + np.arange(w)
-    own = np.arange(M) - base
-    x = s[at] - s[:, None]  # (M, w), the own one is 0
+    at = np.clip(np.arange(M) - w // 2, 0, M - w) + np.arange(w)[:, None]  # (w, M)
+    x = s[at]
+    inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
+    own = np.arange(M) - at[0]
+    mine = np.choose(own, inverse) if w > 1 else np.ones(M)
     out = np.zeros_like(q)
     for j in range(w):
-        # derivative of the j-th Lagrange polynomial at the own point
-        others = [k for k in range(w) if k != j]
-        denominator = np.prod(x[:, [j]] - x[:, others], axis=1)
-        mine = own == j
-        numerator = np.zeros(M)
-        for k in others:
-            rest = [m for m in others if m != k]
-            numerator += np.prod(-x[:, rest], axis=1) if rest else 1.0
-        single = np.stack([np.where(own == k, 1.0, -x[:, k]) for k in others], axis=1).prod(axis=1)
-        weight = np.where(mine, numerator, single) / denominator
-        out += weight[:, None] * q[at[:, j]]
+        apart = x[j] - s
+        there = apart != 0
+        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(M), where=there)
+        out += weight[:, None] * (q[at[j]] - q)
     return out
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What is bounded along the intervals: joints, and motors that turn several of them; k of them in all."""
+
+    first: Array  # (M, k) their slopes at the left end of every interval
+    left: Array  # (M, k) their second derivatives at its left end
+    right: Array  # (M, k) and at its right end
+    h: Array  # (M, 1)
+    accel: Array  # (M, k) greatest acceleration
+
+    def row(self, f: Array | float) -> tuple[Array, Array]:
+        """P and R of the acceleration P u + R x at fractions f of the intervals, x at the left end: (M, k) each.
+
+        With q'' = l + f (r - l) and x(f) = x + 2 u h f it is u q'(f) + q''(f) x(f).
+        """
+        bend = self.right - self.left
+        return self.first + self.h * f * (3 * self.left + 2.5 * f * bend), self.left + f * bend
+
+    def excess(self, x: Array) -> tuple[Array, Array]:
+        """Greatest share of the acceleration inside every interval, and at which fraction: (M, k) each."""
+        u = np.diff(x)[:, None] / (2 * self.h)
+        bend = self.right - self.left
+        a = u * self.first + self.left * x[:-1, None]  # a + b f + c f^2
+        b = 3 * u * self.h * self.left + bend * x[:-1, None]
+        c = 2.5 * u * self.h * bend
+        with np.errstate(divide="ignore", invalid="ignore"):
+            f = np.where(c != 0, -b / (2 * c), 0.0).clip(0.0, 1.0)
+        return np.abs(a + f * (b + f * c)) / self.accel, f
+
+
+def _motion(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> _Motion:
+    left, right = path.second()
+    first = path.d[:-1]
+    low = np.minimum(accel[:-1], accel[1:])  # an interval between two limits keeps to the lower one
+    if rows is not None:
+        weights, most = rows
+        first, left, right = (np.concatenate([x, x @ weights.T], axis=1) for x in (first, left, right))
+        low = np.concatenate([low, np.broadcast_to(most, (len(low), len(most)))], axis=1)
+    return _Motion(first, left, right, path.h[:, None], low)
 
 
 def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
     """x = (ds/dt)^2 of the fastest law from rest to rest: (N,).
 
     rows: weights (k, n) of joints and the greatest acceleration (k,) of each such sum: coupled motors.
+
+    Accelerations are bounded at both ends of every interval; where that leaves more than the limit between them,
+    there, too, and all is done again. What is left of that after some rounds, the whole law slows down for.
     """
-    h = path.h
-    N = len(path.s)
     speed, accel = (np.broadcast_to(b, path.q.shape) for b in (bounds.speed, bounds.accel))
     with np.errstate(over="ignore"):
         cap = np.minimum(((speed / np.maximum(np.abs(path.d), _TINY)) ** 2).min(axis=1), bounds.cap)
     cap = np.minimum(cap, _MOST)
     cap[0] = cap[-1] = 0.0
-    if N < 2:
+    if len(cap) < 2:
         return np.asarray(cap)
-    P, R, C = _rows(path, accel, rows)
+    motion = _motion(path, accel, rows)
+    inside: list[Array | float] = [0.0, 0.5, 1.0] if len(cap) < _FEW else [0.0, 1.0]
+    for _ in range(_ROUNDS):
+        x = _fastest(cap.copy(), motion, inside)
+        over, where = motion.excess(x)
+        if (most := float(over.max())) <= _EXCESS:
+            return x
+        inside.append(np.where(over > 1.0, where, 0.0))
+    return np.asarray(x / most)
+
+
+def _fastest(cap: Array, motion: _Motion, inside: Sequence[Array | float]) -> Array:
+    """The fastest x (N,) within cap, the accelerations kept at fractions `inside` of the intervals."""
+    P, R, C = _rows(motion, inside)
+    h = motion.h
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         slope, level = R / P, C / P  # u between -level - slope x and level - slope x
         # x + 2 h u >= 0 must leave room below the upper bounds of u
-        steep = slope - 0.5 / h[:, None]
+        steep = slope - 0.5 / h
         room = np.where(steep > 0, level / steep, np.inf).min(axis=1)
     cap[:-1] = np.minimum(cap[:-1], room)
     cap[:-1] = _meeting(cap[:-1], slope, level)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        coefficient = 1.0 - 2 * h[:, None] * slope
-        e = np.where(coefficient > 0, 1.0 / coefficient, 0.0)
-        f = np.where(coefficient > 0, 2 * h[:, None] * level * e, np.inf)
-    beta = _backward(cap, e, f)
-    return _forward(beta, 1.0 - 2 * h[:, None] * slope, 2 * h[:, None] * level)
+        keep, gain = 1.0 - 2 * h * slope, 2 * h * level
+        e = np.where(keep > 0, 1.0 / keep, 0.0)
+        f = np.where(keep > 0, gain * e, np.inf)
+    return _forward(_backward(cap, e, f), keep, gain)
 
 
-def within(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
-    """The same, and within the accelerations between the grid points, too, where q'' changes much from one to the next.
-
-    An interval that exceeds them at a quarter of its way, or two, or three, is asked for that much less.
-    """
-    accel = np.broadcast_to(bounds.accel, path.q.shape).copy()
-    most = accel.copy()
-    for _ in range(4):
-        x = optimal(path, Bounds(bounds.speed, accel, bounds.cap), rows)
-        over = _excess(path, x, most)
-        if over.max(initial=0.0) <= 1.001:
-            break
-        each = np.maximum(np.append(over, 1.0), np.append(1.0, over))
-        accel /= np.where(each > 1.001, each, 1.0)[:, None]
-    return x
-
-
-def _excess(path: Knots, x: Array, accel: Array) -> Array:
-    """Greatest share of the accelerations inside every interval: (N - 1,)."""
-    left, right = path.second()
-    h = path.h[:, None]
-    u = (np.diff(x) / (2 * path.h))[:, None]
-    out = np.zeros(len(u))
-    for f in (0.25, 0.5, 0.75):
-        second = left + f * (right - left)
-        first = path.d[:-1] + f * h * (left + second) / 2
-        here = first * u + second * (x[:-1, None] + 2 * u * f * h)
-        out = np.maximum(out, (np.abs(here) / np.maximum(accel[:-1], accel[1:])).max(axis=1))
-    return out
-
-
-def _rows(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> tuple[Array, Array, Array]:
-    """P >= 0, R, C of |P u + R x| <= C, x at the left end: (N - 1, k)."""
-    left, right = path.second()
-    h = path.h[:, None]
-    p0, p1 = path.d[:-1], path.d[1:]
-    c0, c1 = accel[:-1], accel[1:]
-    # An interval between two limits keeps to the lower one at both ends.
-    low = np.minimum(c0, c1)
-    P = [p0, p1 + 2 * h * right]
-    R = [left, right]
-    C = [low, low]
-    if rows is not None:
-        weights, most = rows
-        P += [part @ weights.T for part in P]
-        R += [part @ weights.T for part in R]
-        C += [np.broadcast_to(most, (len(h), len(most)))] * 2
-    p, r, c = (np.concatenate(part, axis=1) for part in (P, R, C))
+def _rows(motion: _Motion, inside: Sequence[Array | float]) -> tuple[Array, Array, Array]:
+    """P > 0, R, C of |P u + R x| <= C, x at the left end: (N - 1, k)."""
+    parts = [motion.row(f) for f in inside]
+    p, r = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
+    c = np.tile(motion.accel, (1, len(inside)))
     sign = np.where(p < 0, -1.0, 1.0)
-    return np.asarray(np.maximum(np.abs(p), 1e-12 * np.abs(p).max(initial=0.0) + _TINY)), r * sign, c
+    size = np.abs(p)
+    return np.asarray(np.maximum(size, 1e-12 * size.max(initial=0.0) + _TINY)), r * sign, c
 
 
 def _meeting(cap: Array, slope: Array, level: Array) -> Array:
@@ -191,44 +205,72 @@ def _meeting(cap: Array, slope: Array, level: Array) -> Array:
     open_ = np.arange(len(x))
     for _ in range(50):
         sl, lv, here = slope[open_], level[open_], x[open_]
-        low, high = -lv - sl * here[:, None], lv - sl * here[:, None]
-        j, k = low.argmax(axis=1), high.argmin(axis=1)
-        i = np.arange(len(open_))
-        wrong = low[i, j] > high[i, k] + 1e-12 * np.abs(high[i, k])
-        if not wrong.any():
+        moved = sl * here[:, None]
+        low, high = -lv - moved, lv - moved
+        top = high.min(axis=1)
+        wrong = np.flatnonzero(low.max(axis=1) > top + 1e-12 * np.abs(top))
+        if not len(wrong):
             break
-        open_, i, j, k = open_[wrong], i[wrong], j[wrong], k[wrong]
+        open_, i = open_[wrong], np.arange(len(wrong))
+        sl, lv, j, k = sl[wrong], lv[wrong], low[wrong].argmax(axis=1), high[wrong].argmin(axis=1)
         x[open_] = np.minimum((lv[i, k] + lv[i, j]) / (sl[i, k] - sl[i, j]), here[wrong])
     return x
 
 
+class _Least(NamedTuple):
+    """The least of affine functions a y + b for y from 0 to `top`, as lists over the intervals.
+
+    Of the many rows of an interval only a few are the least anywhere: that at y = 0, that at y = top, and of the
+    others at most those (`more`) that are lower where these two cross.
+    """
+
+    a0: list[float]
+    b0: list[float]
+    a1: list[float]
+    b1: list[float]
+    more: list[tuple[tuple[float, float], ...]]
+
+
+def _least(a: Array, b: Array, top: Array) -> _Least:
+    """Affine functions (M, k) on 0 <= y <= top (M,), pruned."""
+    i = np.arange(len(a))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        first, last = b.argmin(axis=1), (a * top[:, None] + b).argmin(axis=1)
+        a0, b0, a1, b1 = a[i, first], b[i, first], a[i, last], b[i, last]
+        y = ((b1 - b0) / (a0 - a1)).clip(0.0, top)
+        two = np.flatnonzero((first != last) & np.isfinite(y))
+        k, j = np.nonzero(a[two] * y[two, None] + b[two] < (a0 * y + b0)[two, None] * (1 - 1e-12))
+    more: list[tuple[tuple[float, float], ...]] = [()] * len(a)
+    k = two[k]
+    for at, slope, level in zip(k.tolist(), a[k, j].tolist(), b[k, j].tolist(), strict=True):
+        more[at] = (*more[at], (slope, level))
+    return _Least(a0.tolist(), b0.tolist(), a1.tolist(), b1.tolist(), more)
+
+
 def _backward(cap: Array, e: Array, f: Array) -> Array:
     """The largest x at every point from which the end can be reached: beta[i] = min(cap, e beta[i+1] + f)."""
-    beta = 0.0
-    out = [beta]
-    for most, slopes, levels in zip(cap[-2::-1].tolist(), e[::-1].tolist(), f[::-1].tolist(), strict=True):
-        value = most
-        for a, b in zip(slopes, levels, strict=True):
-            y = a * beta + b
-            if y < value:
-                value = y
-        beta = value
-        out.append(beta)
-    return np.array(out[::-1])
+    return _scan(cap[::-1], _least(e[::-1], f[::-1], cap[:0:-1]))[::-1]
 
 
 def _forward(beta: Array, keep: Array, gain: Array) -> Array:
     """The fastest x within beta: x[i+1] = min(beta[i+1], keep x[i] + gain)."""
-    x = float(beta[0])
-    out = [x]
-    for most, slopes, levels in zip(beta[1:].tolist(), keep.tolist(), gain.tolist(), strict=True):
-        value = most
-        for a, b in zip(slopes, levels, strict=True):
-            y = a * x + b
-            if y < value:
-                value = y
-        x = value if value > 0.0 else 0.0
-        out.append(x)
+    return _scan(beta, _least(keep, gain, beta[:-1]))
+
+
+def _scan(most: Array, least: _Least) -> Array:
+    """y[0] = most[0], y[i+1] = min(most[i+1], least_i(y[i])), not below 0."""
+    y = float(most[0])
+    out = [y]
+    for top, a0, b0, a1, b1, more in zip(most[1:].tolist(), *least, strict=True):
+        value, other = a0 * y + b0, a1 * y + b1
+        if other < value:
+            value = other
+        for a, b in more:
+            other = a * y + b
+            if other < value:
+                value = other
+        y = top if top < value else value if value > 0.0 else 0.0
+        out.append(y)
     return np.array(out)
 
 
