@@ -1,8 +1,8 @@
 import js from "@eslint/js";
 
 const browser = [
-  "Blob", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver", "URL",
-  "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
+  "Blob", "CustomEvent", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver",
+  "URL", "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
   "requestAnimationFrame", "setInterval", "setTimeout", "window",
 ];
 

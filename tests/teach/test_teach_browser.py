@@ -154,6 +154,37 @@ def test_what_cannot_be_reached_is_said(page: Page) -> None:
     assert page.get_attribute("#box-1", "aria-invalid") == "true"
 
 
+def test_what_is_typed_and_is_no_number_is_told_and_not_kept(page: Page) -> None:
+    aim(page, 390, 80, 300)
+    box = page.locator("#box-0")
+    for typed, stays in (("", "10.1529"), ("-", "10.1529"), ("1e", "1.0000")):
+        box.click()
+        page.keyboard.press("Control+a")
+        page.keyboard.press("Delete")
+        page.keyboard.type(typed)
+        page.keyboard.press("Tab")
+        assert page.inner_text("#trouble") == f"q1: that is no number; it stays {stays}"
+        assert box.input_value() == stays
+    page.fill("#box-0", "12")
+    page.keyboard.press("Tab")
+    settled(page)
+    assert page.inner_text("#trouble") == ""
+    assert box.input_value() == "12.0000"
+
+
+def test_a_branch_s_button_stays_the_same_while_the_tip_moves(page: Page) -> None:
+    """Pressed while answers come in, it is still there when the pointer is let go."""
+    aim(page, 390, 80, 300)
+    page.hover("#branch-2")
+    page.mouse.down()
+    page.evaluate("document.querySelector('#target input').value = 380")
+    page.dispatch_event("#target input", "input")
+    settled(page)
+    page.mouse.up()
+    settled(page)
+    assert page.locator("#branches [aria-checked=true]").get_attribute("id") == "branch-2"
+
+
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, colours: str) -> None:
     with served(board="sim") as server, opened(browser, server.address, color_scheme=colours) as page:

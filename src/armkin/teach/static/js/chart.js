@@ -1,6 +1,6 @@
 // @ts-check
 /** Joint speeds over time, as shares of their limits. */
-import { get } from "./dom.js";
+import { get, make } from "./dom.js";
 
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
 const [WIDTH, HEIGHT] = [400, 90];
@@ -36,9 +36,14 @@ export function chart({ time, shares, duration_s: duration }, names) {
   picture.setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
   picture.replaceChildren(limit, ...lines, now);
   const most = shares.map((row, i) => `${names[i]} ${Math.round(100 * Math.max(0, ...row))} %`);
-  const text = `Joint speeds against their limits (dashed), at most: ${most.join(", ")}`;
-  picture.setAttribute("aria-label", text);
-  get("shares").textContent = text;
+  const text = "Joint speeds against their limits (dashed), at most:";
+  picture.setAttribute("aria-label", `${text} ${most.join(", ")}`);
+  const keys = most.map((said, i) => {
+    const dot = make("span", { class: "dot" });
+    dot.style.background = COLOURS[i % COLOURS.length];
+    return make("span", { class: "key" }, dot, said);
+  });
+  get("shares").replaceChildren(text, ...keys);
 }
 
 /** Mark the time. @param {number} share of the duration */

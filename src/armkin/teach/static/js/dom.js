@@ -47,11 +47,12 @@ export const signed = (value) => (value > 0 ? `+${value}` : String(value));
  * @param {number} value
  */
 export function show(box, value) {
-  if (document.activeElement !== box || !box.dataset.typing) box.value = fixed(value);
+  box.dataset.shown = fixed(value);
+  if (document.activeElement !== box || !box.dataset.typing) box.value = box.dataset.shown;
 }
 
 /**
- * Hear of a number that was typed: while it is typed, and when it is done.
+ * Hear of a number that was typed: while it is typed, and when it is done. What is none is said, and not kept.
  * @param {HTMLInputElement} box
  * @param {(value: number) => void} hear
  */
@@ -61,8 +62,12 @@ export function typed(box, hear) {
     if (box.value !== "" && Number.isFinite(box.valueAsNumber)) hear(box.valueAsNumber);
   });
   const done = () => {
+    if (!box.dataset.typing) return;
     delete box.dataset.typing;
-    if (box.value !== "") box.value = fixed(box.valueAsNumber);
+    const shown = box.dataset.shown ?? "";
+    const wrong = box.value === "" ? `${box.labels?.[0]?.textContent}: that is no number; it stays ${shown}` : "";
+    box.value = wrong ? shown : fixed(box.valueAsNumber);
+    document.dispatchEvent(new CustomEvent("typed", { detail: wrong }));
   };
   box.addEventListener("change", done);
   box.addEventListener("blur", done);

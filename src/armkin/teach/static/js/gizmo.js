@@ -11,6 +11,7 @@ export class Gizmo {
     this.controls = new TransformControls(view.camera, view.canvas);
     this.controls.size = 0.75;
     this.dragging = false;
+    this.there = false;
     /** @type {(position: number[], rpy: number[]) => void} */
     this.moved = () => {};
     /** @type {() => void} */
@@ -30,6 +31,7 @@ export class Gizmo {
 
   /** @param {boolean} there @param {boolean} flat whether the tip moves in the xy plane alone */
   show(there, flat) {
+    this.there = there;
     if (there) this.controls.attach(this.handle);
     else this.controls.detach();
     this.controls.showZ = !flat;

@@ -237,6 +237,7 @@ async function start() {
     act("stop").catch((error) => trouble(`STOP did not get through: ${error.message}`, "stop"));
   };
   get("stop").addEventListener("click", stop);
+  document.addEventListener("typed", (event) => trouble(/** @type {CustomEvent} */ (event).detail, "box"));
   /** @type {Object<string, () => void>} */
   const actions = {
     r: () => one.program.record(),

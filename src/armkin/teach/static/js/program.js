@@ -26,6 +26,10 @@ export class Program {
     click("add-wait", () => this.edit({ do: "record", kind: "wait", seconds: 1 }));
     click("add-open", () => this.edit({ do: "record", kind: "grip", value: "open" }));
     click("add-close", () => this.edit({ do: "record", kind: "grip", value: "closed" }));
+    const kind = /** @type {HTMLSelectElement} */ (get("kind"));
+    const arc = () => (get("via").hidden = kind.value !== "arc");
+    kind.addEventListener("change", arc);
+    arc();
     get("add-open").hidden = get("add-close").hidden = arm.gripper === null;
     const file = /** @type {HTMLInputElement} */ (get("load"));
     file.addEventListener("change", async () => {

@@ -86,7 +86,9 @@ export class Tip {
     const legal = look.branches.filter((branch) => branch.within_limits).length;
     const count = look.branches.length;
     let text = `${look.status}: ${count} branch${count === 1 ? "" : "es"}, ${legal} within limits`;
-    if (look.free?.length) text += `; free: ${look.free.join(", ")}`;
+    if (look.status === "boundary") text += "; at the edge of what the arm reaches, branches meet";
+    if (look.status === "singular") text += "; there is a way in which the tip cannot move at once";
+    if (look.free?.length) text += `; free to turn while the tip rests: ${look.free.join(", ")}`;
     if (!look.complete) text += "; there may be more";
     const near = look.closest;
     this.nearest = near?.joints ?? [];
@@ -100,31 +102,33 @@ export class Tip {
     get("nearest").hidden = !near;
   }
 
+  /** The buttons of the branches; those that are there are used again, so that one is not lost under the pointer. */
   list() {
-    const focused = document.activeElement?.closest("#branches") ? document.activeElement.id : "";
+    const place = get("branches");
     const any = this.rows.some((row) => row.chosen);
-    get("branches").replaceChildren(
-      ...this.rows.map(({ branch, colour, chosen }, k) => {
-        const dot = make("span", { class: "dot" });
-        dot.style.background = colour;
-        const note = branch.outside.length ? `outside: ${branch.outside.map((words) => words.split(" ")[0]).join(", ")}` : "";
-        const button = make(
-          "button",
-          {
-            type: "button", role: "radio", id: `branch-${k}`, "aria-checked": String(chosen),
-            tabindex: chosen || (!any && k === 0) ? "0" : "-1", title: branch.outside.join("\n"),
-          },
-          dot,
-          branch.name || "branch",
-          make("span", { class: "note" }, note),
-        );
-        if (k < 8) button.append(make("kbd", { "aria-hidden": "true" }, String(k + 1)));
-        button.addEventListener("click", () => this.chose(branch));
-        button.addEventListener("keydown", (event) => this.step(event, k));
-        return button;
-      }),
-    );
-    if (focused) document.getElementById(focused)?.focus();
+    while (place.childElementCount > this.rows.length) place.lastElementChild?.remove();
+    while (place.childElementCount < this.rows.length) place.append(this.button(place.childElementCount));
+    this.rows.forEach(({ branch, colour, chosen }, k) => {
+      const button = get(`branch-${k}`);
+      const [dot, name, note] = /** @type {HTMLElement[]} */ ([...button.children]);
+      button.setAttribute("aria-checked", String(chosen));
+      button.tabIndex = chosen || (!any && k === 0) ? 0 : -1;
+      button.title = branch.outside.join("\n");
+      dot.style.background = colour;
+      name.textContent = branch.name || "branch";
+      const joints = branch.outside.map((words) => words.split(" ")[0]);
+      note.textContent = joints.length ? `outside: ${joints.join(", ")}` : "";
+    });
+  }
+
+  /** @param {number} k */
+  button(k) {
+    const parts = ["dot", "name", "note"].map((name) => make("span", { class: name }));
+    const button = make("button", { type: "button", role: "radio", id: `branch-${k}` }, ...parts);
+    if (k < 8) button.append(make("kbd", { "aria-hidden": "true" }, String(k + 1)));
+    button.addEventListener("click", () => this.choose(k));
+    button.addEventListener("keydown", (event) => this.step(event, k));
+    return button;
   }
 
   /** Arrow keys go through the radio group. @param {KeyboardEvent} event @param {number} k */

@@ -127,6 +127,7 @@ export class View {
     this.scene.updateMatrixWorld();
     const box = new Box3().setFromObject(this.solid.group);
     for (const body of this.ghosts.bodies.flat()) if (body.visible) box.expandByObject(body);
+    if (this.gizmo.there) box.expandByPoint(this.gizmo.handle.position);
     const size = Math.max(0.9 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
