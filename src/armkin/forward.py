@@ -218,7 +218,7 @@ def _single(arm: Arm, q: Array) -> Array:
 Formula = Callable[["Arm", list[Entry]], list[Entry]]
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=256)
 def _recorded(arm: Arm, formula: Formula) -> OncePaid:
     """A formula of an arm's joint values as straight-line code."""
     return OncePaid(lambda q: formula(arm, q), arm.n)

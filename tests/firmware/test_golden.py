@@ -21,6 +21,7 @@ def test_all_that_generate_writes_is_committed(tmp_path, monkeypatch) -> None:  
     import importlib.util
 
     folder = FIRMWARE / "golden"
+    monkeypatch.syspath_prepend(str(folder))
     spec = importlib.util.spec_from_file_location("generate_golden", folder / "generate.py")
     assert spec is not None
     assert spec.loader is not None

@@ -11,6 +11,7 @@ from armkin.cli.csv_rows import Chunk
 from armkin.cli.render import to_json
 from armkin.errors import NoSolutionError
 
+_MOST_TEXT = 1_000_000  # characters that are written at once
 Answer = TypeVar("Answer", bound=Mapping[str, Any])
 
 
@@ -67,10 +68,18 @@ def run_batch(
             lines: list[str] = []
             if not as_json and not tally.rows:  # nothing is written before the first row is read
                 lines.append(csv_line(heading))
+            length = 0
             for number, answer in zip(chunk.numbers, answers(chunk), strict=True):
                 tally.add(number, answer)
-                lines += [to_json(answer)] if as_json else map(csv_line, records(number, answer))
-            write("\n".join([*lines, ""]))
+                new = [to_json(answer)] if as_json else list(map(csv_line, records(number, answer)))
+                lines += new
+                length += sum(map(len, new))
+                if length > _MOST_TEXT:
+                    write("\n".join([*lines, ""]))
+                    lines.clear()
+                    length = 0
+            if lines:
+                write("\n".join([*lines, ""]))
             tick(tally.rows)
     return tally
 

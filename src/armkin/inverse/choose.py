@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MOST_SWEEPS = 10_000  # combinations of swept values that are tried
+_THIN = 20  # branches of one target that are kept before those that no answer shows are dropped
+_MOST_ANSWERS = 16_384  # of one target and one swept value, 6.5 kB each, that are kept at once
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class Request:
     branch: str | None = None  # name of the branch wanted
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
+    every: bool = True  # keep all branches; False: of the swept values' branches those that an answer shows
     ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
 
     @property
@@ -64,8 +68,7 @@ class Branch(NamedTuple):
     motion: float  # sum of |change| from near [deg | mm]
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """All there is to say about one target."""
 
     status: str
@@ -76,30 +79,56 @@ class Answer:
     branches: list[Branch]  # within limits first, then by motion
     best: int | None
     refused: str | None = None  # why no branch of the name asked for is the best one
+    count: int = 0  # branches found; more than `branches` where not every one is kept
+    within_limits: int = 0  # of them
+    names: tuple[str, ...] = ()  # of all branches that the arm may have
 
 
 def solve(request: Request, targets: Array) -> list[Answer]:
-    """Answer targets (N, ...) [mm, rad].
+    """Answer targets (N, ...) [mm, rad]; with swept joints and `every` no more than `most_targets`.
 
     Raises UsageError if the task does not fit the arm, no branch has the name asked for, or more than
     MOST_SWEEPS combinations are swept.
     """
-    combinations = math.prod(len(values) for values in request.swept.values())
-    if combinations > MOST_SWEEPS:
-        message = f"{combinations} combinations of swept values; at most {MOST_SWEEPS} are tried"
-        raise UsageError(message, combinations=combinations, most=MOST_SWEEPS)
+    if (count := combinations(request)) > MOST_SWEEPS:
+        message = f"{count} combinations of swept values; at most {MOST_SWEEPS} are tried"
+        raise UsageError(message, combinations=count, most=MOST_SWEEPS)
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
-    parts: list[list[tuple[int, Answer, set[str]]]] = [[] for _ in targets]
+    found = [_Found() for _ in targets]
     for held in _holds(request):
-        one = lock(arm, held) if held else arm
+        one = _locked(arm, tuple(held.items()))
         s = request.ik(one, targets, request.task, near=near[_kept(arm, held)])
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
         for i, answer in enumerate(_answers(request, held, s, near)):
-            parts[i].append((int(s.status[i]), answer, wanted))
-    return [_merged(request, found) for found in parts]
+            found[i].add(int(s.status[i]), answer, wanted)
+            if not request.every and len(found[i].branches) > _THIN:
+                found[i].thin_out()
+    return [one.answer(request) for one in found]
+
+
+def combinations(request: Request) -> int:
+    """How many combinations of swept values are tried for each target."""
+    return math.prod(len(values) for values in request.swept.values())
+
+
+def most_targets(request: Request) -> int:
+    """How many targets to solve at once, so that the branches of all swept values stay within 100 MB."""
+    return max(_MOST_ANSWERS // combinations(request), 1) if request.every else _MOST_ANSWERS
+
+
+def locked(request: Request) -> Arm:
+    """The arm that is solved: the joints that are neither held nor swept."""
+    held = {**request.held, **{name: values[0] for name, values in request.swept.items()}}
+    return _locked(request.arm, tuple(_in(request.arm, held).items()))
+
+
+@lru_cache(maxsize=128)
+def _locked(arm: Arm, held: tuple[tuple[str, float], ...]) -> Arm:
+    """The same arm object for the same values held: what is prepared for it is used again."""
+    return lock(arm, dict(held)) if held else arm
 
 
 def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
@@ -122,7 +151,7 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
                 wanted = {names[i] for i in find(names, request.branch)}
             wanted = wanted if answer.best is not None else set()
         best = next((i for i, b in enumerate(branches) if b.within_limits and b.name in wanted), None)
-        yield request, replace(answer, branches=branches, best=best)
+        yield request, answer._replace(branches=branches, best=best)
         if best is not None:
             request = replace(request, near=branches[best].joints)
 
@@ -141,7 +170,7 @@ def closest(request: Request, target: Array) -> Closest:
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     held = _in(arm, request.held)
-    one = lock(arm, held) if held else arm
+    one = _locked(arm, tuple(held.items()))
     nearest = nearest_pose(one, target, request.task, near=near[_kept(arm, held)])
     return replace(nearest, q=unlock(arm, held, nearest.q)) if held else nearest
 
@@ -159,7 +188,7 @@ def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionErro
     """Why an answer has no best branch; distance: how far away the nearest pose within limits is [mm]."""
     arm = request.arm
     away = f"the nearest pose within limits is {distance:.4f} mm away"
-    legal = sum(branch.within_limits for branch in answer.branches)
+    legal = answer.within_limits
     fields: dict[str, Any] = {
         "robot": arm.name,
         "status": answer.status,
@@ -224,28 +253,69 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
             if valid[b]
         ]
         free = [name for name, is_free in zip(kept, s.free[i].tolist(), strict=True) if is_free]
-        yield Answer(Status(status).name.lower(), s.method, s.why, sure, free, branches, None)
+        legal_count = sum(branch.within_limits for branch in branches)
+        name = Status(status).name.lower()
+        yield Answer(name, s.method, s.why, sure, free, branches, None, None, len(branches), legal_count, s.names)
 
 
-def _merged(request: Request, found: list[tuple[int, Answer, set[str]]]) -> Answer:
-    """One answer of those for all locked values: the best status, all branches, sorted."""
-    _, first, _ = min(found, key=lambda item: item[0])
-    both = [(branch, branch.name in wanted) for _, answer, wanted in found for branch in answer.branches]
-    both.sort(key=lambda item: (not item[0].within_limits, item[0].motion))
-    best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
-    refused = None
-    if request.branch is not None and best is None:
-        refused = _refused(request, [branch for branch, named in both if named])
-    return Answer(
-        first.status,
-        first.method,
-        first.why,
-        first.complete and not request.swept,
-        sorted({name for _, answer, _ in found for name in answer.free}),
-        [branch for branch, _ in both],
-        best,
-        refused,
-    )
+@dataclass
+class _Found:
+    """What the swept values of one target have come to so far."""
+
+    best: tuple[int, Answer] | None = None  # the least status, and the first answer with it
+    names: dict[str, None] = field(default_factory=dict)  # in the order of coming
+    last: tuple[str, ...] = ()  # those of the answer before
+    free: set[str] = field(default_factory=set)
+    count: int = 0
+    legal: int = 0
+    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # and whether it is of the name asked for
+
+    def add(self, status: int, answer: Answer, wanted: set[str]) -> None:
+        """Take the answer for one combination of values in."""
+        if self.best is None or status < self.best[0]:
+            self.best = status, answer._replace(branches=[])
+        if answer.names != self.last:
+            self.last = answer.names
+            self.names.update(dict.fromkeys(answer.names))
+        self.free.update(answer.free)
+        self.count += answer.count
+        self.legal += answer.within_limits
+        self.branches += [(branch, branch.name in wanted) for branch in answer.branches]
+
+    def thin_out(self) -> None:
+        """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
+        nearest: dict[tuple[str, bool], tuple[Branch, bool]] = {}
+        for item in sorted(self.branches, key=_rank):
+            nearest.setdefault((item[0].name, item[0].within_limits), item)
+        # A branch's q is a row of the array of all targets, which shall go.
+        self.branches = [(branch._replace(q=branch.q.copy()), named) for branch, named in nearest.values()]
+
+    def answer(self, request: Request) -> Answer:
+        """One answer of all: the best status, the branches sorted."""
+        assert self.best is not None
+        first = self.best[1]
+        both = sorted(self.branches, key=_rank)
+        best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
+        refused = None
+        if request.branch is not None and best is None:
+            refused = _refused(request, [branch for branch, named in both if named])
+        return Answer(
+            first.status,
+            first.method,
+            first.why,
+            first.complete and not request.swept,
+            sorted(self.free),
+            [branch for branch, _ in both],
+            best,
+            refused,
+            self.count,
+            self.legal,
+            tuple(self.names),
+        )
+
+
+def _rank(item: tuple[Branch, bool]) -> tuple[bool, float]:
+    return not item[0].within_limits, item[0].motion
 
 
 def _refused(request: Request, named: Sequence[Branch]) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     """The task and the solver for an arm, prepared once.
 

@@ -81,7 +81,7 @@ class Arm:
         return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def actual(arm: Arm) -> Arm:
     """The arm in actual joint values, ratio 1: limits, home and speeds are those of the actual motion.
 

@@ -54,12 +54,12 @@ def poses_out(arm: Arm) -> dict[str, list[float]]:
     return {name: list(values) for name, values in _poses_out(arm)}
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _limits_out(arm: Arm) -> tuple[tuple[float, float], ...]:
     return tuple(zip(_as_written(arm, arm.lower), _as_written(arm, arm.upper), strict=True))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _poses_out(arm: Arm) -> tuple[tuple[str, tuple[float, ...]], ...]:
     return tuple((name, _as_written(arm, q)) for name, q in arm.poses.items())
 

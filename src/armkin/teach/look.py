@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -11,15 +11,11 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.inverse import recognise
-from armkin.inverse.closest import closest
-from armkin.inverse.solutions import Solutions, Status
-from armkin.inverse.solve import ik
+from armkin.inverse import choose, recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.limits import outside, said
-from armkin.model.lock import lock, unlock
 from armkin.model.rotation import rpy
 from armkin.motors import best_pulses, motor_names, outside_travel, pulses, rounding
 
@@ -78,12 +74,6 @@ def motors(arm: Arm, q: Array, stands: Sequence[int] | None, *, best: bool = Fal
 
 
 @lru_cache(maxsize=32)
-def _locked(arm: Arm, held: tuple[tuple[str, float], ...]) -> Arm:
-    """The same arm object for the same values held: what is recorded for it is used again."""
-    return lock(arm, dict(held)) if held else arm
-
-
-@lru_cache(maxsize=32)
 def _task(arm: Arm) -> tuple[Task | None, str]:
     """The task that the page solves; None, and why, if no branches can be listed."""
     try:
@@ -96,82 +86,70 @@ def _task(arm: Arm) -> tuple[Task | None, str]:
 
 def _solved(arm: Arm, question: Question) -> dict[str, Any]:
     """Every branch of the target; `q` is the pose to show."""
-    held = {name: float(question.q[arm.joint_names.index(name)]) for name in question.held}
-    kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
-    one = _locked(arm, tuple(held.items()))
-    task, why = _task(one)
+    shown = units.joints_out(arm, question.q).tolist()
+    held = {name: shown[arm.joint_names.index(name)] for name in question.held}
+    request = choose.Request(arm=arm, near=shown, held=held)
+    task, why = _task(choose.locked(request))
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}
-    near = question.q[kept]
+    kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
     if question.target is None:
-        goal = targets_of(task, fk(arm, question.q)[None], near[None])[0]
+        goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
         values = target_out(task, goal)
     else:
         values = list(question.target)
         if len(values) != len(task.labels):
             raise UsageError(f"target: task {task.name} takes {len(task.labels)} numbers: {' '.join(task.labels)}")
         goal = units.targets_in(task.labels, [values])[0]
-    s = ik(one, goal, task.name, near=near)
-    rows, names = _rows(arm, held, s, near)
+    request = replace(request, task=task.name)
+    [found] = choose.solve(request, goal[None])
+    branches = found.branches
     answer: dict[str, Any] = {
         "task": task.name,
         "labels": list(task.labels),
         "units": units.label_units(task.labels),
         "target": values,
-        "status": Status(int(s.status)).name.lower(),
-        "method": s.method,
-        "complete": bool(s.complete),
-        "free": [arm.joint_names[kept[i]] for i in np.flatnonzero(s.free)],
-        "branches": [row for row, _ in rows],
-        "names": names,
+        "status": found.status,
+        "method": found.method,
+        "complete": found.complete,
+        "free": found.free,
+        "branches": [_row(arm, branch) for branch in branches],
+        "names": list(found.names),
         "chosen": None,
         "closest": None,
     }
     if question.target is None:
-        answer["chosen"] = _same(rows, question.q)
+        answer["chosen"] = _same(branches, question.q)
         return answer
-    legal = [k for k, (row, _) in enumerate(rows) if row["within_limits"]]
-    stay = [k for k in legal if rows[k][0]["name"] == question.branch]
-    if legal:
-        answer["chosen"] = (stay or legal)[0]
-        answer["q"] = rows[answer["chosen"]][1]
+    stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
+    if found.within_limits:
+        answer["chosen"] = stay[0] if stay else 0
+        answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:
-        near_pose = closest(one, goal, task.name, near=near)
-        q = unlock(arm, held, near_pose.q)
+        nearest = choose.closest(request, goal)
         answer["closest"] = {
-            "joints": units.joints_out(arm, q).tolist(),
-            "distance_mm": near_pose.distance,
-            "angle_deg": float(units.angles_out(near_pose.angle)),
+            "joints": units.joints_out(arm, nearest.q).tolist(),
+            "distance_mm": nearest.distance,
+            "angle_deg": float(units.angles_out(nearest.angle)),
         }
     return answer
 
 
-def _rows(
-    arm: Arm, held: Mapping[str, float], s: Solutions, near: Array
-) -> tuple[list[tuple[dict[str, Any], Array]], list[str]]:
-    """Branches, within limits first and then by motion, each with its joint values [rad | mm]."""
-    full = unlock(arm, held, s.q) if held else s.q
-    degrees = units.joints_out(arm, full).tolist()
-    motion = s.motion.tolist()
-    rows = []
-    for b in s.order.tolist():
-        if s.valid[b]:
-            words = _words(arm, full[b])
-            row = {
-                "name": s.names[s.branch[b]],
-                "joints": degrees[b],
-                "within_limits": bool(s.within_limits[b]) and not words,
-                "outside": words,
-                "motion": motion[b],
-            }
-            rows.append((row, full[b]))
-    return rows, list(s.names)
+def _row(arm: Arm, branch: choose.Branch) -> dict[str, Any]:
+    """A branch as the page lists it."""
+    return {
+        "name": branch.name,
+        "joints": branch.joints,
+        "within_limits": branch.within_limits,
+        "outside": [said(arm, i, float(branch.q[i])) for i in branch.outside],
+        "motion": branch.motion,
+    }
 
 
-def _same(rows: Sequence[tuple[dict[str, Any], Array]], q: Array) -> int | None:
+def _same(branches: Sequence[choose.Branch], q: Array) -> int | None:
     """The branch that a pose is on; None on a self-motion, where the pose is one of many."""
-    for k, (_, other) in enumerate(rows):
-        apart = np.abs(other - q)
+    for k, branch in enumerate(branches):
+        apart = np.abs(branch.q - q)
         if np.minimum(apart, np.abs(apart % (2 * np.pi) - 2 * np.pi)).max() < 1e-6 or apart.max() < 1e-6:
             return k
     return None

@@ -78,6 +78,7 @@ def ik(
         branch=branch,
         held=held,
         swept=holding.sweeps(arm, sweep, held),
+        every=all_branches or continuous,
     )
     if compiled:
         if sweep:
@@ -144,13 +145,16 @@ class _Rows:
         """The answers of some rows."""
         from armkin.inverse import choose
 
-        targets = units.targets_in(self.task.labels, chunk.values)
-        found = choose.solve(self.request, targets)
-        each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
-        for values, goal, (request, one) in zip(chunk.values.tolist(), targets, each, strict=True):
-            yield _answer(request, self.task, values, goal, one, **self.show)
-            if self.continuous and one.best is not None:
-                self.request = replace(request, near=one.branches[one.best].joints)
+        most = choose.most_targets(self.request)
+        for first in range(0, len(chunk.values), most):
+            part = chunk.values[first : first + most]
+            targets = units.targets_in(self.task.labels, part)
+            found = choose.solve(self.request, targets)
+            each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
+            for values, goal, (request, one) in zip(part.tolist(), targets, each, strict=True):
+                yield _answer(request, self.task, values, goal, one, **self.show)
+                if self.continuous and one.best is not None:
+                    self.request = replace(request, near=one.branches[one.best].joints)
 
 
 def _answer(
@@ -179,8 +183,8 @@ def _answer(
         "why": found.why,
         "complete": found.complete,
         "joint_units": units.names(arm),
-        "branch_count": len(found.branches),
-        "branches_within_limits": sum(branch.within_limits for branch in found.branches),
+        "branch_count": found.count,
+        "branches_within_limits": found.within_limits,
         "branches": [_branch(request, branch, turns) for branch in listed],
         "best": best,
         "closest": _closest(request, goal, found) if best is None and with_closest else None,

@@ -1,4 +1,4 @@
-"""The general elimination as C: the method is the same for all arms (parts/elimination.c), its constants are data.
+"""The general elimination as C: the method is the same for all arms (`_METHOD`), its constants are data.
 
 See `armkin.inverse.elimination.method` for the method and why it is complete.
 """
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
+_METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "polish", "elimination")  # each needs those before
 BRANCHES = MOST
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
 PASSES = 4  # of the seven; what they leave open is told as doubt
 
 
 def has_form(elimination: Elimination) -> bool:
-    """Whether all pencils carry the pose where parts/elimination.c expects it: in La, Lb or Le, at full rank."""
+    """Whether all pencils carry the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
     plans = elimination.plans
     return bool(plans) and all(p.role.slot == 1 or (p.role.at_an_end and p.ends.rank == 9) for p in plans[:PASSES])
 
@@ -67,7 +68,7 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
         _flags("plan", [place[id(plan)] for plan in plans]),
         "",
     ]
-    text = part("pencil") + "\n".join(lines) + "\n" + part("linear_algebra") + part("elimination")
+    text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD))
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
     return text

@@ -43,7 +43,7 @@ _SYNONYMS = {
 }  # fmt: skip
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[str, ...]:
     """A name for each branch index; indices as flattened from the branch axes."""
     sizes = [2 if label else 1 for label in geometry.labels]

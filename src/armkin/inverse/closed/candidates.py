@@ -92,7 +92,7 @@ def as_rows(values: list[Entry], count: int) -> Array:
     return np.stack(rows, axis=2).astype(float)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def recorded(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
     """The same for all calls of one solver."""
     return Recorded(arm, task, geometry)

@@ -1,0 +1,146 @@
+/* The twelve equations (4) of `armkin.inverse.elimination.pencil`, 12 x (12 + size). */
+static void arm_equations(const arm_pencil *pencil, const double *Y, const double *N, double *out)
+{
+    const int m = pencil->rows, width = 2 * (12 + pencil->size);
+    double moved[ARM_ROWS * 15], rows[ARM_ROWS * 2 * (12 + ARM_MOST)];
+    int i, j, k;
+    if (pencil->slot == 1) {
+        double R[225];
+        arm_rep(Y, R);
+        for (i = 0; i < m; i++)
+            for (j = 0; j < 15; j++) {
+                moved[15 * i + j] = 0;
+                for (k = 0; k < 15; k++)
+                    moved[15 * i + j] += N[15 * i + k] * R[15 * k + j];
+            }
+        N = moved;
+    }
+    for (i = 0; i < m; i++) {
+        double *row = rows + i * width;
+        for (j = 0; j < width; j++)
+            row[j] = 0;
+        for (k = 0; k < 15; k++)
+            arm_subtract(row, pencil->columns + k * width, -N[15 * i + k], 0, width);
+    }
+    if (!pencil->mix) {
+        for (i = 0; i < 12 * (12 + pencil->size); i++)
+            out[i] = rows[i];
+        return;
+    }
+    for (i = 0; i < 12; i++)
+        for (j = 0; j < width / 2; j++) {
+            out[i * (width / 2) + j] = 0;
+            for (k = 0; k < 2 * m; k++)
+                out[i * (width / 2) + j] += pencil->mix[i * 2 * m + k] * rows[k * (width / 2) + j];
+        }
+}
+
+/* q from multiples of 1, q, q^2, ...: the least-squares quotient of neighbours. */
+static double arm_ratio_of(const double *power, int count, int step)
+{
+    double above = 0, below = 0;
+    int i;
+    for (i = 0; i + 1 < count; i++) {
+        above += power[i * step] * power[(i + 1) * step];
+        below += power[i * step] * power[i * step];
+    }
+    return above / (below > 1e-300 ? below : 1e-300);
+}
+
+/* The joint values for a root x of the pencil; 0 if it is a slide at infinity. */
+static int arm_joints_of(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, double x,
+    double *q)
+{
+    const int r = pencil->r, w = pencil->w, c = 12 + pencil->size, far = fabs(x) > 1;
+    const int of_hidden = 2 + pencil->hidden, of_dialytic = 2 + pencil->dialytic;
+    const int third = 3 - pencil->hidden - pencil->dialytic;
+    const double y = far ? 1 / x : x, scale = (far ? x : 1) / (1 + x * x);
+    double A[144], u[12], v[12], middle[3], a[12], b[12], f[15], m[5], part[6];
+    double most = 0;
+    int i, j, k, row = 0, column = 0;
+    for (i = 0; i < 12; i++) { /* the equations at x, divided by x^2 if x is large */
+        const double *e = E + i * c;
+        for (j = 0; j < 2 * r; j++)
+            A[12 * i + j] = far ? e[j] + e[12 + j] * y : e[j] * y + e[12 + j];
+        for (j = 0; j < w; j++) {
+            const double two = e[2 * r + j], one = e[12 + 2 * r + j], none = e[12 + 2 * r + w + j];
+            A[12 * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
+        }
+    }
+    arm_null_vector(A, u);
+    for (i = 0; i < 12; i++) {
+        v[i] = 0;
+        for (j = 0; j < r; j++) {
+            const double a1 = u[j], a2 = u[r + j];
+            v[i] += scale * ((a1 * x + a2) * pencil->K_re[i * r + j] - (a1 - a2 * x) * pencil->K_im[i * r + j]);
+        }
+        for (j = 0; j < w; j++)
+            v[i] += pencil->W[i * w + j] * u[2 * r + j];
+    }
+    for (i = 0; i < 4; i++) { /* v is 4 x 3: its longest row and column are the safest */
+        const double size = v[3 * i] * v[3 * i] + v[3 * i + 1] * v[3 * i + 1] + v[3 * i + 2] * v[3 * i + 2];
+        if (size > most) {
+            most = size;
+            row = i;
+        }
+    }
+    most = 0;
+    for (j = 0; j < 3; j++) {
+        const double size = v[j] * v[j] + v[3 + j] * v[3 + j] + v[6 + j] * v[6 + j] + v[9 + j] * v[9 + j];
+        if (size > most) {
+            most = size;
+            column = j;
+        }
+    }
+    if (pencil->slides[of_hidden])
+        middle[pencil->hidden] = pencil->psi + 1 / (fabs(x) < 1e-100 ? 1e-100 : x);
+    else
+        middle[pencil->hidden] = pencil->psi + 2 * atan(x);
+    if (pencil->slides[of_dialytic])
+        middle[pencil->dialytic] = arm_ratio_of(v + column, 4, 3);
+    else
+        middle[pencil->dialytic] = 2 * atan2(v[9 + column], v[6 + column]);
+    if (pencil->slides[2 + third])
+        middle[third] = arm_ratio_of(v + 3 * row, 3, 1);
+    else {
+        const double sign = v[3 * row] < 0 ? -1 : 1;
+        middle[third] = atan2(sign * v[3 * row + 2], sign * v[3 * row + 1]);
+    }
+    for (i = 0; i < 3; i++)
+        if (!(fabs(middle[i]) < 1e4))
+            return 0;
+#define ARM_LINK(i) ((i) == pencil->slot ? Y : pencil->links + 12 * (i))
+    for (i = 0; i < 12; i++)
+        a[i] = ARM_LINK(1)[i];
+    for (k = 0; k < 3; k++) {
+        arm_move(a, middle[k], pencil->slides[2 + k], b);
+        arm_times(b, ARM_LINK(2 + k), a);
+    }
+    arm_features(a, f);
+    for (i = 0; i < 5; i++) { /* 1, b1, b2, a1, a2 */
+        m[i] = 0;
+        for (k = 0; k < 15; k++)
+            m[i] += ends->recover[15 * i + k] * f[k];
+    }
+    {
+        const double sign = m[0] < 0 ? -1 : 1, one = fabs(m[0]) < 1e-300 ? 1 : m[0];
+        double before[12], step[12], sine = 0, cosine = 0;
+        part[0] = pencil->slides[0] ? m[3] / one : atan2(sign * m[4], sign * m[3]);
+        part[1] = pencil->slides[1] ? m[1] / one : atan2(sign * m[2], sign * m[1]);
+        arm_move(ARM_LINK(5), part[0], pencil->slides[0], step);
+        arm_times(step, ARM_LINK(0), before);
+        arm_move(before, part[1], pencil->slides[1], step);
+        for (j = 0; j < 3; j++) { /* step A = Je^-1, a turn by -e about z */
+            sine += step[j] * a[4 * j + 1] - step[4 + j] * a[4 * j];
+            cosine += step[j] * a[4 * j] + step[4 + j] * a[4 * j + 1];
+        }
+        part[5] = atan2(sine, cosine);
+    }
+#undef ARM_LINK
+    for (k = 0; k < 3; k++)
+        part[2 + k] = middle[k];
+    for (k = 0; k < 6; k++)
+        q[pencil->order[k]] = pencil->backward ? -part[k] : part[k];
+    return 1;
+}
+
