@@ -535,7 +535,7 @@ def _movable() -> list[Path]:
 @pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
 def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
     import armkin
-    from armkin.board.firmware.configuration import missing
+    from armkin.board.firmware.needs import missing
 
     arm = armkin.load(path)
     home = ",".join(str(x) for x in armkin.pulses(arm, arm.home))
@@ -548,7 +548,7 @@ def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: 
         if lacks:
             assert done.code == 2
             assert all(lack in done.err for lack in lacks)
-            assert "max_accel: ..." in done.err
+            assert "max_accel: 60 " in done.err
         else:
             assert done.code == 0, done.err
             assert done.json["joints"] == pytest.approx(goal, abs=0.2)
@@ -560,7 +560,7 @@ def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path)
     mine.write_text(text[: text.index("board: {kind")].replace("    max_accel: 120\n", "", 1))
     done = run("send", mine, *POSE, "--port", tmp_path / "none")
     assert done.code == 2
-    for words in ("joint q1 has no max_accel", "it has no board", "max_accel: ...", "board: {kind: ..., driver: ...}"):
+    for words in ("joint q1 has no max_accel", "it has no board", "max_accel: 60 ", "board: {kind: uno_cnc_shield, driver: A4988}"):
         assert words in done.err
 
 
@@ -580,4 +580,4 @@ def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -
     assert done.json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
     alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
     assert (alone.code, alone.out) == (2, "")
-    assert "--branch, --task and --lock belong to --target" in alone.err
+    assert "--branch, --task, --near and --lock belong to --target" in alone.err

@@ -23,13 +23,13 @@ def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
     for few, every in zip(
         choose.solve(request, TARGETS), choose.solve(replace(request, every=True), TARGETS), strict=True
     ):
-        assert (few.status, few.count, few.within_limits, few.refused) == (
+        assert (few.status, few.total, few.within_limits, few.refused) == (
             every.status,
-            every.count,
+            every.total,
             every.within_limits,
             every.refused,
         )
-        assert every.count == len(every.branches)
+        assert every.total == len(every.branches)
         assert every.within_limits == sum(one.within_limits for one in every.branches)
         best = [None if one.best is None else one.branches[one.best].joints for one in (few, every)]
         assert best[0] == best[1]
@@ -55,7 +55,7 @@ def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(choose._Found, "add", noted)
     request = replace(SWEPT, swept={"q1": [0.0, 10.0, 20.0, 30.0, 40.0] * 40})
-    [*_, most] = sorted(answer.count for answer in choose.solve(request, TARGETS[:6]))
+    [*_, most] = sorted(answer.total for answer in choose.solve(request, TARGETS[:6]))
     assert most > 60
     assert max(kept) < 30
 

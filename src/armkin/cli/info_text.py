@@ -32,7 +32,7 @@ def text(answer: Mapping[str, Any]) -> str:
         _matrix(answer),
         _hardware(answer),
         _solver(answer),
-        _lacks(answer["lacks"]),
+        _lacks(answer["lacks"], answer["lines_to_add"]),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -209,7 +209,7 @@ def _solver(answer: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _lacks(lacks: dict[str, list[str]]) -> str:
+def _lacks(lacks: dict[str, list[str]], add: list[str]) -> str:
     """What the commands that move the arm still need; what needs nothing is said to be ready."""
     send = [words for words in lacks["send"] if words not in lacks["simulate"]]
     rows = {"pulses": lacks["pulses"], "simulate": lacks["simulate"], "send": send}
@@ -219,4 +219,6 @@ def _lacks(lacks: dict[str, list[str]]) -> str:
         more = ["the same"] if name in ("send", "home") and lacks["simulate" if name == "send" else "send"] else []
         text = f"not yet: {'; '.join(more + words)}" if more or words else "ready"
         lines.append(wrapped(text, f"  {name:9}", " " * 11))
+    if add:
+        lines += ["", "  to add, with your arm's figures, for send:", *(f"    {line}" for line in add)]
     return "\n".join(lines)

@@ -79,7 +79,7 @@ class Answer(NamedTuple):
     branches: list[Branch]  # within limits first, then by motion
     best: int | None
     refused: str | None = None  # why no branch of the name asked for is the best one
-    count: int = 0  # branches found; more than `branches` where not every one is kept
+    total: int = 0  # branches found; more than `branches` where not every one is kept
     within_limits: int = 0  # of them
     names: tuple[str, ...] = ()  # of all branches that the arm may have
 
@@ -266,7 +266,7 @@ class _Found:
     names: dict[str, None] = field(default_factory=dict)  # in the order of coming
     last: tuple[str, ...] = ()  # those of the answer before
     free: set[str] = field(default_factory=set)
-    count: int = 0
+    total: int = 0
     legal: int = 0
     branches: list[tuple[Branch, bool]] = field(default_factory=list)  # and whether it is of the name asked for
 
@@ -278,7 +278,7 @@ class _Found:
             self.last = answer.names
             self.names.update(dict.fromkeys(answer.names))
         self.free.update(answer.free)
-        self.count += answer.count
+        self.total += answer.total
         self.legal += answer.within_limits
         self.branches += [(branch, branch.name in wanted) for branch in answer.branches]
 
@@ -308,7 +308,7 @@ class _Found:
             [branch for branch, _ in both],
             best,
             refused,
-            self.count,
+            self.total,
             self.legal,
             tuple(self.names),
         )

@@ -80,6 +80,9 @@ def missing_rates(arm: Arm) -> dict[str, list[str]]:
     return {key: names for key, names in found.items() if names}
 
 
+_EXAMPLES = {("deg", "max_speed"): 30, ("deg", "max_accel"): 60, ("mm", "max_speed"): 20, ("mm", "max_accel"): 50}
+
+
 def rate_lines(arm: Arm) -> list[str]:
     """What `missing_rates` finds, as lines of a robot file to add."""
     unit = {name: "mm" if slides else "deg" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)}
@@ -89,7 +92,9 @@ def rate_lines(arm: Arm) -> list[str]:
             these = [name for name in names if unit[name] == size]
             if these:
                 per = "s" if key == "max_speed" else "s2"
-                lines.append(f"{key}: ...   # {size}/{per}, to joint{'s' * (len(these) > 1)} {', '.join(these)}")
+                example = _EXAMPLES[size, key]
+                to = f"to joint{'s' * (len(these) > 1)} {', '.join(these)}"
+                lines.append(f"{key}: {example}   # {size}/{per}, for example; {to}")
     return lines
 
 

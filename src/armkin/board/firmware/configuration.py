@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.board.firmware import needs
 from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
 from armkin.errors import UsageError
-from armkin.hardware import BOARDS, DRIVERS, FOREIGN, Board, Driver
-from armkin.motion.plan import missing_rates, rate_lines
-from armkin.motors import joints_per_pulse, motor_accel, pulse_range, pulses, undriven
+from armkin.hardware import BOARDS, DRIVERS, Board, Driver
+from armkin.motors import motor_accel, pulse_range, pulses
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -74,8 +74,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
-    lacks = _without_rates(arm) + ([] if rehearsal else _without_board(arm))
-    if lacks:
+    if lacks := needs.lacks(arm, board=not rehearsal):
         said = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]
         raise UsageError(
@@ -83,7 +82,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
             robot_file=arm.path,
             lines_to_add=lines,
         )
-    made_up = rehearsal and bool(_without_board(arm))
+    made_up = rehearsal and bool(needs.without_board(arm))
     motors = arm.motors
     if made_up:
         board = _rehearsal_board(arm)
@@ -128,64 +127,6 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         meaning=_meaning(arm, grip),
     )
     return Configuration(board, image, axes, grip)
-
-
-Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
-
-
-def missing(arm: Arm, *, board: bool = True) -> list[str]:
-    """What the robot file lacks before the arm can be moved, in words; board: on a board, not in simulation."""
-    return [words for words, _ in _without_rates(arm) + (_without_board(arm) if board else [])]
-
-
-def _without_rates(arm: Arm) -> list[Lack]:
-    """Missing drives and rates: what a plan needs."""
-    lacks: list[Lack] = []
-    try:
-        joints_per_pulse(arm)  # raises if a joint has no motor
-    except UsageError as error:
-        still = undriven(arm)
-        which = f"joint{'s' * (len(still) > 1)} {', '.join(still)} ha{'ve' if len(still) > 1 else 's'} no drive"
-        lacks.append(
-            (
-                which if still else str(error),
-                ["drive: {...}   # to every joint, or motors: (armkin schema shows the keys)"],
-            )
-        )
-    absent = missing_rates(arm)
-    for key, names in absent.items():
-        lacks.append(
-            (f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}", [])
-        )
-    if absent:
-        lacks[-1] = (lacks[-1][0], rate_lines(arm))
-    return lacks
-
-
-def _without_board(arm: Arm) -> list[Lack]:
-    """Missing board, driver, axes: what a board needs."""
-    if arm.board is None:
-        drivers = ", ".join(DRIVERS)
-        add = f"board: {{kind: ..., driver: ...}}   # kinds: {', '.join(BOARDS)}; drivers: {drivers}"
-        return [("it has no board", [add])]
-    lacks: list[Lack] = []
-    if (foreign := FOREIGN.get(arm.board.kind)) is not None:  # it has its own drivers and settings
-        bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
-        if bare:
-            add = f"axis: ...   # to the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
-            lacks.append((f"motors {', '.join(bare)} have no axis", [add]))
-        return lacks
-    board, steppers = BOARDS[arm.board.kind], False
-    for motor in [*arm.motors, *([] if arm.gripper is None else [arm.gripper])]:
-        steppers = steppers or motor.kind == "stepper"
-        if motor.axis is None:
-            what = "the gripper" if motor is arm.gripper else f"motor {getattr(motor, 'name', '')}"
-            free = board.servos if motor.kind == "servo" else board.steppers
-            lacks.append((f"{what} has no axis", [f"axis: ...   # to the drive of {what} ({', '.join(free)})"]))
-    if steppers and arm.board.driver is None:
-        why = "its board has no driver: it sets the pulse timing"
-        lacks.append((why, [f"driver: ...   # to board: ({', '.join(DRIVERS)})"]))
-    return lacks
 
 
 def _rehearsal_board(arm: Arm) -> Board:

@@ -1,15 +1,23 @@
-"""What a robot file still lacks for `pulses`, for motion in simulation and on a board, and for homing."""
+"""What a robot file still lacks for `pulses`, for motion in simulation and on a board, and for homing.
+
+Each lack is told in words and, where that can be, with lines for the file. Their figures are examples: they load,
+and the motor's own stand in its data sheet.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.configuration import missing
 from armkin.errors import UsageError
+from armkin.hardware import BOARDS, DRIVERS, FOREIGN
+from armkin.motion.plan import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
+_DRIVER = "A4988"  # in lines to add
 
 
 def needs(arm: Arm) -> dict[str, list[str]]:
@@ -27,6 +35,94 @@ def needs(arm: Arm) -> dict[str, list[str]]:
         "send": send,
         "home": send + _without_homing(arm),
     }
+
+
+def missing(arm: Arm, *, board: bool = True) -> list[str]:
+    """What the robot file lacks before the arm can be moved, in words; board: on a board, not in simulation."""
+    return [words for words, _ in lacks(arm, board=board)]
+
+
+def lines_to_add(arm: Arm) -> list[str]:
+    """Lines for the robot file of an arm that shall move on a board."""
+    return [line for _, added in lacks(arm) for line in added]
+
+
+def lacks(arm: Arm, *, board: bool = True) -> list[Lack]:
+    """What the robot file lacks before the arm can be moved; board: on a board, not in simulation."""
+    return _without_rates(arm, board) + (without_board(arm) if board else [])
+
+
+def _without_rates(arm: Arm, board: bool) -> list[Lack]:
+    """Missing drives and rates: what a plan needs."""
+    found: list[Lack] = []
+    try:
+        joints_per_pulse(arm)  # raises if a joint has no motor
+    except UsageError as error:
+        still = undriven(arm)
+        found.append((_have(still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
+    absent = missing_rates(arm)
+    found += [(_have(names, key), []) for key, names in absent.items()]
+    if absent:
+        found[-1] = (found[-1][0], rate_lines(arm))
+    return found
+
+
+def _drive_lines(arm: Arm, still: list[str], board: bool) -> list[str]:
+    """A stepper for each joint without a motor; board: with an axis of its own."""
+    axes = list(_axes(arm)) if board else []
+    taken = {motor.axis for motor in arm.motors}
+    free = iter([axis for axis in axes if axis not in taken])
+    groups: dict[str, list[str]] = {}
+    for name in still:
+        lead = ", lead: 8" if arm.prismatic[arm.joint_names.index(name)] else ""
+        axis = next(free, None)
+        at = "" if axis is None else f"axis: {axis}, "
+        groups.setdefault(f"drive: {{{at}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
+    return [f"{drive}   # for example; {_to(names)}" for drive, names in groups.items()]
+
+
+def _axes(arm: Arm) -> tuple[str, ...]:
+    """Names of the stepper axes of the arm's board, or of the one that `without_board` proposes."""
+    kind = _board_for(arm) if arm.board is None else arm.board.kind
+    return FOREIGN[kind].axes if kind in FOREIGN else BOARDS[kind].steppers
+
+
+def _board_for(arm: Arm) -> str:
+    """The first kind that has an axis for every motor, or for every joint of an arm without motors."""
+    servos = sum(motor.kind == "servo" for motor in arm.motors)
+    steppers = len(arm.motors) - servos + len(undriven(arm))
+    fits = (b.kind for b in BOARDS.values() if len(b.steppers) >= steppers and len(b.servos) >= servos)
+    return next(fits, "pico6")
+
+
+def without_board(arm: Arm) -> list[Lack]:
+    """Missing board, driver, axes: what a board needs."""
+    if arm.board is None:
+        kind = _board_for(arm)
+        driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven(arm) else ""
+        choice = f"kinds: {', '.join([*BOARDS, *FOREIGN])}; drivers: {', '.join(DRIVERS)}"
+        return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
+    found: list[Lack] = []
+    if (foreign := FOREIGN.get(arm.board.kind)) is not None:  # it has its own drivers and settings
+        bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
+        if bare:
+            add = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
+            found.append((f"motors {', '.join(bare)} have no axis", [add]))
+        return found
+    board, steppers = BOARDS[arm.board.kind], False
+    for motor in [*arm.motors, *([] if arm.gripper is None else [arm.gripper])]:
+        steppers = steppers or motor.kind == "stepper"
+        if motor.axis is None:
+            what = "the gripper" if motor is arm.gripper else f"motor {getattr(motor, 'name', '')}"
+            free = board.servos if motor.kind == "servo" else board.steppers
+            add = f"axis: {(*free, '?')[0]}   # into the drive of {what} ({', '.join(free)})"
+            found.append((f"{what} has no axis", [add]))
+    if steppers and arm.board.driver is None:
+        why = "its board has no driver: it sets the pulse timing"
+        keys = {**arm.board.model_dump(exclude_none=True), "driver": _DRIVER}
+        line = f"board: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
+        found.append((why, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
+    return found
 
 
 def _without_drives(arm: Arm) -> list[str]:
@@ -49,3 +145,7 @@ def _without_homing(arm: Arm) -> list[str]:
 
 def _have(names: list[str], what: str) -> str:
     return f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {what}"
+
+
+def _to(names: list[str]) -> str:
+    return f"to joint{'s' * (len(names) > 1)} {', '.join(names)}"

@@ -181,6 +181,7 @@ class Info(Head, Solving):
     gripper: Annotated[dict[str, Any] | None, "as in the robot file"]
     board: Annotated[dict[str, Any] | None, "as in the robot file"]
     lacks: Annotated[dict[str, list[str]], "what the file lacks for pulses, simulate, send, home; empty: nothing"]
+    lines_to_add: Annotated[list[str], "lines for the file, with examples for figures, that send asks for"]
 
 
 class ShippedRobot(Head):

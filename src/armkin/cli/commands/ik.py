@@ -183,7 +183,7 @@ def _answer(
         "why": found.why,
         "complete": found.complete,
         "joint_units": units.names(arm),
-        "branch_count": found.count,
+        "branch_count": found.total,
         "branches_within_limits": found.within_limits,
         "branches": [_branch(request, branch, turns) for branch in listed],
         "best": best,

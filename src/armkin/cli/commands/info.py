@@ -33,7 +33,7 @@ def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = Non
 
 
 def _answer(arm: Arm, task: str | None) -> Info:
-    from armkin.board.firmware.needs import needs
+    from armkin.board.firmware.needs import lines_to_add, needs
 
     file = arm.file
     assert file is not None  # it was read from one
@@ -58,6 +58,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "gripper": None if file.gripper is None else file.gripper.model_dump(exclude_none=True),
         "board": None if file.board is None else file.board.model_dump(exclude_none=True),
         "lacks": needs(arm),
+        "lines_to_add": lines_to_add(arm),
     }
 
 

@@ -1,0 +1,56 @@
+"""What a robot file lacks is told as lines: pasted where they say, they make a file that moves."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from command_line import run
+
+
+def pasted(text: str, lines: list[str]) -> str:
+    """The file with every line where its comment says: to joints, or at the end."""
+    for line in lines:
+        if "in place of board:" in line:
+            text = re.sub(r"(?m)^board:.*$", line, text)
+            continue
+        to = re.search(r"to joints? ([\w, ]+)$", line)
+        if to is None:
+            text = f"{text}\n{line}\n"
+            continue
+        for name in to[1].split(", "):
+            before = f"  - name: {name}\n"
+            assert before in text
+            text = text.replace(before, f"{before}    {line}\n")
+    return text
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "planar_2dof", "moveo", "cobra600", "stanford", "roarm_m2", "yaw_two_link"])
+def test_pasted_lines_make_a_file_that_moves(robot: str, tmp_path: Path) -> None:
+    copy = tmp_path / f"my_{robot}.yaml"
+    assert run("export", robot, "--dh", "-o", copy).code == 0
+    found = run("info", copy, "--json").json
+    lines, lacks = found["lines_to_add"], found["lacks"]
+    assert lines
+    assert lacks["simulate"]
+    refused = run("send", copy, "home", "--dry-run", "--json")
+    assert refused.code == 2
+
+    rehearsal = tmp_path / "rehearsal.yaml"
+    rehearsal.write_text(pasted(copy.read_text(), json.loads(refused.err)["lines_to_add"]))
+    assert run("send", rehearsal, "home", "--dry-run").code == 0
+
+    whole = tmp_path / "whole.yaml"
+    whole.write_text(pasted(copy.read_text(), lines))
+    assert run("info", whole, "--json").json["lacks"]["send"] == []
+    assert run("send", whole, "home", "--port", "sim").code == 0
+
+
+def test_info_shows_the_lines() -> None:
+    shown = run("info", "ur5e").out
+    for line in run("info", "ur5e", "--json").json["lines_to_add"]:
+        assert f"    {line}\n" in shown
+    assert "to add" not in run("info", "three_dof").out
