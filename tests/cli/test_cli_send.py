@@ -305,7 +305,7 @@ def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pyte
         def close(self) -> None:
             pass
 
-    monkeypatch.setattr("armkin.board.ports.serial_port._open_serial", lambda name, baud: Flood())
+    monkeypatch.setattr("armkin.board.ports.serial_port._open_serial", lambda *given: Flood())
     port = SerialPort("flood")
     assert len(port.read(0.1)) >= 1000
     port.close()
@@ -560,7 +560,12 @@ def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path)
     mine.write_text(text[: text.index("board: {kind")].replace("    max_accel: 120\n", "", 1))
     done = run("send", mine, *POSE, "--port", tmp_path / "none")
     assert done.code == 2
-    for words in ("joint q1 has no max_accel", "it has no board", "max_accel: 60 ", "board: {kind: uno_cnc_shield, driver: A4988}"):
+    for words in (
+        "joint q1 has no max_accel",
+        "it has no board",
+        "max_accel: 60 ",
+        "board: {kind: uno_cnc_shield, driver: A4988}",
+    ):
         assert words in done.err
 
 

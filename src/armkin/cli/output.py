@@ -12,6 +12,7 @@ from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
+_LONGEST = 1000  # characters of a line: a path or a word from the command line may be longer than people read
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
 
 
@@ -124,7 +125,7 @@ def _print(text: str) -> None:
 def _plain(line: str) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-    return text if len(text) <= 240 else f"{text[:150]} ... {text[-80:]}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 100]} ... {text[-80:]}"
 
 
 def _coloured(stream: TextIO) -> bool:

@@ -105,6 +105,18 @@ def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
     return numbers * [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]
 
 
+def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
+    """Targets (N, m) or (N, 4, 4), as `armkin.ik` takes them, in the command line's numbers [mm, deg]."""
+    import numpy as np
+
+    if targets.ndim == 3:
+        from armkin.model.rotation import rpy
+
+        targets = np.concatenate([targets[:, :3, 3], rpy(targets[:, :3, :3])], axis=1)
+    scale = [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]
+    return [list(row) for row in (targets / scale + 0.0).tolist()]
+
+
 def _scale(arm: Arm) -> Array:
     import numpy as np
 

@@ -95,7 +95,7 @@ def _solved(arm: Arm, question: Question) -> dict[str, Any]:
     kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
     if question.target is None:
         goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
-        values = target_out(task, goal)
+        [values] = units.targets_out(task.labels, goal[None])
     else:
         values = list(question.target)
         if len(values) != len(task.labels):
@@ -158,11 +158,3 @@ def _same(branches: Sequence[choose.Branch], q: Array) -> int | None:
 def _words(arm: Arm, q: Array) -> list[str]:
     """Each joint outside its limits, in words."""
     return [said(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
-
-
-def target_out(task: Task, goal: Array) -> list[float]:
-    """A target as `ik` takes it, in the command line's numbers [mm, deg]."""
-    if task.orientation == "full":
-        return [*(goal[:3, 3] + 0.0).tolist(), *units.angles_out(rpy(goal[:3, :3])).tolist()]
-    scale = [units.DEGREE if unit == "deg" else 1.0 for unit in units.label_units(task.labels)]
-    return [float(value) for value in goal / scale + 0.0]

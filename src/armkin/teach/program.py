@@ -183,11 +183,10 @@ class Program:
         raise UsageError(f"kind: '{kind}' is none of joint, line, arc, wait, grip")
 
     def _target(self, values: Sequence[float]) -> list[float]:
-        from armkin.teach.look import target_out
-
         q = units.joints_in(self.arm, values)
         task = task_for(self.arm, self.head.get("task"))
-        return _rounded(target_out(task, targets_of(task, fk(self.arm, q)[None], q[None])[0]))
+        [target] = units.targets_out(task.labels, targets_of(task, fk(self.arm, q)[None], q[None]))
+        return _rounded(target)
 
     def _set_via(self, fields: Mapping[str, Any]) -> None:
         q = units.joints_in(self.arm, guard.numbers(fields, "q", self.arm.n))

@@ -10,6 +10,7 @@ import errno
 import hashlib
 import os
 import re
+import stat
 import sys
 import tempfile
 import time
@@ -90,6 +91,26 @@ class SerialPort:
             ) from None
 
 
+def check(name: str) -> None:
+    """Raise LinkError if there is no port of that name; one that is there is not opened, and not reset."""
+    import serial
+
+    try:
+        if "://" in name:
+            serial.serial_for_url(name, do_not_open=True)
+        elif os.name == "posix":
+            if not stat.S_ISCHR(os.stat(name).st_mode):
+                raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
+            if not os.access(name, os.R_OK | os.W_OK):
+                raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+        elif name.upper() not in {port.device.upper() for port in list_ports()}:
+            raise OSError(errno.ENOENT, os.strerror(errno.ENOENT))
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise LinkError(_cannot_open(name, error)) from None
+    except Exception as error:
+        raise LinkError(_no_url(name, error)) from None
+
+
 def _open_serial(name: str, baud: int, reset: bool) -> Any:
     import serial
 
@@ -104,7 +125,7 @@ def _open_serial(name: str, baud: int, reset: bool) -> Any:
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_cannot_open(name, error)) from None
     except Exception as error:  # what pyserial makes of a malformed URL: KeyError, re.error, AttributeError, ...
-        raise LinkError(f"port {name} cannot be opened: it is no URL that pyserial understands ({error})") from None
+        raise LinkError(_no_url(name, error)) from None
     _keep_dtr(port)
     return port
 
@@ -117,6 +138,10 @@ def _keep_dtr(port: Any) -> None:
         mode = termios.tcgetattr(port.fileno())
         mode[2] &= ~termios.HUPCL
         termios.tcsetattr(port.fileno(), termios.TCSANOW, mode)
+
+
+def _no_url(name: str, error: Exception) -> str:
+    return f"port {name} cannot be opened: it is no URL that pyserial understands ({error})"
 
 
 def _cannot_open(name: str, error: Exception) -> str:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import holding, inputs, output, render
+from armkin.cli import holding, inputs, output, piped, render
 from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import Chunk, batch_rows, one_row
+from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -20,7 +20,7 @@ from armkin.cli.options import (
     Lock,
     Near,
     Out,
-    Robot,
+    RobotOrPipe,
     Sweep,
     Target,
     TaskName,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 def ik(
-    robot: Robot,
+    robot: RobotOrPipe = None,
     target: Target = None,
     all_branches: AllBranches = False,
     near: Near = None,
@@ -63,13 +63,15 @@ def ik(
     """All joint values that reach a target.
 
     Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
-    the nearest pose within limits is shown instead.
+    the nearest pose within limits is shown instead. Without a target, standard input's answers of fk are reached.
     """
     from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
 
-    arm = inputs.load(robot)
+    given = None if target or batch is not None else piped.joint_values(robot)
+    arm = inputs.load(inputs.named(robot)) if given is None else given[0]
     what = task_for(arm, task)
+    reached = None if given is None else _reached(arm, what, given[1])
     held = holding.locks(arm, lock)
     request = choose.Request(
         arm=arm,
@@ -86,11 +88,11 @@ def ik(
         request = replace(request, ik=_compiled)
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
-    if batch is not None:
+    if batch is not None or (reached is not None and len(reached) > 1):
         inputs.no_numbers(target)
         rows = _Rows(request, what, all_branches, turns, continuous=continuous, with_closest=json)
         tally = run_batch(
-            batch_rows(batch, what.labels, f"task {what.name}"),
+            all_rows(reached or []) if batch is None else batch_rows(batch, what.labels, f"task {what.name}"),
             out,
             json,
             rows.answers,
@@ -108,7 +110,7 @@ def ik(
         )
         tally.refuse_unsolved()
         return
-    values = one_row(inputs.target(arm, what, target)).values
+    values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     goal = units.targets_in(what.labels, values)
     [found] = choose.solve(request, goal)
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
@@ -116,6 +118,15 @@ def ik(
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
     if answer["best"] is None and answer["closest"] is not None:
         raise choose.refusal(request, found, answer["closest"]["distance_mm"])
+
+
+def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
+    """Targets [mm, deg] of the task that joint values [deg | mm] reach."""
+    import armkin
+    from armkin.inverse.tasks.task import targets_of
+
+    q = units.joints_in(arm, joints)
+    return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
 def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Solutions:

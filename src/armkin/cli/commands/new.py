@@ -61,14 +61,12 @@ def new(
     path = _path(name, out)
     if dh and batch is not None:
         raise UsageError("--dh and --batch: give one of the two")
-    if not dh and batch is None:
+    table: list[dict[str, str]] | None = None
+    if not dh and batch is None and sys.stdin is not None and sys.stdin.isatty():
         convention, table = _asked(convention)
-    elif convention is None:
-        raise UsageError(
-            "--convention is missing: standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz); the table's source says"
-        )
-    else:
-        table = _options(dh) if dh else _csv(batch or "-")
+    if not (dh or batch is not None or table) or convention is None:
+        raise _lacking(bool(dh or batch is not None), convention)
+    table = table or (_options(dh) if dh else _csv(batch or "-"))
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
     rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
@@ -79,6 +77,16 @@ def new(
     if path != "-":
         word = shlex.quote(path)
         output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
+
+
+def _lacking(table: bool, convention: str | None) -> UsageError:
+    """All that is missing, at once."""
+    lacks = [] if table else ["no table: give --dh ALPHA,A,D,THETA for each joint, or --batch FILE (a CSV)"]
+    if convention is None:
+        lacks.append(
+            "--convention is missing: standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz); the table's source says"
+        )
+    return UsageError("\n".join(lacks))
 
 
 def _path(name: str, out: str | None) -> str:
@@ -131,8 +139,6 @@ def _csv(source: str) -> list[dict[str, str]]:
 
 def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
     """The table by questions on the terminal; an answer that does not do is asked for again."""
-    if sys.stdin is None or not sys.stdin.isatty():
-        raise UsageError("no table: give --dh ALPHA,A,D,THETA for each joint, or --batch FILE (a CSV)")
 
     def ask(question: str, default: str, check: Callable[[str], object]) -> str:
         while True:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import inputs, output
-from armkin.cli.linking import Baud
+from armkin.cli.linking import SIM, Baud
 from armkin.cli.options import Robot
 
 
@@ -30,11 +30,17 @@ def teach(
     from armkin.teach.desk import Desk
     from armkin.teach.server import Server
 
-    desk = Desk(inputs.load(robot), port, baud)
+    arm = inputs.load(robot)
+    if port is not None and port != SIM:
+        from armkin.board.ports.serial_port import check
+
+        check(port)
+    desk = Desk(arm, port, baud)
     try:
         with Server(desk) as server:
             with output.destination(None) as write:
                 write(f"{server.address}\n")
+            output.note("Ctrl-C ends it" + (", after the arm has been stopped" if port is not None else ""))
             threading.Thread(target=desk.warm, daemon=True).start()
             if open:
                 import webbrowser
