@@ -42,7 +42,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
             for j in range(n):
                 held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
                 at += 1 if arm.prismatic[j] else 2
-        return recorded.candidates(inputs[:entries], held)
+        return recorded.candidates(inputs[:entries], held)[:-1]  # which joints are free is of no use here
 
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(entries)]
     if prefer:

@@ -126,7 +126,7 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]
     missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(candidates.doubt, values[0].shape).reshape(B, -1).T
+    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(B, -1).T
     return postures, q, valid
 
 

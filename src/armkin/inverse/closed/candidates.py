@@ -36,14 +36,14 @@ class Recorded:
         self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
-        """Joint values of all candidates, their squared residual and doubt: n + 2 arrays on branch axes."""
+        """Joint values of all candidates, their squared residual, edge and free of `Doubt`: n + 3 arrays."""
         assert self.geometry.pairs is not None
         found = self.geometry.pairs(goal, prefer)
         miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
         values = found.values()
         if len(self.task.sums):
             miss = np.maximum(miss, _sum_miss(self.task, values, goal))
-        return [*values, miss, found.doubt]
+        return [*values, miss, found.doubt.edge, found.doubt.free]
 
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
@@ -53,8 +53,8 @@ class Recorded:
             found = self.candidates(entries(self.task, target), [None] * self.arm.n)
         else:
             found = list(straight.run(entries(self.task, target), straight.workspace(N)))
-        *_, miss, doubt = rows = np.moveaxis(as_rows(found, N), 2, 0)
-        return np.moveaxis(rows[:-2], 0, 2), miss, np.asarray((doubt > 0).any(axis=1))
+        *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
+        return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
     def others(self, target: Array, near: Array) -> tuple[Array, NDArray[np.int64]]:
         """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
@@ -72,7 +72,7 @@ class Recorded:
         values = (near[:, None] + offsets).reshape(-1, n)
         prefer = preferred(self.arm, values)
         found = self.candidates(entries(self.task, goals.reshape(-1, *target.shape[1:])), prefer)
-        rows = as_rows(found[:-1], len(values))
+        rows = as_rows(found[: n + 1], len(values))
         B = rows.shape[1]
         rows = rows.reshape(N, -1, n + 1)
         q, miss = rows[:, :, :n], rows[:, :, n]

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, linear, rotation_between, spin
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, linear, rotation_between, spin
 from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel
@@ -48,7 +48,7 @@ class Elbow:
 
     def solve(
         self, p: list[Entry], past: list[Entry], prefer: Prefer, tip: list[Entry] | None = None
-    ) -> tuple[list[Pair], Bool]:
+    ) -> tuple[list[Pair], Doubt]:
         """Angles of the three joints that bring the tip to p.
 
         p: position in the base, entries (N,); past: an offset added to the tip in the frame
@@ -63,7 +63,7 @@ class Elbow:
         along = arrays.add(self.along if fore is None else arrays.add(self.rise, fore[2]), past[2])
         if self.prismatic1:
             ahead = arrays.sub(arrays.dot(n, [x, y, z]), along + arrays.dot(n, o))
-            first, doubt1 = Pair(ahead / n[2], None), np.zeros(1, bool)
+            first, doubt1 = Pair(ahead / n[2], None), Doubt(np.zeros(1, bool))
             z = z - first.c
         else:
             a = arrays.combine(n[0], [x], n[1], [y])[0]
@@ -90,7 +90,7 @@ class TwoLink:
 
     def solve(
         self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None
-    ) -> tuple[Pair, Pair, Bool]:
+    ) -> tuple[Pair, Pair, Doubt]:
         """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,); fore: m, if the target changes it."""
         lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
         # |r|^2 = |l + Rz(q3) m|^2

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.elbow import TwoLink
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
@@ -27,7 +27,7 @@ from armkin.model.rotation import FLIP, inverse
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Bool]]
+Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -91,7 +91,7 @@ def _two(chain: Chain) -> Solve:
     virtual = Chain(np.array([np.eye(4), *chain.link]), np.array([True, *chain.prismatic]))
     position = Position(virtual, chain.link[2][:3, 3])
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         pairs, doubt = position.solve([goal[0], goal[1], 0.0 * goal[0]], [Pair(0.0, None), *prefer])
         return pairs[1:], doubt
 
@@ -107,7 +107,7 @@ def _two_turning(chain: Chain) -> Solve:
     two_link = TwoLink(L1[:2, 3], (L1[:3, :3] @ tip)[:2], float(sense2))
     start = pose.constant(inverse(base))
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         # height does not matter: any point above or below the target will do
         p = pose.apply(start, [goal[0], goal[1], 0.0])
         first, second, doubt = two_link.solve(p[0], p[1], prefer[0], prefer[1])
@@ -155,7 +155,7 @@ def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
     back = pose.constant(inverse(chain.link[3]))
     two = _two(Chain(chain.link[:3], chain.prismatic[:2]))
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         R = _direction(goal, task, chain)
         x, y, _ = pose.turn(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
@@ -172,7 +172,7 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
     two = _two(Chain(back.link[:3], back.prismatic[:2]))
     axis = [float(v) for v in chain.link[0][:2, 3]]
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
         x, y = axis[0] - goal[0], axis[1] - goal[1]
         (third, second), doubt = two([c * x + s * y, c * y - s * x], [prefer[2], prefer[1]])
@@ -185,7 +185,7 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joints 1 and 3 slide, joint 2 turns: its angle is given, two equations linear in the slides."""
     link = [pose.constant(L) for L in chain.link]
 
-    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         second = _rest(goal, task, weights, [None, None, None], 1)
         P = pose.times(link[0], link[1])
         a = link[0][6:8]
@@ -194,10 +194,10 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
         end = pose.times(P, link[3])
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
-        doubt = np.abs(det) < 1e-9
+        parallel = np.abs(det) < 1e-9
         inverse_det = np.sign(det) / np.maximum(np.abs(det), 1e-9)
         d1 = (arrays.mul(x, b[1]) - arrays.mul(y, b[0])) * inverse_det
         d3 = (arrays.mul(a[0], y) - arrays.mul(a[1], x)) * inverse_det
-        return [Pair(d1, None), second, Pair(d3, None)], doubt
+        return [Pair(d1, None), second, Pair(d3, None)], Doubt(parallel, parallel)
 
     return solve

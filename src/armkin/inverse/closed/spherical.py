@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import Elbow
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
     Candidates,
+    Doubt,
     Pair,
     Prefer,
     distance2,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-Place = Callable[..., tuple[list[Pair], Bool]]
+Place = Callable[..., tuple[list[Pair], Doubt]]
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -142,7 +143,7 @@ class SphericalWrist:
 
     def _around(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
-    ) -> tuple[Pair, Pair, Bool, Entry]:
+    ) -> tuple[Pair, Pair, Doubt, Entry]:
         """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
 
         across: the square of z's part across joint 4, if the wrist can reach every z.
@@ -159,7 +160,7 @@ class SphericalWrist:
         return fourth, Pair(c6, s6), doubt4, wrong
 
     def _mirrored(
-        self, pairs: list[Pair], doubt: Bool, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
+        self, pairs: list[Pair], doubt: Doubt, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
     ) -> Candidates:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]

@@ -12,6 +12,7 @@ The caller says which axis by the shape of `signs`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -32,17 +33,38 @@ class Pair(NamedTuple):
 Prefer = Sequence[Pair | None]
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Which branches are on an edge.
+
+    edge: roots are about to merge, or a joint is free; free: of these, a joint is free, and what was found holds for
+    one of its values at most. Boolean entries, broadcastable to the branch axes.
+    """
+
+    edge: Bool
+    free: Entry = False
+
+    __array_ufunc__ = None  # an array on the left of | leaves it to this class
+
+    def __or__(self, other: Doubt | Bool) -> Doubt:
+        if isinstance(other, Doubt):
+            return Doubt(self.edge | other.edge, self.free | other.free)
+        return Doubt(self.edge | other, self.free)
+
+    __ror__ = __or__
+
+
 class Candidates(NamedTuple):
     """What a closed form returns: candidate branches, not yet told from false ones.
 
-    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these, branches on an edge. miss:
+    pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these. miss:
     squared residual of every branch (lengths in units of the reach), recomputed from the
     pairs, if the geometry has a shorter way than the whole chain; else None. angles: one a
     joint, its angle where the geometry knows it without an inverse function, else None.
     """
 
     pairs: list[Pair]
-    doubt: Bool
+    doubt: Doubt
     miss: Entry | None = None
     angles: Sequence[Entry | None] = ()
 
@@ -88,15 +110,14 @@ def signs(axis: int) -> Array:
 def linear(
     a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None,
     tangent: float = TANGENT,
-) -> tuple[Pair, Bool]:  # fmt: skip
+) -> tuple[Pair, Doubt]:  # fmt: skip
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
     a, b, c: broadcastable entries; axis: the branch axis of the two roots; scale: the
     length that makes a and b dimensionless; prefer: the angle to give where the equation
     leaves it free, or None to do without (such targets are in doubt and looked at again); disc:
     ``a^2 + b^2 - c^2`` if the caller knows it without cancellation; tangent: of it, where roots are about to
-    merge. Returns the pair and doubt, a
-    boolean array: True where the roots are about to merge or the angle is free.
+    merge. Returns the pair and doubt: where the roots are about to merge or the angle is free.
 
     Without a real root the pair is that of the closest angle, not normalised; the caller finds by
     its residual that it is no solution, or normalises it where the residual would not show.
@@ -105,20 +126,19 @@ def linear(
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     if disc is None:
         disc = h2 - c * c
-    doubt = np.abs(disc) < tangent * h2
+    edge = np.abs(disc) < tangent * h2
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
     least = FREE * scale * scale
     if isinstance(h2, float) and isinstance(least, float):
-        if h2 < least:
-            doubt = (c == c) | doubt  # the equation says nothing about the angle, whatever the target
+        free: Entry = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
         inverse: Entry = 1.0 / max(h2, least)
     else:
-        doubt = doubt | (h2 < least)
+        free = h2 < least
         inverse = 1.0 / np.maximum(h2, least)
     ci, ri = c * inverse, root * inverse
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
-    return _prefer(Pair(cos, sin), h2 < least, prefer), doubt
+    return _prefer(Pair(cos, sin), h2 < least, prefer), Doubt(edge | free, free)
 
 
 def normalised(pair: Pair) -> Pair:
@@ -135,12 +155,12 @@ def rotation_between(
     scale: Entry,
     prefer: Pair | None,
     length2: Entry | None = None,
-) -> tuple[Pair, Bool]:
+) -> tuple[Pair, Doubt]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
     length2: the squared length that u and v both have if the target is reached, where the
     caller knows it; the pair of a target that is not is then not normalised.
-    Returns the pair and doubt: True where u or v vanishes, so that the angle is free.
+    Returns the pair and doubt: where u or v vanishes, so that the angle is free.
     """
     c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
     s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
@@ -152,7 +172,7 @@ def rotation_between(
     else:
         free = length2 < least
         inverse = 1.0 / np.maximum(length2, least)
-    return _prefer(Pair(c * inverse, s * inverse), free, prefer), free
+    return _prefer(Pair(c * inverse, s * inverse), free, prefer), Doubt(free, free)
 
 
 def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
@@ -164,7 +184,7 @@ def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
 
 def quadratic(
     a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, least: Entry, prefer: Pair | None
-) -> tuple[Array, Bool]:
+) -> tuple[Array, Doubt]:
     """Solve ``a d^2 + b d + c = 0`` for both roots d.
 
     scale: a length of the size of d; least: the size of c below which, if all three are, the equation says
@@ -180,7 +200,7 @@ def quadratic(
     d = scale * half_tangent(pair)
     if prefer is not None and np.any(free):
         d = np.where(free, prefer.c, d)
-    return d, doubt | free
+    return d, doubt | Doubt(free, free)
 
 
 def half_tangent(pair: Pair) -> Entry:
@@ -193,7 +213,7 @@ def half_tangent(pair: Pair) -> Entry:
     return np.where(far, 1e9, above / np.where(far, 1.0, below))
 
 
-def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Bool]:
+def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Doubt]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
     e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
@@ -246,7 +266,8 @@ def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Bool]:
         shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
     merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
-    return Pair(c, s), merging | triple | (size < 1e-12 * scale)
+    free = size < 1e-12 * scale
+    return Pair(c, s), Doubt(merging | triple | free, free)
 
 
 def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:

@@ -21,10 +21,11 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
     Candidates,
+    Doubt,
     Pair,
     Prefer,
     half_tangent,
@@ -108,7 +109,7 @@ class Position:
         self.close = self.tolerance < off <= NEAR
         return off > self.tolerance
 
-    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Bool]:
+    def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
         x, y, z = pose.apply(self.from_base, p)
         square = x * x + y * y + z * z
@@ -149,7 +150,7 @@ class Position:
         six[0] = arrays.add(six[0], arrays.dot(weights.tolist(), known))
         return six
 
-    def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-_six(self.across)).tolist()
         if not self.prismatic[2]:
@@ -180,12 +181,12 @@ class Position:
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
 
-    def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Bool]:
+    def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Doubt]:
         """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
         pair, doubt = trig_quadratic(six, size * size)
         return normalised(pair), doubt
 
-    def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
             d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, 1e-12 * size, prefer[2])
@@ -205,7 +206,7 @@ class Position:
         second, doubt2 = linear(a, b, right, 1, size, prefer[1])
         return third, normalised(second), doubt | doubt2
 
-    def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Bool]:
+    def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
         # known_k - rows_k . y, coefficients of (1, b1, b2)
         across: list[list[Entry]] = (-self.rows @ self.Y).tolist()
@@ -247,13 +248,13 @@ class Position:
             third, doubt = self._roots(six, size)
         return third, Pair(_at(d2, third), None), doubt
 
-    def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Bool]:
+    def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         known, slope, other = coefficients
         if self.prismatic[2]:
             if abs(slope) < 1e-12:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
-            return Pair(arrays.mul(-1.0 / slope, known), None), np.zeros(1, bool)
+            return Pair(arrays.mul(-1.0 / slope, known), None), Doubt(np.zeros(1, bool))
         third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])
         return normalised(third), doubt
 

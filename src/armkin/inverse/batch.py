@@ -1,0 +1,101 @@
+"""Results of a batch as the solvers fill them: arrays of all targets, and how rows are written, packed and widened."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.branches.turns import nearest_row
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Batch(NamedTuple):
+    """q (N, B, n), valid, within, branch (N, B), status (N,), free (N, n), complete (N,)."""
+
+    q: Array
+    valid: Bool
+    within: Bool
+    branch: NDArray[np.int8]
+    status: NDArray[np.int8]
+    free: Bool
+    complete: Bool
+
+    def part(self, rows: slice) -> Batch:
+        return Batch(
+            self.q[rows],
+            self.valid[rows],
+            self.within[rows],
+            self.branch[rows],
+            self.status[rows],
+            self.free[rows],
+            self.complete[rows],
+        )
+
+
+def empty(N: int, B: int, n: int) -> Batch:
+    return Batch(
+        np.empty((N, B, n)),
+        np.empty((N, B), bool),
+        np.empty((N, B), bool),
+        np.empty((N, B), np.int8),
+        np.zeros(N, np.int8),
+        np.zeros((N, n), bool),
+        np.ones(N, bool),
+    )
+
+
+def write(
+    arm: Arm, out: Batch, rows: NDArray[np.intp], q: Array, valid: Bool, label: NDArray[np.int64], near: Array
+) -> None:
+    """Write branches (K, W, n) of some targets at their nearest legal copies, nan behind."""
+    width = q.shape[1]
+    copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
+    out.q[rows], out.valid[rows], out.within[rows], out.branch[rows] = np.nan, False, False, -1
+    out.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
+    out.valid[rows, :width] = valid
+    out.within[rows, :width] = inside & valid
+    out.branch[rows, :width] = np.where(valid, label, -1)
+
+
+def named(label: NDArray[np.int64], valid: Bool) -> NDArray[np.int64]:
+    """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
+    out = np.where(valid, label, -1)
+    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
+        taken: set[int] = set()
+        for b in np.flatnonzero(valid[row]):
+            if out[row, b] < 0 or out[row, b] in taken:
+                out[row, b] = next(i for i in range(out.shape[1] + len(taken) + 1) if i not in {*taken, *out[row]})
+            taken.add(int(out[row, b]))
+    return out
+
+
+def wider(out: Batch, width: int) -> Batch:
+    """The same with more columns, empty."""
+    N, B, n = out.q.shape
+    wide = empty(N, width, n)
+    wide.q[:, :B], wide.valid[:, :B], wide.within[:, :B], wide.branch[:, :B] = out.q, out.valid, out.within, out.branch
+    wide.status[...], wide.free[...], wide.complete[...] = out.status, out.free, out.complete
+    wide.q[:, B:], wide.valid[:, B:], wide.within[:, B:], wide.branch[:, B:] = np.nan, False, False, -1
+    return wide
+
+
+def pack(part: Batch, partial: Bool) -> None:
+    """Move the branches of some targets to the front, nan behind."""
+    some = np.flatnonzero(partial)
+    if not len(some):
+        return
+    valid = part.valid[some]
+    count = valid.sum(axis=1)
+    row, column = np.nonzero(valid)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
+    for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+        old = array[some]
+        new = np.full_like(old, missing)
+        new[row, place] = old[row, column]
+        array[some] = new
+    part.valid[some] = np.arange(valid.shape[1]) < count[:, None]

@@ -1,0 +1,111 @@
+"""Targets that a solver doubts: decided all at once where that will do, else posture by posture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse import regular, singularities
+from armkin.inverse.batch import Batch, named, wider, write
+from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
+from armkin.inverse.numeric.tolerances import SAME
+from armkin.inverse.solutions import Status
+from armkin.inverse.tasks.task import Task
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+AT_ONCE = 256  # targets examined together
+
+
+def decided(
+    arm: Arm,
+    task: Task,
+    runner: Recorded,
+    out: Batch,
+    target: Array,
+    near: Array,
+    doubtful: NDArray[np.intp],
+    q: Array,
+    valid: Bool,
+    free: Bool,
+) -> Batch:
+    """Decide what doubtful targets (K,) are: those that are regular all at once, the others posture by posture.
+
+    q: (K, B, n) their candidates, valid: (K, B), free: (K,) a joint is free, so that the candidates are not all.
+    """
+    left = free.copy()
+    for start in range(0, len(doubtful), AT_ONCE):
+        part = start + np.flatnonzero(~free[start : start + AT_ONCE])
+        rows = doubtful[part]
+        if not len(part):
+            continue
+        found = regular.settle(arm, task, q[part], valid[part], target[rows], near[rows])
+        left[part] = ~found.known
+        double = np.flatnonzero(found.known & found.double)
+        if len(double):
+            order = np.argsort(~found.branch[double], axis=1, kind="stable")
+            kept = np.take_along_axis(q[part[double]], order[:, :, None], axis=1)
+            there = np.take_along_axis(found.branch[double], order, axis=1)
+            write(arm, out, rows[double], kept, there, order, near[rows[double]])
+            out.status[rows[double]] = Status.BOUNDARY
+
+    def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
+        """With the preferred values for joints that are free, and those that other values would change."""
+        some = open_[some]
+        if not free[some].any():
+            return q[some], np.zeros(q[some].shape[:2], bool)
+        rows = doubtful[some]
+        goal = entries(task, target[rows])
+        first, other = (
+            as_rows(runner.candidates(goal, preferred(arm, near[rows] + shift))[: arm.n], len(rows))
+            for shift in (0.0, 1.0)
+        )
+        loose = ~(np.abs(first - other).max(axis=2) < SAME)
+        if not loose.any():
+            return first, loose
+        other[~loose] = np.nan
+        return np.concatenate([first, other], axis=1), np.concatenate([loose, np.zeros_like(loose)], axis=1)
+
+    open_ = np.flatnonzero(left)
+    return examined(arm, task, out, target, near, doubtful[open_], candidates, runner.others)
+
+
+def examined(
+    arm: Arm,
+    task: Task,
+    out: Batch,
+    target: Array,
+    near: Array,
+    doubtful: NDArray[np.intp],
+    candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
+    others: Callable[[Array, Array], tuple[Array, NDArray[np.int64]]] | None,
+) -> Batch:
+    """Examine the doubtful targets and write what is found: branches first, nan behind.
+
+    candidates: joint values (K, M, n) for some of the doubtful ones, and which depend on `near` (K, M); others: more
+    of them, for targets and preferred values.
+    """
+    for start in range(0, len(doubtful), AT_ONCE):
+        rows = doubtful[start : start + AT_ONCE]
+        goal, close, columns = target[rows], near[rows], out.q.shape[1]
+        q, loose = candidates(np.arange(start, start + len(rows)))
+
+        def more(some: NDArray[np.int64], goal: Array = goal, close: Array = close) -> Any:
+            assert others is not None
+            return others(goal[some], close[some])
+
+        seen = singularities.examine(
+            arm, task, q, np.arange(q.shape[1]) % columns, loose, goal, close, None if others is None else more
+        )
+        width = seen.q.shape[1]
+        if width > out.q.shape[1]:
+            out = wider(out, width)
+        write(arm, out, rows, seen.q, seen.valid, named(seen.label, seen.valid), close)
+        out.status[rows], out.free[rows] = seen.status, seen.free
+        out.complete[rows] &= ~seen.again
+    return out

@@ -1,0 +1,77 @@
+"""Doubtful targets that are decided all at once come out as those examined posture by posture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import truth
+from oracle import goal
+from test_every_branch import shipped
+
+import armkin
+from armkin import Status
+from armkin.inverse import regular
+from armkin.inverse.numeric import newton
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm
+
+NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma560", "ur5e", "irb2400", "stanford"]
+
+
+def nearly_singular(name: str) -> tuple[Arm, armkin.Solutions]:
+    """Answers for targets 1e-7 to 1e-3 rad off singular postures."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(3)
+    q = np.concatenate(list(truth.singular_postures(arm, screw, None, 12, seed=3).values()))
+    off = 10.0 ** rng.uniform(-7, -3, (len(q), 1)) * rng.uniform(-1, 1, q.shape)
+    q = q + off * np.where(arm.prismatic, arm.reach, 1.0)
+    return arm, armkin.ik(arm, goal(task, screw, q).array())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_at_once_is_as_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, at_once = nearly_singular(name)
+    decided = []
+
+    def nothing(arm: Arm, task: object, q: np.ndarray, *rest: object) -> regular.Regular:
+        decided.append(len(q))
+        none = np.zeros(len(q), bool)
+        return regular.Regular(none, np.zeros(q.shape[:2], bool), none)
+
+    monkeypatch.setattr(regular, "settle", nothing)
+    _, one_by_one = nearly_singular(name)
+    assert sum(decided) > 4
+    for k in range(len(at_once.status)):
+        a, b = at_once.q[k][at_once.valid[k]], one_by_one.q[k][one_by_one.valid[k]]
+        assert len(a) == len(b)
+        assert at_once.status[k] == one_by_one.status[k]
+        if at_once.status[k] == Status.EXACT:
+            assert newton.wrapped_distance(arm, a[:, None], b[None]).min(axis=1).max(initial=0.0) < 1e-6
+    assert (at_once.complete == one_by_one.complete).all()
+
+
+@pytest.mark.parametrize("name", ["three_dof", "puma560", "ur5e"])
+def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: no singular value, one call."""
+    known = []
+    settle = regular.settle
+
+    def counted(*args: object) -> regular.Regular:
+        found = settle(*args)  # type: ignore[arg-type]
+        known.append(found.known)
+        return found
+
+    monkeypatch.setattr(regular, "settle", counted)
+    arm, _ = shipped(name)
+    task, _ = solver(arm, None)
+    screw = shipped(name)[1]
+    rng = np.random.default_rng(4)
+    q = rng.uniform(-np.pi, np.pi, (100, arm.n))
+    straight = {"three_dof": 0.0, "puma560": np.arctan2(20.32, 431.8) - np.pi / 2, "ur5e": 0.0}[name]
+    q[:, 2] = straight + 10.0 ** rng.uniform(-4.5, -3.6, 100) * rng.choice([-1.0, 1.0], 100)
+    answers = armkin.ik(arm, goal(task, screw, q).array())
+    assert len(known) == 1
+    assert known[0].mean() > 0.9, known[0].mean()
+    assert len(known[0]) > 50
+    assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
