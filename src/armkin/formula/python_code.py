@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -21,13 +22,13 @@ _PYTHON = {
     "maximum": "max({}, {})",
     "minimum": "min({}, {})",
     "power": "{} ** {}",
-    "sqrt": "math.sqrt({})",
-    "cbrt": "math.cbrt({})",
-    "tan": "math.tan({})",
-    "arctan2": "math.atan2({}, {})",
+    "sqrt": "sqrt({})",
+    "cbrt": "cbrt({})",
+    "tan": "tan({})",
+    "arctan2": "atan2({}, {})",
     "rint": "float(round({}))",
-    "sign": "math.copysign(1.0, {0}) if {0} else 0.0",
-    "copysign": "math.copysign({}, {})",
+    "sign": "copysign(1.0, {0}) if {0} else 0.0",
+    "copysign": "copysign({}, {})",
     "less": "{} < {}",
     "less_equal": "{} <= {}",
     "greater": "{} > {}",
@@ -37,30 +38,59 @@ _PYTHON = {
     "bitwise_and": "{} and {}",
     "where": "{1} if {0} else {2}",
 }
+_FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "atan2", "copysign")}
+DEEPEST = 20  # brackets within brackets that a line may have: Python's parser takes 200
+
+Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
 
 
 def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
-    """One Python expression a line and branch, branch axes unrolled: a function of the inputs as numbers."""
-    names: dict[int, dict[tuple[int, ...], str]] = {id(node): {(): f"i{k}"} for k, node in enumerate(recording.inputs)}
-    lines = []
+    """Branch axes unrolled, one line a value that is used more than once: a function of the inputs as numbers."""
+    same: dict[Value, Value | str] = {}
 
-    def name(x: Any, index: tuple[int, ...]) -> str:
+    def value(x: Any, index: tuple[int, ...]) -> Value | str:
+        """What an argument is on a branch: a value, or a constant's digits."""
         axes = axes_of(x)
         at = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
         if isinstance(x, Node):
-            return names[id(x)][at]
+            return same.get((id(x), at), (id(x), at))
         return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
 
-    for k, node in enumerate(recording.nodes):
-        names[id(node)] = {}
-        for b, index in enumerate(np.ndindex(*node.axes)):
-            names[id(node)][index] = f"t{k}_{b}"
-            lines.append(f"t{k}_{b} = " + _PYTHON[node.op].format(*(name(x, index) for x in node.args)))
-    outputs = []
-    for x in recording.outputs:
-        every = [name(x, index) for index in np.ndindex(*axes_of(x))]
-        outputs.append(f"({', '.join(every)},)" if axes_of(x) else every[0])
-    return function_of([names[id(x)][()] for x in recording.inputs], lines, outputs, {"math": math})
+    todo: list[tuple[Value, str, list[Value | str]]] = []
+    uses: Counter[Value | str] = Counter()
+    for node in recording.nodes:
+        for index in np.ndindex(*node.axes):
+            args = [value(x, index) for x in node.args]
+            if node.op == "multiply" and "1.0" in args:  # a sign of branches
+                same[id(node), index] = args[1 - args.index("1.0")]
+                continue
+            todo.append(((id(node), index), node.op, args))
+            uses.update(args * 2 if node.op == "sign" else args)
+    outputs = [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
+    uses.update(x for every in outputs for x in every)
+    texts: dict[Value | str, tuple[str, int]] = {
+        (id(node), ()): (f"i{k}", 0) for k, node in enumerate(recording.inputs)
+    }
+    lines: list[str] = []
+
+    def text(x: Value | str) -> tuple[str, int]:
+        return (x, 0) if isinstance(x, str) else texts[x]
+
+    for result, op, args in todo:
+        shown = [text(x) for x in args]
+        line, depth = _PYTHON[op].format(*(t for t, _ in shown)), 1 + max(d for _, d in shown)
+        if uses[result] == 1 and depth < DEEPEST:
+            texts[result] = f"({line})", depth
+        else:
+            name = f"t{len(lines)}"
+            lines.append(f"{name} = {line}")
+            texts[result] = name, 0
+    returned = []
+    for x, every in zip(recording.outputs, outputs, strict=True):
+        shown = [text(v) for v in every]
+        joined = ", ".join(t for t, _ in shown)
+        returned.append(f"({joined},)" if axes_of(x) else joined)
+    return function_of([texts[id(x), ()][0] for x in recording.inputs], lines, returned, dict(_FUNCTIONS))
 
 
 def function_of(

@@ -33,14 +33,20 @@ class Straight:
         assert self._batch is not None  # written for the workspace
         return self._batch[0](*inputs, *workspace)
 
-    def single(self, inputs: Sequence[float]) -> list[Array]:
-        """The formula's outputs for one pose, as arrays (*branch axes, 1).
+    @property
+    def outputs(self) -> list[Any]:
+        """What is recorded of each output: a node, an array or a number."""
+        return self._recording.outputs
 
-        In plain Python numbers: for one pose a call of numpy costs more than what it computes.
-        """
+    def numbers(self) -> Callable[..., tuple[Any, ...]]:
+        """The formula for one pose in plain Python: takes numbers; an output on branch axes is a tuple of them."""
         if self._run_single is None:
             self._run_single = python_code.write(self._recording)
-        values = self._run_single(*inputs)
+        return self._run_single
+
+    def single(self, inputs: Sequence[float]) -> list[Array]:
+        """The formula's outputs for one pose, as arrays (*branch axes, 1)."""
+        values = self.numbers()(*inputs)
         return [
             np.array(v).reshape(*axes_of(x), 1) if isinstance(v, tuple) else np.array([v])
             for x, v in zip(self._recording.outputs, values, strict=True)

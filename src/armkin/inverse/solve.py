@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse import single
 from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -54,10 +55,13 @@ def ik(
     >>> s.names[s.branch[s.best]], np.rad2deg(s.q[s.best]).round(4).tolist()
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
+    values = arrays.real(targets, "targets")
+    if examine and values.ndim <= 2 and (alone := single.solve(arm, values, task, near)) is not None:
+        return alone
     if (turned := actual(arm)) is not arm:
         return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine))
     definition, geometry = solver(arm, task)
-    target, lead, rounding = read_targets(definition, targets)
+    target, lead, rounding = read_targets(definition, values)
     close = arm.home if near is None else arrays.real(near, "near")
     if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")

@@ -61,6 +61,38 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     return value, ~outside
 
 
+def nearest_number(value: float, near: float, lower: float, upper: float, slides: bool) -> tuple[float, bool]:
+    """`nearest_copy` of one number, operation by operation; a joint that slides has no copies.
+
+    >>> nearest_number(3.0, -2.0, -4.0, 4.0, False) == (3.0 - TURN, True)
+    True
+    """
+    low, high = lower - SLACK, upper + SLACK
+    if slides:
+        return value, low <= value <= high
+    if lower >= -math.pi and upper <= math.pi:
+        legal = low <= value <= high
+        if (low <= -math.pi or high >= math.pi) and abs(value) > math.pi - SLACK:
+            other = value - math.copysign(TURN, value)
+            if low <= other <= high and (not legal or abs(other - near) < abs(value - near)):
+                return other, True
+        return value, legal
+    principal, first = value, -math.pi
+    if near != 0.0:
+        value, first = value + TURN * float(round((near - value) / TURN)), near - math.pi
+    if (lower <= first and upper >= first + TURN) or low <= value <= high:
+        return value, True
+    if value < low and upper > first + TURN - SLACK:
+        moved = value + TURN * math.ceil((low - value) / TURN)
+        if moved <= high:
+            return moved, True
+    if value > high and lower < first + SLACK:
+        moved = value - TURN * math.ceil((value - upper - SLACK) / TURN)
+        if moved >= low:
+            return moved, True
+    return principal, False
+
+
 def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
     if (turned := actual(arm)) is not arm:

@@ -113,7 +113,7 @@ def read_targets(task: Task, targets: ArrayLike) -> Targets:
 
 
 @cache
-def _rotation_check() -> Straight:
+def rotation_check() -> Straight:
     """How far the columns x and z are from unit vectors at right angles, and y from z x x."""
 
     def formula(P: pose.Pose) -> list[Entry]:
@@ -130,7 +130,7 @@ def _rotation_check() -> Straight:
 
 def _off(T: Array) -> Array:
     """How far the columns of (N, 4, 4) are from those of rotations: (N,)."""
-    check = _rotation_check()
+    check = rotation_check()
     if len(T) == 1:
         return check.single(pose.read_one(T[0]))[0]
     return np.asarray(check.run(pose.read(T), check.workspace(len(T)))[0])

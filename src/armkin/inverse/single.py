@@ -1,0 +1,148 @@
+"""One target of a closed form in plain numbers: for one pose a call of numpy costs more than what it computes.
+
+The operations are those of a batch; what is not plain (an edge, a rounded rotation, a far slide) is left to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.formula import arrays
+from armkin.formula.arrays import Array
+from armkin.formula.recording import axes_of
+from armkin.inverse.branches.names import branch_names
+from armkin.inverse.branches.turns import nearest_number
+from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
+from armkin.inverse.recognise import solver
+from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
+from armkin.model.arm import actual
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def solve(arm: Arm, target: Array, task: str | None, near: ArrayLike | None) -> Solutions | None:
+    """The branches of a single target; None if it is a batch, or if there is more to it."""
+    one = _prepared(arm, task)
+    if one is None or target.shape != one.shape:
+        return None
+    if near is None:
+        return one.solve(target, arm.home)
+    close = arrays.real(near, "near")
+    return one.solve(target, close) if close.shape == (arm.n,) and np.isfinite(close).all() else None
+
+
+@lru_cache(maxsize=64)
+def _prepared(arm: Arm, task: str | None) -> OneTarget | None:
+    """The short way of an arm and task, prepared at its first use; None if there is none."""
+    if actual(arm) is not arm or solver(arm, task)[1].pairs is None:
+        return None
+    return OneTarget(arm, task)
+
+
+class OneTarget:
+    """A closed form for one target at a time."""
+
+    def __init__(self, arm: Arm, task: str | None) -> None:
+        definition, geometry = solver(arm, task)
+        self.orientation, self.position = definition.orientation, definition.position
+        self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
+        straight = recorded(arm, definition, geometry).code.always()
+        self._run, self._off = straight.numbers(), rotation_check().numbers()
+        self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
+        own = [axes_of(x) for x in straight.outputs]
+        axes = np.broadcast_shapes((1, 1, 1), *own[: arm.n])
+        self.count = math.prod(axes)
+        self._plain = [not a for a in own]  # outputs that are a number, not a tuple
+        places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in own[: arm.n + 1]]
+        first = np.cumsum([0, *(math.prod(a) for a in own[: arm.n - 1])])
+        # of all joints' values one after the other, those of every branch
+        index = np.stack(places[: arm.n], axis=1) + first
+        self._rows = [itemgetter(*row, row[0]) for row in index.tolist()]  # one more: of one alone it makes no tuple
+        self._all = itemgetter(*index.ravel().tolist(), 0)
+        self._misses = itemgetter(*places[-1].tolist(), 0)
+        self._base, self._reach = arm.link[0][: self.position, 3].tolist(), arm.reach
+        self._slides, self._ordered, self._n = bool(arm.prismatic.any()), geometry.ordered, arm.n
+        self._same = {"arm": arm, "task": definition, "method": geometry.name, "why": geometry.why}
+        self._same["names"] = branch_names(arm, definition, geometry, self.count)
+
+    def solve(self, target: Array, near: Array) -> Solutions | None:
+        """The branches of a target of the task's shape; near: (n,)."""
+        goal, off = target.ravel().tolist(), 0.0
+        if not math.isfinite(sum(goal)) or max(goal) > LARGEST or min(goal) < -LARGEST:
+            return None
+        kept = target.copy()
+        if self.orientation == "full":
+            goal = [*goal[0:11:4], *goal[1:11:4], *goal[2:11:4], *goal[3:12:4]]
+            off = self._off(*goal)[0]
+            if off > ROUNDED:
+                return None
+            point = goal[9:]
+        else:
+            point = goal[: self.position]
+            if self.orientation == "axis":
+                length = math.sqrt(goal[3] * goal[3] + goal[4] * goal[4] + goal[5] * goal[5])
+                if length < 1e-12:
+                    return None
+                kept[3:] /= length
+                goal = kept.tolist()
+        if self._slides and math.dist(point, self._base) > FAR * self._reach:
+            return None
+        *values, miss, doubt, _ = self._run(*goal)
+        if doubt if self._plain[-2] else any(doubt):
+            return None
+        misses = self._misses((miss,) if self._plain[-3] else miss)[:-1]
+        there = [b for b, m in enumerate(misses) if m <= ACCEPTED**2]
+        if len(there) < self.count and sum(m > NEARBY**2 for m in misses) + len(there) < self.count:
+            return None
+        return self._found(kept, near, values, there, off)
+
+    def _found(self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float) -> Solutions:
+        """The branches that are there, at their nearest legal copies, nan behind."""
+        legal: list[float] = []
+        inside: list[bool] = []
+        for value, close, joint, plain in zip(values, near.tolist(), self._joints, self._plain, strict=False):
+            for v in (value,) if plain else value:
+                copy, ok = nearest_number(v, close, *joint)
+                legal.append(copy)
+                inside.append(ok)
+        B, n, count = self.count, self._n, len(there)
+        if count == B:
+            q = np.array(self._all(legal)[:-1]).reshape(B, n)
+        else:
+            q = np.full((B, n), np.nan)
+            for place, b in enumerate(there):
+                q[place] = self._rows[b](legal)[:-1]
+        within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
+        none = B - count
+        block = np.array([
+            *[True] * count, *[False] * none, *within, *[False] * none,
+            *(there if self._ordered else range(count)), *[-1] * none,
+            *[False] * n, Status.EXACT if count else Status.UNREACHABLE, True,
+        ], np.int8)  # fmt: skip
+        flags = block.view(np.bool_)
+        end = 3 * B + n
+        out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one
+        out.__dict__.update(
+            self._same,
+            target=target,
+            near=near.copy(),
+            q=q,
+            valid=flags[:B],
+            within_limits=flags[B : 2 * B],
+            branch=block[2 * B : 3 * B],
+            free=flags[3 * B : end],
+            status=block[end : end + 1].reshape(()),
+            complete=flags[end + 1 :].reshape(()),
+            rounding=np.array(off),
+        )
+        return out

@@ -1,0 +1,97 @@
+"""One target in plain numbers is answered as in a batch."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from oracle import goal
+from test_every_branch import NAMES, shipped
+
+import armkin
+from armkin.inverse import single
+from armkin.inverse.branches.turns import nearest_copy, nearest_number
+from armkin.inverse.recognise import solver
+from armkin.model.arm import Arm
+
+CLOSED = [name for name in NAMES if solver(shipped(name)[0], None)[1].pairs]
+FIELDS = [f.name for f in fields(armkin.Solutions)]
+
+
+def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
+    """One target by the short way, and a check that it is as in a batch."""
+    alone = single.solve(arm, target, None, near)
+    batch = armkin.ik(arm, target[None], near=None if near is None else near[None])
+    if alone is None:
+        return None
+    for name in FIELDS:
+        a, b = getattr(alone, name), getattr(batch, name)
+        if isinstance(b, np.ndarray):
+            assert a.shape == b.shape[1:], name
+            assert a.dtype == b.dtype, name
+            if name == "q":  # numpy's vectors and the C library round tangents in their own ways
+                assert np.allclose(a, b[0], rtol=0, atol=1e-7 * max(arm.reach, 1.0), equal_nan=True)
+            elif name in ("target", "rounding"):
+                assert np.allclose(a, b[0], rtol=0, atol=1e-15 * max(arm.reach, 1.0))
+            else:
+                assert (a == b[0]).all(), name
+        elif name != "arm":
+            assert a == b, name
+    return alone
+
+
+@pytest.mark.parametrize("name", CLOSED)
+@pytest.mark.parametrize("limits", ["own", "half a turn", "narrow", "wide", "none"])
+def test_one_is_as_in_a_batch(name: str, limits: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    turn = np.where(arm.prismatic, 300.0, np.pi)
+    lower, upper = {
+        "own": (arm.lower, arm.upper),
+        "half a turn": (-turn, turn),
+        "narrow": (-0.4 * turn, 0.3 * turn),
+        "wide": (-1.6 * turn, 2.2 * turn),
+        "none": (np.full(arm.n, -np.inf), np.full(arm.n, np.inf)),
+    }[limits]
+    arm = replace(arm, lower=lower, upper=upper)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-np.pi, np.pi, (30, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
+    targets = goal(task, screw, q).array()
+    short = 0
+    for k, target in enumerate(targets):
+        near = None if k % 3 == 0 else rng.uniform(-1.5, 1.5, arm.n) * turn
+        alone = ask(arm, target, near)
+        short += alone is not None and bool(alone.valid.any())
+    assert short > 25
+    beyond = targets[0].copy()
+    beyond[(..., 3) if beyond.ndim == 2 else slice(0, 2)] *= 1.0 if beyond.ndim == 2 else 50.0
+    if beyond.ndim == 2:
+        beyond[:3, 3] += 3.0 * arm.reach
+    ask(arm, beyond, None)
+
+
+def test_what_is_not_plain_is_left_to_the_batch() -> None:
+    arm = shipped("puma560")[0]
+    T = armkin.fk(arm, np.full(6, 0.3))
+    rounded = T.round(8)
+    assert single.solve(arm, T, None, None) is not None
+    assert single.solve(arm, rounded, None, None) is None  # made a rotation first
+    assert single.solve(arm, T * np.nan, None, None) is None
+    assert single.solve(arm, np.array([T, T]), None, None) is None
+    assert single.solve(arm, T, None, [0.0] * 5) is None
+    assert single.solve(arm, armkin.fk(arm, np.zeros(6)), None, None) is None  # the wrist is singular
+
+
+ANGLE = st.floats(-np.pi, np.pi)
+EDGE = st.sampled_from([-2 * np.pi, -np.pi, -1.0, 0.0, 1.0, np.pi, 2 * np.pi, -np.inf, np.inf])
+
+
+@given(ANGLE | EDGE.filter(lambda x: abs(x) <= np.pi), st.floats(-20, 20) | st.just(0.0), EDGE | ANGLE, EDGE | ANGLE)
+def test_a_number_has_the_copy_that_it_has_in_an_array(value: float, near: float, one: float, other: float) -> None:
+    lower, upper = min(one, other), max(one, other)
+    assume(lower < np.inf and upper > -np.inf)
+    copy, inside = nearest_copy(np.array([value]), near, lower, upper)
+    assert nearest_number(value, near, lower, upper, False) == (copy[0], np.broadcast_to(inside, 1)[0])
