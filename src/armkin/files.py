@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import IO, Any, Literal
@@ -55,6 +54,8 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
             return
         if there is not None:
             _check_replaceable(name, real, there)
+        import tempfile  # needed for writing alone: it takes a millisecond
+
         handle, temporary = tempfile.mkstemp(prefix=".armkin-", suffix=".part", dir=os.path.dirname(real))
         try:
             with _open(handle, mode) as file:

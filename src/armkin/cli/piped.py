@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -141,6 +140,8 @@ def _parts(text: str) -> list[str]:
 
 
 def _parsed(text: str) -> dict[str, Any]:
+    import json
+
     try:
         answer = json.loads(text)
     except (ValueError, RecursionError):

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse import singularities
+from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, SAME, SEED, SOLUTION
@@ -42,16 +44,19 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     size = np.sqrt((r * r).sum(axis=1)).reshape(K, B + 1)
     # `near` is no branch itself, accepted candidates need no correction, and others are beyond it
     known = (size[:, 0] > SOLUTION) & valid.any(axis=1)
-    known &= ~(valid & ~(size[:, 1:] < CLOSED)).any(axis=1) & ~(~valid & (size[:, 1:] < SEED)).any(axis=1)
+    known &= ~(valid & ~(size[:, 1:] < CLOSED)).any(axis=1)
     sigma = np.ones((K, B))
     sigma[valid] = _weakest(arm, task, J.reshape(K, B + 1, *J.shape[1:])[:, 1:][valid])
-    known &= (sigma > 1.1 * MOVING).all(axis=1)
+    known &= ~_open(arm, task, q, valid, size[:, 1:], sigma, target)
     with np.errstate(invalid="ignore"):
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
         clusters = (away < CLUSTER).sum(axis=2) > 2
+    if clusters.any():  # roots of third or fourth order: their mean is right to rounding
+        mean = singularities.means(arm, q)[clusters]
+        clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < size[:, 1:][clusters]
     two = valid[:, :, None] & valid[:, None]
     close = np.triu(two & (away < HAIR) & known[:, None, None], 1)
-    same = 2 * SAME + 1e-13 / sigma
+    same = 2 * SAME + np.minimum(2e-13 / np.maximum(sigma, 1e-300), 4e-4)
     known &= ~clusters.any(axis=1) & ~(close & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
     one = np.zeros((K, B, B), bool)
     k, i, j = np.nonzero(close)
@@ -65,6 +70,21 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     second = size[:, None, 1:] < size[:, 1:, None]  # the more exact of two stays
     branch = valid & ~(one & second).any(axis=2) & ~(one & ~second).any(axis=1)
     return Regular(known, branch, merged | (branch & (sigma < DOUBLE)).any(axis=1))
+
+
+def _open(arm: Arm, task: Task, q: Array, valid: Bool, size: Array, sigma: Array, target: Array) -> Bool:
+    """Targets (K,) of which a branch may lie on a self-motion, or a candidate may yet become a branch."""
+    weak, near = valid & (sigma < 1.1 * MOVING), ~valid & (size < SEED)
+    k, b = np.nonzero(weak | near)
+    open_ = np.zeros(len(q), bool)
+    if len(k):
+        at = folds(arm, task, q[k, b], target[k])
+        bent = np.abs(at.bend) > BENT
+        # beyond a fold, and what else is missing is so little that putting it right does not lead back
+        beyond = (at.weakest < 1e-6) & (at.lost * at.bend > 0) & (np.abs(at.lost) > 10 * SOLUTION)
+        beyond &= (at.rest < 1e-3) & (100 * at.rest**2 < np.abs(at.lost))
+        np.logical_or.at(open_, k, ~(bent & (weak[k, b] | beyond)))
+    return open_
 
 
 def _weakest(arm: Arm, task: Task, J: Array) -> Array:

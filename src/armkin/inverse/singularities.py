@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     CLUSTER,
@@ -131,6 +132,10 @@ def _settle(
         if len(some):
             k, b = k[some], b[some]
             asked[k, b] = True
+            straight = ~(np.abs(folds(arm, task, q[k, b], target[k]).bend) > BENT)
+            if not straight.any():
+                return
+            k, b = k[straight], b[straight]
             moves[k, b], which[k, b] = _self_motion(
                 arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k]
             )
@@ -208,7 +213,7 @@ def _onto(
     known = np.flatnonzero(~np.isnan(flat).any(axis=1))
     size = np.full(len(flat), np.inf)
     size[known] = newton.missing(arm, task, flat[known], goals[known])
-    mean = np.concatenate([near[:, None], _means(arm, q)], axis=1).reshape(-1, n)
+    mean = np.concatenate([near[:, None], means(arm, q)], axis=1).reshape(-1, n)
     better = newton.missing(arm, task, mean[known], goals[known]) < size[known]
     flat[known[better]] = mean[known[better]]
     own = np.zeros(both.shape[:2], bool)
@@ -239,7 +244,7 @@ def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: 
     return np.asarray(same)
 
 
-def _means(arm: Arm, q: Array) -> Array:
+def means(arm: Arm, q: Array) -> Array:
     """Candidates (K, B, n), the mean of its cluster for each that has two others around it.
 
     Of a root of third or fourth order rounding leaves three or four, off by its third or fourth root; their

@@ -31,10 +31,16 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     return r, J
 
 
-def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Size of the residual (M,), lengths in units of the arm's reach."""
+def residuals(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Residuals (M, r), lengths in units of the arm's reach."""
     r = residual(task, fk(arm, q), q, target)
     r[:, : task.position] /= arm.reach
+    return r
+
+
+def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Size of the residual (M,), lengths in units of the arm's reach."""
+    r = residuals(arm, task, q, target)
     size: Array = np.linalg.norm(r, axis=1)
     return np.where(np.isnan(size), np.inf, size)
 
