@@ -83,25 +83,27 @@ def examined(
     near: Array,
     doubtful: NDArray[np.intp],
     candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
-    others: Callable[[Array, Array], tuple[Array, NDArray[np.int64]]] | None,
+    others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64]]],
+    unsettled: Bool | None = None,
 ) -> Batch:
     """Examine the doubtful targets and write what is found: branches first, nan behind.
 
     candidates: joint values (K, M, n) for some of the doubtful ones, and which depend on `near` (K, M); others: more
-    of them, for targets and preferred values.
+    of them, for targets and preferred values, and whether branches seem lost; unsettled: (N,), see
+    `singularities.examine`.
     """
     for start in range(0, len(doubtful), AT_ONCE):
         rows = doubtful[start : start + AT_ONCE]
         goal, close, columns = target[rows], near[rows], out.q.shape[1]
         q, loose = candidates(np.arange(start, start + len(rows)))
 
-        def more(some: NDArray[np.int64], goal: Array = goal, close: Array = close) -> Any:
-            assert others is not None
-            return others(goal[some], close[some])
+        def more(some: NDArray[np.int64], lost: Bool, goal: Array = goal, close: Array = close) -> Any:
+            return others(goal[some], close[some], lost)
 
         seen = singularities.examine(
-            arm, task, q, np.arange(q.shape[1]) % columns, loose, goal, close, None if others is None else more
-        )
+            arm, task, q, np.arange(q.shape[1]) % columns, loose, goal, close, more,
+            None if unsettled is None else unsettled[rows],
+        )  # fmt: skip
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)

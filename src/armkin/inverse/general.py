@@ -69,7 +69,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
         return Rows(
-            np.take_along_axis(own, order[:, :, None], axis=1), hit.sum(axis=1) > count, settled & prepared.complete
+            np.take_along_axis(own, order[:, :, None], axis=1),
+            hit.sum(axis=1) > count,
+            settled & prepared.complete,
         )
 
     return Geometry(

@@ -8,6 +8,7 @@ its postures, two postures between which a third solves the target as well are o
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +19,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
+    BESIDE,
     CLUSTER,
     DOUBLE,
     HAIR,
@@ -43,8 +45,9 @@ SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
-# For targets (rows of those examined): more postures to start from (rows, M, n), and their branches (M,).
-More = Callable[[Int], tuple[Array, Int]]
+# For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), and
+# their branches (M,).
+More = Callable[[Int, Bool], tuple[Array, Int]]
 
 
 class Examined(NamedTuple):
@@ -74,22 +77,42 @@ class _Settled(NamedTuple):
 
 
 def examine(
-    arm: Arm, task: Task, q: Array, label: Int, loose: Bool, target: Array, near: Array, more: More | None
+    arm: Arm,
+    task: Task,
+    q: Array,
+    label: Int,
+    loose: Bool,
+    target: Array,
+    near: Array,
+    more: More,
+    unsettled: Bool | None = None,
 ) -> Examined:
     """Correct, group and classify candidate branches of doubtful targets.
 
     q: (K, B, n), nan where there is none; label: (B,); loose: (K, B) candidates that depend on a value preferred
     for a free joint; target: (K, m) or (K, 4, 4); near: (K, n), a branch itself
-    where it solves the target; more: other candidates, for targets that seem to have no branch, and for
-    those of which the preferred value leaves the other joints no solution.
+    where it solves the target; more: other candidates, for targets that seem to have no branch, for those of which
+    the preferred value leaves the other joints no solution, and for self-motions that may meet others; unsettled:
+    (K,) targets whose candidates may not be all, of a solver that loses singular ones: more are asked for these and
+    for what is singular.
     """
     found = _settle(arm, task, q, np.broadcast_to(label, q.shape[:2]), loose, target, near, SEED)
     again = found.open | ~found.valid.any(axis=1)
-    if more is None or not again.any():
+    if unsettled is None:
+        # a self-motion of joints more than one apart goes through postures in which others move, too
+        first, last = found.free.argmax(axis=1), arm.n - 1 - found.free[:, ::-1].argmax(axis=1)
+        wider = again | found.free.any(axis=1) & (last - first > 2)
+    else:
+        wider = again | unsettled | (found.status != Status.EXACT)
+    if not wider.any():
         return Examined(*found[:5], np.zeros(len(q), bool))
-    rows = np.flatnonzero(again)
-    others, labels = more(rows)
-    again[rows] = ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
+    rows = np.flatnonzero(wider)
+    others, labels = more(rows, again[rows])
+    there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
+    rows, others = rows[there], others[there]
+    if not len(rows):
+        return Examined(*found[:5], again)
+    again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     seeds = np.concatenate([found.q[rows], others], axis=1)
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
     second = _settle(arm, task, seeds, whose, np.zeros(seeds.shape[:2], bool), target[rows], near[rows], HOPELESS)
@@ -173,6 +196,7 @@ def _settle(
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
     _drop_contained(arm, q, chosen & (sigma < SOLUTION), chosen, curve)
+    _drop_twins(arm, task, q, chosen, np.asarray(curve.any(axis=2)), target)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
     out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
@@ -201,6 +225,24 @@ def _drop_contained(arm: Arm, q: Array, sure: Bool, chosen: Bool, curve: Bool) -
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
             if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
                 chosen[k, i] = False
+
+
+def _drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, moving: Bool, target: Array) -> None:
+    """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
+
+    Groups are found around their first candidate, and reported by the one nearest to `near`.
+    """
+    for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
+        kept: list[int] = []
+        for i in np.flatnonzero(chosen[k] & moving[k]):
+            apart = newton.difference(arm, q[k, kept], q[k, i])
+            close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
+            between = q[k, i] + 0.5 * apart[close] * np.where(arm.prismatic, arm.reach, 1.0)
+            there = np.repeat(target[k : k + 1], len(between), axis=0)
+            if (newton.missing(arm, task, between, there) <= SOLUTION).any():
+                chosen[k, i] = False
+            else:
+                kept.append(int(i))
 
 
 def _onto(
@@ -307,7 +349,8 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     """Which branches to push, and where: (m,) indices and (m, n) directions.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
-    is pushed as far as the null space lets it, and in a plane of them every joint is held.
+    is pushed as far as the null space lets it, pairs of joints that do without the others are, and in a plane
+    of them every joint is held.
     """
     for index in range(int(nullity.max())):
         who = np.flatnonzero(nullity > index)
@@ -321,8 +364,17 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
         if some.any():
             yield plane[some], hold[some] / size[some, None]
     many = np.flatnonzero(nullity > 1)
+    in_null = np.arange(n) >= n - nullity[many][:, None]
+    rest = np.eye(n) - np.einsum("mij,mi,mik->mjk", V[many], in_null, V[many])  # projection out of the null space
+    for i, j in itertools.combinations(range(n) if len(many) else (), 2):
+        # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
+        a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
+        some = (a * b - c * c < 1e-10) & (a + b > 1e-3) & (np.abs(c) > 1e-3)
+        if some.any():
+            push = np.zeros((int(some.sum()), n))
+            push[:, i], push[:, j] = b[some], -c[some]
+            yield many[some], push / np.linalg.norm(push, axis=1, keepdims=True)
     for joint in range(n if len(many) else 0):
-        in_null = np.arange(n) >= n - nullity[many][:, None]
         push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
         size = np.linalg.norm(push, axis=1)
         some = size > 0.1

@@ -28,7 +28,7 @@ from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import Task, distance, read_targets
+from armkin.inverse.tasks.task import Task, around, distance, read_targets
 from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 
@@ -222,6 +222,15 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
     pack(out, count < B)
     doubtful = np.flatnonzero(doubt)
     if examine and len(doubtful):
+        solve = geometry.rows
+
+        def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
+            """Branches of targets around these, on both sides: what two roots in one leave is real on one of them."""
+            there = around(arm, task, target)
+            found = solve(there.reshape(-1, *target.shape[1:])).q
+            found = found.reshape(len(target), -1, arm.n)
+            return found, np.arange(found.shape[1]) % max(B, 1)
+
         out = examined(
             arm,
             task,
@@ -230,6 +239,7 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
             near,
             doubtful,
             lambda some: (q[doubtful[some]], np.zeros((len(some), B), bool)),
-            None,
+            others,
+            ~complete,
         )
     return out, B

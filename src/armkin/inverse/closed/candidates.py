@@ -14,7 +14,8 @@ from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import OncePaid
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
-from armkin.inverse.numeric.tolerances import HOPELESS
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import HOPELESS, SEED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 FREED = 24  # values tried for joints that a target leaves free
 SHAKEN, SHAKE = 8, 1e-4  # moves of a target to where nothing is free, and their size [reaches, rad]
+MEETING = 0.1  # second smallest singular value, at values tried, from which on no two self-motions meet near there
+MEETINGS = 6  # such places looked at for each target
+AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
 
 
 class Recorded:
@@ -56,19 +60,21 @@ class Recorded:
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
-    def others(self, target: Array, near: Array) -> tuple[Array, NDArray[np.int64]]:
+    def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
         """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
 
-        With other values for the joints that are free, and for targets moved a little, which do not; nan where the
-        candidate is far from its target. near: (N, n).
+        Where branches seem lost (N,): with other values for the joints that are free, and for targets moved a little,
+        which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where
+        the candidate is far from its target. near: (N, n).
         """
         rng = np.random.default_rng(4)
         N, n = len(target), self.arm.n
         unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
-        offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)), np.zeros((SHAKEN, n))]) * unit
+        round_ = np.repeat(np.linspace(-1.0, 1.0, FREED, endpoint=False)[:, None], n, axis=1)
+        offsets = np.concatenate([round_, rng.uniform(-1, 1, (FREED, n)), np.zeros((SHAKEN, n))]) * unit
         goals = np.repeat(target[:, None], len(offsets), axis=1)
         for k in range(SHAKEN):
-            goals[:, FREED + k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
+            goals[:, 2 * FREED + k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
         values = (near[:, None] + offsets).reshape(-1, n)
         prefer = preferred(self.arm, values)
         found = self.candidates(entries(self.task, goals.reshape(-1, *target.shape[1:])), prefer)
@@ -76,7 +82,42 @@ class Recorded:
         B = rows.shape[1]
         rows = rows.reshape(N, -1, n + 1)
         q, miss = rows[:, :, :n], rows[:, :, n]
-        return np.where((miss < HOPELESS**2)[:, :, None], q, np.nan), np.tile(np.arange(B), len(offsets))
+        q = np.where((miss < HOPELESS**2)[:, :, None], q, np.nan)
+        on = np.where((miss < SEED**2)[:, :, None], q, np.nan)[:, : FREED * B].reshape(N, FREED, B, n)
+        meeting = self._crossings(on, target)
+        q[~lost] = np.nan
+        branch = np.concatenate([np.tile(np.arange(B), len(offsets)), np.arange(meeting.shape[1]) % B])
+        return np.concatenate([q, meeting], axis=1), branch
+
+    def _crossings(self, q: Array, target: Array) -> Array:
+        """Postures (N, M, n) beside those at which another self-motion leaves that of q (N, FREED, B, n), all round.
+
+        There the second smallest singular value vanishes; a step off, in the plane of the two null directions, leads
+        onto the other one.
+        """
+        N, steps, B, n = q.shape
+        flat = q.reshape(-1, n)
+        some = np.flatnonzero(~np.isnan(flat).any(axis=1))
+        size = np.full(len(flat), np.inf)
+        _, J = newton.scaled(self.arm, self.task, flat[some], np.repeat(target, steps * B, axis=0)[some])
+        rank = min(self.task.constraints, n)
+        size[some] = np.linalg.svd(J, compute_uv=False)[:, rank - 2]
+        second = size.reshape(N, steps, B)
+        before, after = np.roll(second, 1, axis=1), np.roll(second, -1, axis=1)
+        near, far = np.minimum(before, after), np.maximum(before, after)
+        with np.errstate(invalid="ignore"):  # a zero in between: |x| falls as fast on one side as it rises on the other
+            least = (second <= before) & (second < after) & (second < MEETING) & (near + second < 1.7 * (far - second))
+        lowest = np.argsort(np.where(least, second, np.inf).reshape(N, -1), axis=1)[:, :MEETINGS]
+        at = np.take_along_axis(q.reshape(N, -1, n), lowest[:, :, None], axis=1).reshape(-1, n)
+        at[~np.take_along_axis(least.reshape(N, -1), lowest, axis=1).ravel()] = np.nan
+        out = np.full((len(at), 8, n), np.nan)
+        some = np.flatnonzero(~np.isnan(at).any(axis=1))
+        _, V, _ = newton.null_space(self.arm, self.task, at[some], np.repeat(target, MEETINGS, axis=0)[some])
+        u, v = V[:, rank - 1], V[:, rank - 2]
+        ways = np.stack([u, v, (u + v) / 2**0.5, (u - v) / 2**0.5], axis=1)
+        unit = np.where(self.arm.prismatic, self.arm.reach, 1.0)
+        out[some] = at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)
+        return out.reshape(N, -1, n)
 
 
 def preferred(arm: Arm, near: Array) -> list[Pair]:

@@ -265,11 +265,13 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     good = done.residual < (10 * GRAZING if careful else ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.
-    near = (done.residual < 1e-5) & (seed.tilt < 1e-3) if careful else done.residual < 1e-3
+    # A move of the pose may turn two close real roots into such a pair.
+    pair = 1e-4 + 10 * np.sqrt(shake)
+    maybe = seed.tilt < pair
+    near = (done.residual < 1e-5) & (seed.tilt < max(pair, 1e-3)) if careful else done.residual < 1e-3
     missed = ~good & ((seed.tilt < 1e-4) | near)
     touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
-    # A move of the pose may turn two close real roots into such a pair.
-    unsure = good & (seed.tilt > 0) & (seed.tilt < 1e-4 + 10 * np.sqrt(shake))
+    unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.
     strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
     unsettled[seed.pose[missed | unsure | strayed]] = True
@@ -277,13 +279,14 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
     answers = _answers(closed, seed.pose, done, good)
-    hidden, blurred = seed.hidden[good], done.guess[good] > 1e-5 + 10 * shake
-    order = np.lexsort((hidden, answers.pose))
-    close = (np.diff(answers.pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
+    # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
+    stands = good & maybe
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > 1e-5 + 10 * shake
+    order = np.lexsort((hidden, pose))
+    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
     close &= blurred[order][1:] | blurred[order][:-1]
-    unsettled[answers.pose[order][1:][close]] = True
-    # Two real roots that led to one answer: one of them stands for another. Of complex roots damped steps bring
-    # many to an answer that has its own.
+    unsettled[pose[order][1:][close]] = True
+    # Two real roots that led to one answer: one of them stands for another.
     real = answers.take(seed.tilt[good] == 0)
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))

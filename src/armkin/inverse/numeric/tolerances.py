@@ -13,6 +13,7 @@ HOPELESS = 0.3  # residual of a seed from which nothing is corrected any more
 # ---- when two are one
 SAME = 1e-7  # distance of joint values that rounding explains
 HAIR = 0.05  # branches this close are one if the posture between them solves the target, too
+BESIDE = 0.2  # postures of self-motions this close are asked whether they are one
 TURNED = 1e-5  # joints that a self-motion holds differ by less along it
 
 # ---- how singular

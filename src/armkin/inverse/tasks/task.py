@@ -180,6 +180,12 @@ def moved(arm: Arm, task: Task, target: Array, by: Array) -> Array:
     return out
 
 
+def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = 1e-4) -> Array:
+    """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
+    ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
+    return np.stack([moved(arm, task, target, sign * by) for by in ways for sign in (1.0, -1.0)], axis=1)
+
+
 def distance(arm: Arm, task: Task, target: Array) -> Array:
     """How far targets (M, m) or (M, 4, 4) are from the arm's first joint, in reaches: (M,)."""
     p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
