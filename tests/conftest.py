@@ -20,6 +20,11 @@ _TOOLS = ("avr-gcc", "arm-none-eabi-gcc", "npm")
 _NO_COMPILER = "needs avr-gcc, simavr, arm-none-eabi-gcc and npm: install the packages of the README's apt-get line"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--long`: the fuzzers' million."""
+    parser.addoption("--long", action="store_true", help="a million inputs for the fuzzers (tests/fuzz)")
+
+
 @pytest.fixture(autouse=True)
 def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """ARMKIN_PORT is somebody's arm."""

@@ -48,7 +48,7 @@ MAY_IMPORT: dict[str, str] = {
     "board": "errors hardware formula model forward motors motion board/ports board/backend board/firmware"
     " board/grbl board/feetech board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion path_file reach view board board/ports board/backend board/firmware board/feetech",
+    " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/sim",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

@@ -46,3 +46,23 @@ def test_standard_input_without_end_is_refused() -> None:
     done = run("send", "--port", "sim", stdin=b"{}\n" * 11_000_000)
     assert (done.code, done.out) == (2, "")
     assert "more than 32 MB on standard input" in done.err
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a POSIX device")
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("path three_dof /dev/zero", "larger than 32 MB"),
+        ("send three_dof --dry-run --path /dev/zero", "larger than 32 MB"),
+        ("info /dev/zero", "larger than 256 kB"),
+        ("import /dev/zero", "larger than 8 MB"),
+        ("calibrate three_dof /dev/zero", "no CSV"),
+        ("fk three_dof --batch /dev/zero", "no CSV"),
+        ("new x --convention standard --batch /dev/zero", "no CSV"),
+    ],
+)
+def test_a_file_without_end_is_refused(words: str, message: str) -> None:
+    done = run(*words.split())
+    assert done.code in (1, 2, 4)
+    assert done.out == ""
+    assert message in done.err

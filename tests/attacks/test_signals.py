@@ -50,3 +50,26 @@ def test_streams_that_are_not_there_are_named(words: str, code: int, message: st
     assert done.returncode == code
     assert message in done.stderr
     assert "internal error" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+@pytest.mark.parametrize(
+    "words",
+    [
+        "send three_dof --batch - --port sim",
+        "send three_dof --batch - --dry-run",
+        "send --port sim",
+        "fk three_dof --batch -",
+        "ik three_dof",
+        "path three_dof -",
+        "new x --convention standard --batch - --out x.yaml",
+    ],
+)
+def test_standard_input_that_cannot_be_read_is_named(words: str, tmp_path: Path) -> None:
+    """Opened for writing only: every read fails. A thread that reads must not leave its command waiting."""
+    command = f"exec {sys.executable} -m armkin {words} 0>unreadable"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "standard input: cannot read: " in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["unreadable"]

@@ -110,7 +110,7 @@ class Stream:
     def __init__(self, arm: Arm, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
         """rows: number and joint values [deg | mm]; what is wrong with one is an ArmkinError."""
         self.problem: ArmkinError | None = None
-        self._rows: queue.Queue[tuple[int, Sequence[float]] | ArmkinError | None] = queue.Queue(_AHEAD)
+        self._rows: queue.Queue[tuple[int, Sequence[float]] | Exception | None] = queue.Queue(_AHEAD)
         self._arm = arm
         threading.Thread(target=self._read, args=(rows,), daemon=True).start()
 
@@ -119,6 +119,8 @@ class Stream:
             for row in rows:
                 self._rows.put(row)
         except ArmkinError as error:
+            self._rows.put(error)
+        except Exception as error:  # what nobody foresaw ends the stream, too, and is raised where it is read
             self._rows.put(error)
         self._rows.put(None)
 
@@ -136,6 +138,8 @@ class Stream:
             if isinstance(item, ArmkinError):
                 self.problem = item
                 return
+            if isinstance(item, Exception):
+                raise item
             empty = False
             try:
                 made = planner.plan(at, units.joints_in(self._arm, [item[1]]))

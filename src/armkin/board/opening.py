@@ -33,9 +33,10 @@ def open_port(
     """
     if name == SIM:
         from armkin.board.sim.board import SimBoard
-        from armkin.board.sim.port import PacedSimPort, SimPort
+        from armkin.board.sim.port import Paced, SimPort
 
-        return (PacedSimPort if paced else SimPort)(SimBoard(board, switches))
+        port = SimPort(SimBoard(board, switches))
+        return Paced(port) if paced else port
     return SerialPort(name, baud, reset=reset)
 
 

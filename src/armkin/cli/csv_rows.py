@@ -171,7 +171,7 @@ def streamed_rows(
     """The same row by row, each as soon as it is there: its number and its values."""
     columns = Columns(names, what, named)
     with _opened(source) as file:
-        for number, line in enumerate(iter(lambda: file.readline(LONGEST), b""), 1):
+        for number, line in enumerate(iter(lambda: _line(file, source), b""), 1):
             try:
                 row = columns.row(line, number)
             except UsageError as error:
@@ -198,14 +198,19 @@ def _opened(source: str) -> Iterator[IO[bytes]]:
 
 def _lines(file: IO[bytes], source: str) -> list[bytes]:
     lines: list[bytes] = []
+    while len(lines) < ROWS and (line := _line(file, source)):
+        lines.append(line)
+        if len(line) >= LONGEST:  # no use in reading on
+            break
+    return lines
+
+
+def _line(file: IO[bytes], source: str) -> bytes:
     try:
-        while len(lines) < ROWS and (line := file.readline(LONGEST)):
-            lines.append(line)
-            if len(line) >= LONGEST:  # no use in reading on
-                break
-        return lines
-    except OSError as error:
-        raise FileError(f"{_name(source)}: cannot read: {error.strerror or error}") from None
+        return file.readline(LONGEST)
+    except (OSError, ValueError) as error:  # ValueError: closed
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{_name(source)}: cannot read: {reason}") from None
 
 
 def _name(source: str) -> str:

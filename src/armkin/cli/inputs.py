@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from armkin import files
 from armkin.cli import unit_notes
 from armkin.cli.numbers import NOT_FINITE, is_number, listed, numbers
-from armkin.errors import UsageError
+from armkin.errors import FileError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -32,6 +33,23 @@ def load(robot: str) -> Arm:
     arm = load(robot)
     unit_notes.robot_file(arm)
     return arm
+
+
+def standard_input(most: int, instead: str = "") -> bytes:
+    """All of standard input, at most so many bytes; instead: what to give where there are more.
+
+    Raises FileError if it is closed or cannot be read, UsageError if it is longer.
+    """
+    if sys.stdin is None:
+        raise FileError("standard input is closed")
+    try:
+        data = sys.stdin.buffer.read(most + 1)
+    except (OSError, ValueError) as error:
+        raise FileError(f"standard input: cannot read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > most:
+        size = f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1000} kB"
+        raise UsageError(f"more than {size} on standard input{instead}")
+    return data
 
 
 def named(robot: str | None) -> str:

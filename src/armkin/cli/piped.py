@@ -115,10 +115,7 @@ def _text() -> str:
     if sys.stdin is None or sys.stdin.isatty():
         return ""
     try:
-        data = sys.stdin.buffer.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise UsageError(f"more than {_LARGEST // 1_000_000} MB on standard input: give rows to --batch - instead")
-        return data.decode("utf-8-sig")
+        return inputs.standard_input(_LARGEST, ": give rows to --batch - instead").decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UsageError(_NO_JSON) from None
 

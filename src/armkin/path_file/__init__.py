@@ -17,23 +17,28 @@ from armkin.errors import FileError, PathFileError
 from armkin.path_file.model import Move, PathFile
 from armkin.robot_file import strict_yaml
 
-__all__ = ["Move", "PathFile", "json_schema", "parse", "read", "validated"]
+LARGEST = 32_000_000  # [bytes]
+__all__ = ["LARGEST", "Move", "PathFile", "json_schema", "parse", "read", "validated"]
 
 
 def read(name: str) -> PathFile:
     """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
     try:
         with open(name, "rb") as file:
-            raw = file.read()
+            raw = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(f"{name}: cannot read the path file: {reason}", file=name) from None
+    if len(raw) > LARGEST:
+        raise FileError(f"{name} is larger than {LARGEST // 1_000_000} MB: this is no path file", file=name)
     return parse(raw, name)
 
 
 def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     """Validate the text of a path; `name` is what messages call it. Text without a colon in its head is CSV."""
     data = raw.encode() if isinstance(raw, str) else raw
+    if not data.strip():
+        raise _invalid(name, [(0, "the path is empty; it needs moves, or one row of CSV a corner")])
     if name.endswith(".csv") or not (name.endswith((".yaml", ".yml")) or _is_yaml(data)):
         from armkin.path_file import table
 

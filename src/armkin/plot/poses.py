@@ -85,7 +85,7 @@ def plot_poses(
             drawing.mark(np.asarray(target, dtype=float))
         notes = []
         if alone:
-            notes.append("tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*bones[0].tip + 0.0))
+            notes.append("tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bones[0].tip, 1) + 0.0))
             notes += [] if legal[0] else ["outside the joint limits"]
         if with_frames:
             notes.append("frames: x red, y green" + ("" if drawing.dimensions == 2 else ", z blue"))

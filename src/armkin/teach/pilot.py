@@ -18,6 +18,7 @@ from armkin.board.firmware.machine import Machine
 from armkin.board.foreign import Foreign, foreign
 from armkin.board.opening import open_port
 from armkin.board.ports import BAUD, SIM, SerialPort
+from armkin.board.sim.port import Paced
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
 from armkin.motors import joints as joints_of
@@ -147,7 +148,7 @@ class Pilot:
         if isinstance(self.board, Foreign):
             if self.link is None:
                 baud = self.baud or self.board.board.baud
-                self.link = self.board.simulated() if self.port == SIM else SerialPort(self.port, baud)
+                self.link = Paced(self.board.simulated()) if self.port == SIM else SerialPort(self.port, baud)
             if self.machine is None:
                 self.machine = self.board.machine(self.link, self._watch)
             else:

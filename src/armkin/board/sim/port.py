@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from armkin.board.ports import BAUD, SIM
 
 if TYPE_CHECKING:
+    from armkin.board.ports import Port
     from armkin.board.sim.board import SimBoard
 
 _LATE = (
@@ -45,22 +46,36 @@ class SimPort:
         """Nothing to give back."""
 
 
-class PacedSimPort(SimPort):
-    """A simulated board in this process, in the clock's time; where the computer is late, its time waits."""
+class Paced:
+    """A simulated port in the clock's time; where the computer is late, its time waits."""
 
-    def __init__(self, board: SimBoard, name: str = SIM) -> None:
-        super().__init__(board, name)
+    simulated = True
+
+    def __init__(self, port: Port) -> None:
+        self.port, self.name, self.baud = port, port.name, port.baud
         self._clock = time.monotonic()
+        self._due = port.now()  # what the board's clock shall say
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self.port.write(data)
 
     def read(self, timeout: float) -> bytes:
         """What the board has said, or says within `timeout` seconds of its time."""
-        end = self._now + timeout
+        end = self.port.now() + timeout
         while True:
             clock = time.monotonic()
-            step = min(clock - self._clock, _LATE)
-            self._clock, self._now = clock, self._now + step
-            self.board.advance(step)
-            data = self.board.take()
-            if data or self._now >= end:
+            self._due = min(self._due + clock - self._clock, self.port.now() + _LATE)
+            self._clock = clock
+            data = self.port.read(max(self._due - self.port.now(), 0.0))
+            if data or self.port.now() >= end:
                 return data
             time.sleep(0.001)
+
+    def now(self) -> float:
+        """Seconds on the board's clock."""
+        return self.port.now()
+
+    def close(self) -> None:
+        """Give back what the port holds."""
+        self.port.close()

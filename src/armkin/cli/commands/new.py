@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import output
+from armkin.cli import inputs, output
 from armkin.cli.numbers import number, of_pi, whole
 from armkin.cli.options import Out
 from armkin.errors import FileError, UsageError
@@ -113,7 +113,7 @@ def _options(words: Sequence[str]) -> list[dict[str, str]]:
 def _csv(source: str) -> list[dict[str, str]]:
     try:
         if source == "-":
-            text = sys.stdin.read(_LARGEST_FILE) if sys.stdin is not None else ""
+            text = inputs.standard_input(_LARGEST_FILE).decode("utf-8-sig")
         else:
             with open(source, encoding="utf-8-sig") as file:
                 text = file.read(_LARGEST_FILE)

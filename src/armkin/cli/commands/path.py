@@ -209,9 +209,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
         return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in rest)]})
     assert file is not None
     if file == "-":
-        import sys
-
-        return path_file.parse(sys.stdin.buffer.read(), "standard input")
+        return path_file.parse(inputs.standard_input(path_file.LARGEST), "standard input")
     return path_file.read(file)
 
 

@@ -1,0 +1,102 @@
+"""Boards that say anything: an answer, or an error in words, in bounded time."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+from attack import attack
+
+from armkin.board.ports import Port
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.port import SimPort
+from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.hardware import BOARDS
+from command_line import ROOT
+
+BOARDS_OF: dict[str, Callable[[], Port]] = {
+    str(ROOT / "robots/three_dof.yaml"): lambda: SimPort(SimBoard(BOARDS["uno_cnc_shield"])),
+    str(ROOT / "tests/robots/three_dof_grbl.yaml"): lambda: Grbl(axes=4),
+    str(ROOT / "tests/robots/bus_arm.yaml"): lambda: ServoBus([Servo(number) for number in range(8)]),
+}
+SAID = (
+    b"ok\r\n",
+    b"error:9\r\n",
+    b"ALARM:1\r\n",
+    b"<Idle|MPos:0,0,0|FS:0,0>\r\n",
+    b"<Run|MPos:nan,inf,1e400|WCO:1,2>\r\n",
+    b"Grbl 1.1h ['$' for help]\r\n",
+    b"$110=\r\n$110=x\r\n$999999999999=1\r\n",
+    b"[VER:1.1]\r\n",
+    b"\x00\x00\x00",
+    b"\xff\xff\x01\x04\x00\x00\x00\xfa",
+    b"\xff\xff\xfe\xff",
+)
+
+
+class Unreliable:
+    """A simulated board on a line that changes, drops, repeats and adds bytes, or falls silent."""
+
+    simulated = False
+    baud = 115_200
+
+    def __init__(self, port: Port, rng: random.Random) -> None:
+        self.port, self.name, self.rng = port, port.name, rng
+        self.share = rng.choice((0.0, 0.003, 0.03, 0.3))
+        self.silent_from = rng.choice((1e9, rng.uniform(0, 4)))
+
+    def write(self, data: bytes) -> None:
+        self.port.write(self.spoilt(data))
+
+    def read(self, timeout: float) -> bytes:
+        data = self.port.read(timeout)
+        if self.port.now() > self.silent_from:
+            return b""
+        if self.rng.random() < self.share:
+            data += self.rng.choice((*SAID, self.rng.randbytes(self.rng.randrange(40))))
+        return self.spoilt(data)
+
+    def now(self) -> float:
+        return self.port.now()
+
+    def close(self) -> None:
+        self.port.close()
+
+    def spoilt(self, data: bytes) -> bytes:
+        out = bytearray()
+        for byte in data:
+            if self.rng.random() >= 0.02 * self.share:
+                out.append(byte)
+                continue
+            kind = self.rng.randrange(3)
+            out += bytes([byte, byte] if kind == 0 else [byte ^ 1 << self.rng.randrange(8)] if kind == 1 else [])
+        return bytes(out)
+
+
+@pytest.mark.parametrize("robot", BOARDS_OF, ids=("own firmware", "grbl", "servo bus"))
+def test_any_device(robot: str, rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = random.Random(robot.rpartition("/")[2])
+    make = BOARDS_OF[robot]
+    monkeypatch.setattr("armkin.board.opening.SerialPort", lambda *given, **options: Unreliable(make(), rng))
+    codes = []
+    for _ in range(rounds):
+        words = rng.choice(
+            (
+                ("send", robot, "home", "--assume-home"),
+                ("send", robot, *(round(rng.uniform(-20, 20), 1) for _ in range(2 if "bus" in robot else 3))),
+                ("send", robot, "--batch", "-"),
+                ("status", robot),
+                ("home", robot),
+                ("jog", robot, "q1" if "bus" not in robot else "shoulder", rng.choice((-5, 5))),
+                ("stop",),
+                ("grip", robot, "closed", "--assume", "open"),
+                ("setup", robot),
+                ("path", robot, "--via", "390,80,300", "--via", "390,100,300"),
+            )
+        )
+        stdin = b"0,85,-85\n5,80,-80\n" if "bus" not in robot else b"1,2\n3,4\n"
+        done = attack(*words, "--port", "fuzzed", *(["--json"] if words[0] != "stop" else []), stdin=stdin)
+        codes.append(done.code)
+    assert {0, 5} <= set(codes)
