@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 
 GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
+NO_GROWTH = 1e-12  # residual that stays as it is
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 SURE = 1e-14  # residuals below this are equal
@@ -323,6 +324,14 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
     some = np.flatnonzero(far & (size <= GROWTH * first))
     if not len(some):
         return moving, joints
+    if len(pushes) == 1:  # of these, most do not stay on a longer way
+        who, push, grown = who[some], push[some], size[some]
+        there, size = newton.correct(arm, task, q[who] + 10 * STEP * push * unit, target[who], steps=6, least=WEAK)
+        size -= newton.missing(arm, task, q, target)[who]
+        far = (np.abs(there - q[who]) / unit).max(axis=1) > 3 * STEP * np.abs(push).max(axis=1)
+        some = np.flatnonzero((grown <= NO_GROWTH) | (far & (size <= GROWTH * 10 * STEP)))
+        if not len(some):
+            return moving, joints
     who, push = who[some], push[some]
     # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
     sizes, ways, parts = np.ix_(*([STEP, 10 * STEP], [1.0, -1.0], [1.0, 0.6], [0.0], [0.0]))[:3]
@@ -339,7 +348,7 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
     )
     # Where several directions are lost at once, a short step is drawn back into the corner. Where the residual grows
     # at all, it must do so slowly as far as the long step: near a fold the first tenth of a radian costs nothing.
-    along = (short & ((grown[0] <= 1e-12) | long)) | (long & (len(pushes) > 1))
+    along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & (len(pushes) > 1))
     np.logical_or.at(moving, who, along)
     np.logical_or.at(joints, who, along[:, None] & (moved > 1e-3 * STEP).any(axis=(0, 1)))
     return moving, joints

@@ -35,8 +35,6 @@ from armkin.model.limits import SLACK
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-BLOCK = 512  # poses whose rows are written joint by joint while they are in the cache
-
 
 def ik(
     arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None, examine: bool = True
@@ -172,12 +170,10 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
         legal.append(value)
         if inside is not True:
             within = within & inside
-    for start in range(0, N, BLOCK):
-        some = slice(start, start + BLOCK)
-        for i, value in enumerate(legal):
-            grid[..., some, i] = value[..., some] if np.shape(value)[-1:] == (N,) else value
-    part.valid[...] = valid.reshape(-1, N).T
-    part.within[...] = within.reshape(-1, N).T
+    for i, value in enumerate(legal):
+        grid[..., i] = value
+    for mask, out in ((valid, part.valid), (within, part.within)):
+        out[...] = True if mask.all() else mask.reshape(-1, N).T
     part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
 
 

@@ -40,8 +40,12 @@ def residuals(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Size of the residual (M,), lengths in units of the arm's reach."""
-    r = residuals(arm, task, q, target)
-    size: Array = np.linalg.norm(r, axis=1)
+    return _sizes(residuals(arm, task, q, target))
+
+
+def _sizes(r: Array) -> Array:
+    """Norms (M,) of residuals (M, r); infinite where they are not known."""
+    size: Array = np.sqrt((r * r).sum(axis=1))
     return np.where(np.isnan(size), np.inf, size)
 
 
@@ -52,26 +56,29 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6, least
     so that a singular posture is approached without running away.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
-    best, best_size = q.copy(), missing(arm, task, q, target)
-    active = np.flatnonzero(np.isfinite(best_size) & (best_size > 0))
-    q = q.copy()
-    for _ in range(steps):
-        if not len(active):
+    q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
+    active = np.arange(len(q))
+    for k in range(steps + 1):
+        if k < steps:
+            r, J = scaled(arm, task, q[active], target[active])
+        else:
+            r = residuals(arm, task, q[active], target[active])
+        size = _sizes(r)
+        before = best_size[active]
+        better = size < before
+        best[active[better]], best_size[active[better]] = q[active[better]], size[better]
+        # done when rounding is all that is left
+        least_gain = np.isfinite(size) & (size > 1e-15) & ((size > 1e-11) | (size < 0.5 * before))
+        going = least_gain if k else np.isfinite(size) & (size > 0)
+        active, r, size = active[going], r[going], size[going]
+        if k == steps or not len(active):
             break
-        r, J = scaled(arm, task, q[active], target[active])
-        size = np.linalg.norm(r, axis=1)
         # a singular value below the residual's own size would throw the step out of the linear range
-        U, S, Vt = np.linalg.svd(J, full_matrices=False)
+        U, S, Vt = np.linalg.svd(J[going], full_matrices=False)
         gain = np.where(np.maximum(least, 0.1 * size)[:, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
-        step = np.einsum("mij,mi->mj", Vt, gain * np.einsum("mji,mj->mi", U, r))
+        step = (Vt * (gain * (U * r[:, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         q[active] += step * unit
-        now = missing(arm, task, q[active], target[active])
-        before = best_size[active]
-        better = now < before
-        best[active[better]], best_size[active[better]] = q[active[better]], now[better]
-        # done when rounding is all that is left
-        active = active[np.isfinite(now) & (now > 1e-15) & ((now > 1e-11) | (now < 0.5 * before))]
     return best, best_size
 
 

@@ -18,9 +18,9 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         parts.append(target[:, :3, 3] - T[:, :3, 3])
         R, Rt = T[:, :3, :3], target[:, :3, :3]
         # half the sum of the columns' vector products is the rotation vector to third order
-        w = 0.5 * np.cross(R, Rt, axis=1).sum(axis=2)
-        trace = np.einsum("mij,mij->m", R, Rt)
-        far = trace < 3.0 - 1e-8
+        C = R @ np.swapaxes(Rt, 1, 2)
+        w = 0.5 * np.stack([C[:, 1, 2] - C[:, 2, 1], C[:, 2, 0] - C[:, 0, 2], C[:, 0, 1] - C[:, 1, 0]], axis=1)
+        far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - 1e-8
         if far.any():
             w[far] = _rotation_vector(Rt[far] @ np.swapaxes(R[far], 1, 2))
         parts.append(w)
