@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,6 +13,9 @@ from armkin.formula import numpy_code, python_code
 from armkin.formula.arrays import Array
 from armkin.formula.recording import axes_of, record
 
+SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
+LENGTHS = 16  # of batches, for which a thread keeps buffers
+
 
 class Straight:
     """A recorded formula, as code for batches and as code for one pose."""
@@ -21,12 +25,21 @@ class Straight:
         self._recording = record(formula, inputs)
         self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
+        self._kept = threading.local()
 
     def workspace(self, length: int) -> list[NDArray[Any]]:
-        """Buffers for batches of that length, to be passed to `run`; one set for each thread."""
+        """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
         if self._batch is None:
             self._batch = numpy_code.write(self._recording)
-        return [np.empty((*axes, length), dtype) for axes, dtype in self._batch[1]]
+        kept: dict[int, list[NDArray[Any]]] = self._kept.__dict__.setdefault("buffers", {})
+        if length in kept:
+            return kept[length]
+        buffers: list[NDArray[Any]] = [np.empty((*axes, length), dtype) for axes, dtype in self._batch[1]]
+        if length <= SMALL:
+            if len(kept) >= LENGTHS:
+                kept.clear()
+            kept[length] = buffers
+        return buffers
 
     def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
         """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""

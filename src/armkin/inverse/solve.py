@@ -21,7 +21,7 @@ from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_copy, nearest_row
-from armkin.inverse.closed.candidates import as_rows, entries, preferred, recorded
+from armkin.inverse.closed.candidates import entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import decided, examined
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
@@ -83,7 +83,7 @@ def ik(
         arm=arm,
         task=definition,
         target=target.reshape(lead + target.shape[1:]).copy(),  # the caller's arrays may change
-        near=np.broadcast_to(close, (*lead, arm.n)).copy(),
+        near=np.broadcast_to(close.copy(), (*lead, arm.n)),
         q=out.q.reshape(*each_branch, arm.n),
         valid=out.valid.reshape(each_branch),
         within_limits=out.within.reshape(each_branch),
@@ -150,10 +150,12 @@ def _closed(
             part.status[count == 0] = Status.UNREACHABLE
             pack(part, count < B)
         if len(doubtful):
-            some = [np.asarray(v)[..., doubtful] if np.shape(v)[-1:] == (N,) else v for v in (*values, free)]
-            *_, loose = found = np.moveaxis(as_rows(some, len(doubtful)), 2, 0)
-            q = np.moveaxis(found[:-1], 0, 2)
-            doubts.append((start + doubtful, q, valid[:, doubtful].T, (loose > 0).any(axis=1)))
+            q, loose = np.empty((*runner.axes, len(doubtful), arm.n)), np.zeros((*runner.axes, len(doubtful)), bool)
+            for i, value in enumerate(values):
+                q[..., i] = value[..., doubtful] if np.shape(value)[-1:] == (N,) else value
+            loose |= free[..., doubtful] if np.shape(free)[-1:] == (N,) else free
+            q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
+            doubts.append((start + doubtful, q, valid[:, doubtful].T, loose.reshape(B, -1).any(axis=0)))
     assert out is not None
     if doubts and examine:
         out = decided(arm, task, runner, out, target, near, *map(np.concatenate, zip(*doubts, strict=True)))
@@ -182,13 +184,13 @@ def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.
 
     miss, valid: (B, N); full: valid everywhere.
     """
-    if full and not np.any(doubt):
-        return np.empty(0, np.intp)
-    shape = np.broadcast_shapes(np.shape(doubt), (1, 1, 1, miss.shape[1]))
-    edge = np.any(np.broadcast_to(doubt, shape), axis=(0, 1, 2))
-    if not full:
-        edge = edge | (~valid & ~(miss > NEARBY**2)).any(axis=0)  # nearly there, or not a number
-    return np.flatnonzero(edge)
+    N = miss.shape[1]
+    if np.shape(doubt)[-1:] != (N,):
+        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
+    edge = np.flatnonzero(doubt) % N
+    if not full:  # nearly there, or not a number
+        edge = np.concatenate([edge, np.flatnonzero(~valid & ~(miss > NEARBY**2)) % N])
+    return np.unique(edge) if len(edge) else edge
 
 
 def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:

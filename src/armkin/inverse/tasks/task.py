@@ -87,9 +87,9 @@ def read_targets(task: Task, targets: ArrayLike) -> Targets:
     if values.shape[-len(shape) :] != shape or values.ndim < len(shape):
         expected = "(..., 4, 4)" if task.orientation == "full" else f"(..., {shape[0]}): {' '.join(task.labels)}"
         raise UsageError(f"task {task.name} takes targets of shape {expected}; got {values.shape}")
-    if not np.isfinite(values).all():
-        raise UsageError("a target holds nan or infinity; every number must be finite")
-    if np.abs(values).max(initial=0.0) > LARGEST:
+    if not (values.min(initial=0.0) >= -LARGEST and values.max(initial=0.0) <= LARGEST):
+        if not np.isfinite(values).all():
+            raise UsageError("a target holds nan or infinity; every number must be finite")
         raise UsageError(f"a target holds a number beyond {LARGEST:g}; no arm reaches there")
     lead = values.shape[: values.ndim - len(shape)]
     flat = values.reshape(-1, *shape)
