@@ -9,28 +9,29 @@ from pathlib import Path
 
 import messages
 from messages import (
-    AXES,
-    BACK,
-    GRIP,
-    RAMP,
     STEP,
     Segment,
     ack,
+    back,
     commit,
     config,
     enable,
+    grip,
     hello,
     hold,
     home,
     image,
     info,
     jog,
+    mask,
     motion,
+    ramp,
     report,
     set_position,
     status,
     steps_of,
     units,
+    vector,
     whole,
     wire,
 )
@@ -45,13 +46,13 @@ def frames() -> str:
     def add(text: str, payload: bytes) -> None:
         lines.append((text, payload))
 
-    def add_motion(tag: int, mask: int, flags: int, start: list[int], segments: list[Segment]) -> None:
+    def add_motion(tag: int, which: int, flags: int, start: list[int], segments: list[Segment]) -> None:
         end = [a + b for a, b in zip(start, steps_of(segments), strict=True)]
         text = ";".join(f"{t}/{i}/{a}/" + ",".join(map(str, s)) for t, i, a, s in segments)
         commas = (",".join(map(str, v)) for v in (start, end))
         add(
-            f"MOTION tag={tag} mask={mask} flags={flags} start={next(commas)} end={next(commas)} segments={text}",
-            motion(tag, mask, flags, start, end, segments),
+            f"MOTION tag={tag} mask={which} flags={flags} start={next(commas)} end={next(commas)} segments={text}",
+            motion(tag, which, flags, start, end, segments),
         )
 
     add("HELLO tag=5 version=2 nonce=3735928559", hello(5, 3735928559))
@@ -63,9 +64,9 @@ def frames() -> str:
     add(f"COMMIT tag=1 length={len(img)} crc={zlib.crc32(img)}", commit(1, img))
     add("ENABLE tag=2 what=3", enable(2, 3))
     add("SET_POSITION tag=3 mask=23 counts=0,-1,70000,1500", set_position(3, 23, [0, -1, 70000, 1500]))
-    add_motion(4, 7, 1, [0, 0, 0], RAMP)
-    add_motion(5, 7, 3, [-40, -217, 122], BACK)
-    add_motion(6, 16, 3, [1500], GRIP)
+    add_motion(4, 7, 1, [0, 0, 0], ramp())
+    add_motion(5, 7, 3, [-40, -217, 122], back())
+    add_motion(6, 16, 3, [1500], grip())
     add_motion(255, 1, 0, [-128], [whole(255, 400, -1, [127]), whole(255, 65535, 1, [-128])])
     add(
         "HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
@@ -93,11 +94,10 @@ def frames() -> str:
 class Talk:
     """Collects the lines of a conversation; `tag` counts the sequence."""
 
-    def __init__(self, title: str, board: str = "uno_cnc_shield") -> None:
-        global board_of_talk
-        board_of_talk = board
+    def __init__(self, title: str, name: str) -> None:
+        messages.board = messages.BOARDS[name]
         self.opened(None)
-        self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", f"board {board}"]
+        self.lines = [f"# {title}; written by generate.py from PROTOCOL.md", f"board {name}"]
 
     def note(self, text: str) -> None:
         self.lines.append(f"# {text}")
@@ -123,7 +123,7 @@ class Talk:
         self.say(config(0, 0, img[:100]), ack(1))
         self.say(config(1, 100, img[100:]), ack(2))
         self.say(commit(2, img), ack(3))
-        self.say(set_position(3, 0b10111, [0, 0, 0, 1500]), ack(4))
+        self.say(set_position(3, mask(0, 1, 2, -1), [0, 0, 0, 1500]), ack(4))
         self.say(enable(4, what), ack(5))
         return 5
 
@@ -131,34 +131,36 @@ class Talk:
         (HERE / name).write_text("\n".join(self.lines) + "\n")
 
 
-def talks() -> None:
-    crc = zlib.crc32(image())
+def talks(name: str, suffix: str = "") -> None:
+    """The conversations with a board that has steppers."""
 
-    t = Talk("HELLO, configuration, position, three moves, a reset at rest")
+    t = Talk("HELLO, configuration, position, three moves, a reset at rest", name)
     t.setup(0xDEADBEEF)
-    end = steps_of(RAMP)
-    t.say(motion(5, 7, 1, [0, 0, 0], end, RAMP), ack(6, 0, 0, 1, 29, units(RAMP)))
+    crc = zlib.crc32(image())
+    known, everything = mask(0, 1, 2), mask(0, 1, 2, -1)
+    end = steps_of(ramp())
+    t.say(motion(5, 7, 1, [0, 0, 0], end, ramp()), ack(6, 0, 0, 1, messages.board.queue - 3, units(ramp())))
     t.raw("wait 400")
-    t.say(status(7), report(7, 6, 0, 0, 0, 7, 0b10111, [*end, 0, 1500]))
+    t.say(status(7), report(7, 6, 0, 0, 0, 7, everything, vector(*end, 1500)))
     t.note("wide segments, back home; then the gripper: an axis like the others")
-    t.say(motion(6, 7, 3, end, [0, 0, 0], BACK), ack(7, 0, 0, 1, 31, units(BACK)))
+    t.say(motion(6, 7, 3, end, [0, 0, 0], back()), ack(7, 0, 0, 1, messages.board.queue - 1, units(back())))
     t.raw("wait 300")
-    t.say(motion(7, 16, 3, [1500], [1590], GRIP), ack(8, 0, 0, 1, 31, units(GRIP)))
+    t.say(motion(7, mask(-1), 3, [1500], [1590], grip()), ack(8, 0, 0, 1, messages.board.queue - 1, units(grip())))
     t.raw("wait 450")
-    t.say(status(8), report(8, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1590]))
+    t.say(status(8), report(8, 8, 0, 0, 0, 7, everything, vector(0, 0, 0, 1590)))
     t.note("a repeated HELLO changes nothing, a duplicate moves nothing")
-    t.say(hello(9, 0xDEADBEEF), info(9, 0xDEADBEEF, crc, 0b10111, 7))
-    t.say(motion(7, 16, 3, [1500], [1590], GRIP), ack(8))
-    t.say(status(9), report(9, 8, 0, 0, 0, 7, 0b10111, [0, 0, 0, 0, 1590]))
+    t.say(hello(9, 0xDEADBEEF), info(9, 0xDEADBEEF, crc, everything, 7))
+    t.say(motion(7, mask(-1), 3, [1500], [1590], grip()), ack(8))
+    t.say(status(9), report(9, 8, 0, 0, 0, 7, everything, vector(0, 0, 0, 1590)))
     t.note("steppers and image survive a reset at rest, drivers come back on; servo pulses do not, so servos are lost")
     t.raw("reset")
-    t.say(status(10), report(10, 0, 1, 0, 0, 0b1101, 0b111, [0, 0, 0, 0, 1590]))
-    t.say(hello(11, 77), info(11, 77, crc, 0b111, 0b1101))
+    t.say(status(10), report(10, 0, 1, 0, 0, 0b1101, known, vector(0, 0, 0, 1590)))
+    t.say(hello(11, 77), info(11, 77, crc, known, 0b1101))
     t.say(set_position(0, 1, [0]), ack(0, 10))
-    t.write("move.talk")
+    t.write(f"move{suffix}.talk")
 
-    t = Talk("Every refusal ends the session and moves nothing")
-    t.say(status(1), report(1, 0, 1, 0, 0, 0, 0, [0] * AXES))
+    t = Talk("Every refusal ends the session and moves nothing", name)
+    t.say(status(1), report(1, 0, 1, 0, 0, 0, 0, vector(0, 0, 0)))
     t.say(enable(0, 1), ack(0, 1))
     t.say(hello(2, 5, version=9), info(2, 5, 0, 0, 0))
     t.say(enable(0, 1), ack(0, 1))
@@ -176,7 +178,7 @@ def talks() -> None:
     t.setup(101, what=0b11)
     t.note("a gap is not executed")
     t.say(motion(6, 1, 1, [0], [1], [whole(20, 16000, 0, [1])]), ack(5))
-    known, at_home = 0b10111, [0, 0, 0, 0, 1500]
+    known, at_home = mask(0, 1, 2, -1), vector(0, 0, 0, 1500)
     slow = (100, 16000, 0)
     for nonce, payload, error, detail in (
         (1000, b"\x17\x00", 3, 0),
@@ -193,14 +195,19 @@ def talks() -> None:
         (1011, motion(0, 3, 1, [0, 0], [5, 6], [(5, 16000, 0, [0, -STEP])]), 15, 1),
         (1012, motion(0, 1, 1, [0], [100], [whole(100, 4000, 0, [100])]), 16, 0),
         (1014, motion(0, 1, 1, [0], [100], [whole(200, 8000, 0, [100])]), 29, 0),
-        (1013, motion(0, 17, 3, [0, 1500], [0, 2101], [whole(2600, 16000, 0, [0, 601], 1)]), 17, 4),
+        (
+            1013,
+            motion(0, mask(0, -1), 3, [0, 1500], [0, 2101], [whole(2600, 16000, 0, [0, 601], 1)]),
+            17,
+            messages.board.gripper,
+        ),
         (1015, set_position(0, 3, [0, 0]), 10, 0),
         (1016, set_position(0, 8, [0]), 5, 3),
-        (1017, jog(0, [0, 8001, 0, 0, 0]), 16, 1),
-        (1018, jog(0, [0, 0, 0, 1, 0]), 5, 3),
-        (1019, home(0, 9, 0, 26, 100, 1000, 10, [100, 0, 0, 0, 0]), 5, 0),
-        (1020, home(0, 0, 0, 26, 100, 1000, 10, [0, 0, 0, 0, 0]), 5, 0),
-        (1021, home(0, 0, 0, 26, 100, 1000, 10, [0, 0, 0, 0, 10]), 5, 4),
+        (1017, jog(0, vector(0, 8001, 0)), 16, 1),
+        (1018, jog(0, [*vector(0, 0, 0)[:3], 1, *vector(0, 0, 0)[4:]]), 5, 3),
+        (1019, home(0, 9, 0, 26, 100, 1000, 10, vector(100, 0, 0)), 5, 0),
+        (1020, home(0, 0, 0, 26, 100, 1000, 10, vector(0, 0, 0)), 5, 0),
+        (1021, home(0, 0, 0, 26, 100, 1000, 10, vector(0, 0, 0, 10)), 5, messages.board.gripper),
         (1022, hold(0), 21, 0),
     ):
         t.say(hello(1, nonce), info(1, nonce, crc, known, 0b111))
@@ -210,10 +217,13 @@ def talks() -> None:
     t.note("drivers off: steppers are lost; pulses off: servos too")
     t.say(hello(1, 2000), info(1, 2000, crc, known, 0b111))
     t.say(enable(0, 2), ack(1))
-    t.say(motion(1, 16, 1, [1500], [1510], [whole(*slow, [10])]), ack(2, 0, 0, 1, 31, units([whole(*slow, [10])])))
+    t.say(
+        motion(1, mask(-1), 1, [1500], [1510], [whole(*slow, [10])]),
+        ack(2, 0, 0, 1, messages.board.queue - 1, units([whole(*slow, [10])])),
+    )
     t.raw("wait 150")
     t.say(motion(2, 1, 1, [0], [5], [whole(*slow, [5])]), ack(2, 9, 0))
-    t.say(hello(1, 2001), info(1, 2001, crc, 0b10000, 0b110))
+    t.say(hello(1, 2001), info(1, 2001, crc, mask(-1), 0b110))
     t.say(set_position(0, 7, [0, 0, 0]), ack(1))
     t.say(motion(1, 1, 1, [0], [5], [whole(*slow, [5])]), ack(1, 11, 0))
     t.note("a broken image is not taken, and what was known is lost")
@@ -222,11 +232,11 @@ def talks() -> None:
     t.say(hello(1, 2002), info(1, 2002, crc, known, 0b110))
     t.say(config(0, 0, bytes(bad)), ack(1))
     t.say(commit(1, bytes(bad)), ack(1, 7))
-    t.say(status(3), report(3, 1, 7, 0, 0, 0, 0, [0, 0, 0, 0, 1510]))
-    t.write("refuse.talk")
+    t.say(status(3), report(3, 1, 7, 0, 0, 0, 0, vector(0, 0, 0, 1510)))
+    t.write(f"refuse{suffix}.talk")
 
-    t = Talk("A joint limit of coupled motors: Y and Z turn one joint by their sum")
-    img = image(rows=[(-1000, 1000, [0, 2, 2, 0, 0])])
+    t = Talk("A joint limit of coupled motors: Y and Z turn one joint by their sum", name)
+    img = image(rows=[(-1000, 1000, vector(0, 2, 2))])
     t.say(hello(1, 9), info(1, 9, 0, 0, 0))
     t.say(config(0, 0, img[:100]), ack(1))
     t.say(config(1, 100, img[100:]), ack(2))
@@ -234,12 +244,12 @@ def talks() -> None:
     t.say(set_position(3, 7, [0, 0, 0]), ack(4))
     t.say(enable(4, 1), ack(5))
     pair = [whole(300, 16000, 0, [300, -200], 1), whole(100, 16000, 0, [0, 0], 1)]
-    t.say(motion(5, 6, 3, [0, 0], [300, -200], pair), ack(6, 0, 0, 1, 30, units(pair)))
+    t.say(motion(5, 6, 3, [0, 0], [300, -200], pair), ack(6, 0, 0, 1, messages.board.queue - 2, units(pair)))
     t.raw("wait 450")
     t.say(motion(6, 6, 3, [300, -200], [701, -200], [whole(401, 16000, 0, [401, 0], 1)]), ack(6, 18))
-    t.write("joint_limit.talk")
+    t.write(f"joint_limit{suffix}.talk")
 
-    t = Talk("Damaged bytes are dropped without an answer, and counted")
+    t = Talk("Damaged bytes are dropped without an answer, and counted", name)
     t.say(hello(1, 3), info(1, 3, 0, 0, 0))
     sound = wire(status(2))
     broken = bytearray(sound)
@@ -249,35 +259,35 @@ def talks() -> None:
         t.raw("silent")
     t.note("empty frames are ignored, a question after them is answered")
     t.raw("wire 000000" + sound.hex())
-    t.raw("< " + report(2, 0, 0, 0, 0, 0, 0, [0] * AXES, bad="04"))
+    t.raw("< " + report(2, 0, 0, 0, 0, 0, 0, vector(0, 0, 0), bad="04"))
     t.note("an unknown type outside of the sequence gets no answer, nor does a HELLO of the wrong length")
     t.raw("wire " + wire(b"\x0f\x01").hex())
     t.raw("wire " + wire(hello(1, 4) + b"\0").hex())
     t.raw("wire " + wire(b"\x80\x01").hex())
     t.raw("silent")
-    t.write("noise.talk")
+    t.write(f"noise{suffix}.talk")
 
 
 def servo_talk() -> None:
     """Two joints of a servo arm: the count is the pulse width."""
-    board, crc_of = "uno_servos", zlib.crc32
+    crc_of = zlib.crc32
     img = struct.pack("<8BI", 2, 6, 0, 0, 0, 0, 0, 0, 7)
     img += struct.pack("<BiiiII", 1, 500, 2500, 1500, 1000, 4000) * 2
     img += struct.pack("<BiiiII", 0, 0, 0, 0, 0, 0) * 4
-    t = Talk("Servos: a start pose and consent before the first pulse, then motion like any other", board)
-    t.say(hello(1, 1), info(1, 1, 0, 0, 0, board))
+    t = Talk("Servos: a start pose and consent before the first pulse, then motion like any other", "uno_servos")
+    t.say(hello(1, 1), info(1, 1, 0, 0, 0))
     t.say(config(0, 0, img[:90]), ack(1))
     t.say(config(1, 90, img[90:]), ack(2))
     t.say(commit(2, img), ack(3))
     t.note("nobody has said where the servos stand, then nobody has consented to pulses")
     move = [whole(200, 16000, 0, [40, -40], 1), whole(100, 16000, 0, [0, -20], 1)]
     t.say(motion(3, 3, 3, [1500, 1500], [1540, 1440], move), ack(3, 9, 0))
-    t.say(hello(1, 2), info(1, 2, crc_of(img), 0, 4, board))
+    t.say(hello(1, 2), info(1, 2, crc_of(img), 0, 4))
     t.say(set_position(0, 3, [1500, 2501]), ack(0, 5, 1))
-    t.say(hello(1, 3), info(1, 3, crc_of(img), 0, 4, board))
+    t.say(hello(1, 3), info(1, 3, crc_of(img), 0, 4))
     t.say(set_position(0, 3, [1500, 1500]), ack(1))
     t.say(motion(1, 3, 3, [1500, 1500], [1540, 1440], move), ack(1, 11, 0))
-    t.say(hello(1, 4), info(1, 4, crc_of(img), 3, 4, board))
+    t.say(hello(1, 4), info(1, 4, crc_of(img), 3, 4))
     t.say(enable(0, 2), ack(1))
     t.say(motion(1, 3, 3, [1500, 1500], [1540, 1440], move), ack(2, 0, 0, 1, 30, units(move)))
     t.raw("wait 400")
@@ -286,10 +296,10 @@ def servo_talk() -> None:
     t.say(motion(2, 3, 3, [1540, 1440], [2501, 1440], [whole(5000, 16000, 0, [961, 0], 1)]), ack(2, 17, 0))
     t.note("after a reset the servos are lost: nothing held them")
     t.raw("reset")
-    t.say(hello(1, 5), info(1, 5, crc_of(img), 0, 0b100, board))
+    t.say(hello(1, 5), info(1, 5, crc_of(img), 0, 0b100))
     tiny = [whole(100, 16000, 0, [10, 0], 1)]
     t.say(motion(0, 3, 3, [1540, 1440], [1550, 1440], tiny), ack(0, 9, 0))
-    t.say(hello(1, 6), info(1, 6, crc_of(img), 0, 0b100, board))
+    t.say(hello(1, 6), info(1, 6, crc_of(img), 0, 0b100))
     t.say(set_position(0, 3, [1540, 1440]), ack(1))
     t.say(enable(1, 2), ack(2))
     t.say(motion(2, 3, 3, [1540, 1440], [1550, 1440], tiny), ack(3, 0, 0, 1, 31, units(tiny)))
@@ -304,7 +314,8 @@ def servo_talk() -> None:
 def main() -> None:
     """Write all files."""
     (HERE / "frames.txt").write_text(frames())
-    talks()
+    talks("uno_cnc_shield")
+    talks("pico6", "_pico6")
     servo_talk()
 
 

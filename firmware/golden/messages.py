@@ -5,14 +5,43 @@ Standalone on purpose: it shares no code with the firmware or with armkin, so th
 
 import struct
 import zlib
+from typing import NamedTuple
 
-AXES = 5  # uno_cnc_shield: X Y Z A and a servo
-BOARDS = {  # id, axes, servos, switches, rows, queue, frame
-    "uno_cnc_shield": (1, 5, 0x10, 3, 4, 32, 152),
-    "uno_servos": (3, 6, 0x3F, 0, 6, 32, 128),
+
+class Board(NamedTuple):
+    """What INFO says of a board, and which axis the gripper is in these conversations."""
+
+    id: int
+    axes: int
+    servos: int
+    switches: int
+    rows: int
+    queue: int
+    frame: int
+    receive: int
+    clock: int
+    gripper: int
+
+
+BOARDS = {
+    "uno_cnc_shield": Board(1, 5, 0x10, 3, 4, 32, 152, 127, 16_000_000, 4),  # X Y Z A and a servo
+    "uno_servos": Board(3, 6, 0x3F, 0, 6, 32, 128, 127, 16_000_000, 0),
+    "pico6": Board(4, 8, 0xC0, 6, 6, 128, 250, 2047, 25_000_000, 6),  # X Y Z A B C and two servos
 }
-RECEIVE = 127
+board = BOARDS["uno_cnc_shield"]  # the one that the conversation is with
 STEP = 1 << 23
+
+
+def vector(x: int, y: int, z: int, gripper: int = 0) -> list[int]:
+    """One number an axis; only X, Y, Z and the gripper have any."""
+    out = [x, y, z] + [0] * (board.axes - 3)
+    out[board.gripper] = gripper
+    return out
+
+
+def mask(*axes: int) -> int:
+    """Bits of axes; -1 is the gripper."""
+    return sum(1 << (board.gripper if axis < 0 else axis) for axis in axes)
 
 
 def cobs(data: bytes) -> bytes:
@@ -51,17 +80,17 @@ def enable(tag: int, what: int) -> bytes:
     return struct.pack("<BBB", 0x12, tag, what)
 
 
-def set_position(tag: int, mask: int, counts: list[int]) -> bytes:
-    return struct.pack(f"<BBH{len(counts)}i", 0x13, tag, mask, *counts)
+def set_position(tag: int, which: int, counts: list[int]) -> bytes:
+    return struct.pack(f"<BBH{len(counts)}i", 0x13, tag, which, *counts)
 
 
 Segment = tuple[int, int, int, list[int]]  # ticks, interval, add in 1/256 cycle, rates in 2^-23 step a tick
 
 
-def motion(tag: int, mask: int, flags: int, start: list[int], end: list[int], segments: list[Segment]) -> bytes:
+def motion(tag: int, which: int, flags: int, start: list[int], end: list[int], segments: list[Segment]) -> bytes:
     k = len(start)
-    body = struct.pack(f"<BBHBB{k}i{k}i", 0x14, tag, mask, flags, len(segments), *start, *end)
-    axes = [i for i in range(16) if mask >> i & 1]
+    body = struct.pack(f"<BBHBB{k}i{k}i", 0x14, tag, which, flags, len(segments), *start, *end)
+    axes = [i for i in range(16) if which >> i & 1]
     for t, i, a, rates in segments:
         if flags & 2:
             fine = sum(1 << axis for axis, r in zip(axes, rates, strict=True) if abs(r) < 1 << 15)
@@ -86,18 +115,19 @@ def image(
     flags: int = 0,
     guards: list[tuple[int, list[int]]] | None = None,
 ) -> bytes:
-    """The three-joint arm on X Y Z, nothing on A, a gripper on the servo. A4988 timing."""
+    """The three-joint arm on X Y Z, a gripper on the first servo, nothing on other axes. A4988 timing."""
     rows = rows or []
-    out = struct.pack("<8BI", 2, AXES, len(rows), flags, 10, 10, 2, 1, 0x1234ABCD)
+    out = struct.pack("<8BI", 2, board.axes, len(rows), flags, 10, 10, 2, 1, 0x1234ABCD)
     out += struct.pack("<BiiiII", 1, -4267, 4267, 0, 3000, 9000)
     out += struct.pack("<BiiiII", 1, -13127, 3580, 0, 8000, 24000)
     out += struct.pack("<BiiiII", 3, -2000, 14000, 0, 6000, 18000)
-    out += struct.pack("<BiiiII", 0, 0, 0, 0, 0, 0)
-    out += struct.pack("<BiiiII", 1, 900, 2100, 1500, 1000, 4000)
-    for flag, weight in guards or [(0, [0] * AXES)] * 3:
-        out += struct.pack(f"<B{AXES}b", flag, *weight)
+    for axis in range(3, board.axes):
+        gripper = (1, 900, 2100, 1500, 1000, 4000)
+        out += struct.pack("<BiiiII", *(gripper if axis == board.gripper else (0,) * 6))
+    for flag, weight in guards or [(0, [0] * board.axes)] * board.switches:
+        out += struct.pack(f"<B{board.axes}b", flag, *weight)
     for lower, upper, weight in rows:
-        out += struct.pack(f"<ii{AXES}h", lower, upper, *weight)
+        out += struct.pack(f"<ii{board.axes}h", lower, upper, *weight)
     return out
 
 
@@ -105,17 +135,13 @@ digest = 0  # of the session that the conversation is in
 
 
 def ack(next_: int, error: int = 0, detail: int = 0, state: int = 0, free: int | None = None, queued: int = 0) -> bytes:
-    slots = BOARDS[board_of_talk][5] if free is None else free
+    slots = board.queue if free is None else free
     return struct.pack("<6BHH", 0x80, next_, error, detail, state, slots, queued, digest)
 
 
-board_of_talk = "uno_cnc_shield"
-
-
-def info(tag: int, nonce: int, config_crc: int, known: int, flags: int, board: str = "uno_cnc_shield") -> str:
-    head = struct.pack("<BBB", 0x81, tag, 2).hex() + "????" + struct.pack("<IBBHBBBB", nonce, *BOARDS[board]).hex()
-    head += struct.pack("<H", RECEIVE).hex()
-    return head + "????" + struct.pack("<IIHB", 16_000_000, config_crc, known, flags).hex() + "??????"
+def info(tag: int, nonce: int, config_crc: int, known: int, flags: int) -> str:
+    head = struct.pack("<BBB", 0x81, tag, 2).hex() + "????" + struct.pack("<IBBHBBBBH", nonce, *board[:8]).hex()
+    return head + "????" + struct.pack("<IIHB", board.clock, config_crc, known, flags).hex() + "??????"
 
 
 def report(
@@ -132,7 +158,7 @@ def report(
     page: int = 0,
     bad: str = "00",
 ) -> str:
-    free = BOARDS[board_of_talk][5] if free is None else free
+    free = board.queue if free is None else free
     head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
     return head + "??00" + bad + struct.pack(f"<BH{len(counts)}i", page, digest, *counts).hex()
 
@@ -150,8 +176,9 @@ def rates(ticks: int, steps: list[int], unit: int = 1) -> list[int]:
 
 
 def whole(ticks: int, interval: int, add: int, steps: list[int], unit: int = 256) -> Segment:
-    """A segment of whole steps."""
-    return ticks, interval, add, rates(ticks, steps, unit)
+    """A segment of whole steps; `interval` and `add` for 16 MHz, so that it lasts as long on every board."""
+    pace = board.clock / 16_000_000
+    return ticks, min(65535, round(interval * pace)), round(add * pace), rates(ticks, steps, unit)
 
 
 def steps_of(segments: list[Segment]) -> list[int]:
@@ -162,19 +189,30 @@ def steps_of(segments: list[Segment]) -> list[int]:
     return [p >> 23 for p in places]
 
 
-# three narrow segments for X Y Z, then one wide one back and a gripper move
-RAMP = [
-    whole(100, 8000, -2000, [-10, -50, 28]),
-    whole(200, 7200, 0, [-20, -117, 65]),
-    whole(100, 7200, 2000, [-10, -50, 29]),
-]
-BACK = [whole(400, 6000, 0, [40, 217, -122], 1)]
-GRIP = [whole(300, 20000, 0, [90], 1)]
-assert [steps_of(RAMP), steps_of(BACK), steps_of(GRIP)] == [[-40, -217, 122], [40, 217, -122], [90]]
+def ramp() -> list[Segment]:
+    """Three narrow segments for X Y Z."""
+    return [
+        whole(100, 8000, -2000, [-10, -50, 28]),
+        whole(200, 7200, 0, [-20, -117, 65]),
+        whole(100, 7200, 2000, [-10, -50, 29]),
+    ]
+
+
+def back() -> list[Segment]:
+    """One wide segment, the same way back."""
+    return [whole(400, 6000, 0, [40, 217, -122], 1)]
+
+
+def grip() -> list[Segment]:
+    """The gripper moves."""
+    return [whole(300, 20000, 0, [90], 1)]
+
+
+assert [steps_of(ramp()), steps_of(back()), steps_of(grip())] == [[-40, -217, 122], [40, 217, -122], [90]]
 
 
 def units(segments: list[Segment]) -> int:
     total = 0
     for t, i, a, _ in segments:
         total += (t * ((i + ((256 * i + (t - 1) * a) >> 8)) // 2)) >> 8
-    return total * 2 // 125
+    return total * 256_000 // board.clock

@@ -116,6 +116,7 @@ export class Chip {
     const watchdog = this.rp2040.peripherals[0x40058];
     watchdog.reason = kind === 'watchdog' ? 1 : 0;
     watchdog.onWatchdogTrigger = () => {
+      watchdog.alarm.enable = false; // or it would be due again at once
       this.pendingReset = 'watchdog';
     };
   }

@@ -164,6 +164,15 @@ export class Commands {
       this.pins.flush();
     },
 
+    /** The program runs in a circle from here on. */
+    hang() {
+      const { core, sram } = this.chip.rp2040;
+      sram.set([0xfe, 0xe7], 0x3ff00); // b .
+      core.PM = true;
+      core.waiting = false;
+      core.PC = 0x2003ff00;
+    },
+
     help() {
       return { commands: Object.keys(Commands.all).join(' ') };
     },

@@ -56,7 +56,10 @@ def _carry(master: int, ours: socket.socket) -> bool:
     if master in ready and (data := _read(master)):
         ours.sendall(data)
     if ours in ready:
-        data = ours.recv(1 << 16)
+        try:
+            data = ours.recv(1 << 16)
+        except ConnectionResetError:
+            return False
         if not data:
             return False
         with suppress(BlockingIOError):  # nobody reads: it is gone

@@ -8,7 +8,11 @@
 #define HAL_NOINIT
 #define HAL_TABLE
 #define HAL_READ32(p) (*(p))
+#ifdef RECEIVE
+#define HAL_RECEIVE RECEIVE
+#else
 #define HAL_RECEIVE 127
+#endif
 
 typedef uint32_t fine_t;
 typedef int32_t sfine_t;

@@ -35,6 +35,7 @@ _FIRST = 0.002  # [s] a ramp's first segment at least
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
 _TICK = 1.12  # shortest intervals that a tick lasts
+_TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no edge is farther off than that
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
@@ -110,7 +111,7 @@ class Cutter:
 
     def _ticks(self, cycles: float, steps: float) -> int:
         """How many ticks a piece has: whole ones for each step of its fastest motor, if it makes many."""
-        least = _TICK * self.min_interval
+        least = max(_TICK * self.min_interval, _TICK_S * self.clock)
         each = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
         tick = max(least, min(each / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
         over = int(each / tick) if each < math.inf else 0
