@@ -99,6 +99,19 @@ def test_four_rows_do_no_harm() -> None:
     assert worse <= 1  # of 12; tests/bench/bench_calibration.py counts 200
 
 
+@pytest.mark.parametrize("seed", [37, 63, 76, 90, 105, 130, 152])
+def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
+    """Seeds of tests/bench/bench_calibration.py (1 mm of noise) where cross-validation alone chose a harmful fit."""
+    arm = armkin.load("three_dof")
+    rng = np.random.default_rng(1000 + seed)
+    true = built(arm, seed, base=False)
+    c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
+    found = armkin.calibrate(arm, c, measured(true, c, rng, noise=1.0, wrong=0.0))
+    tips = measured(true, unseen, rng, noise=1.0, wrong=0.0)
+    after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (found.arm, arm))
+    assert after <= 1.05 * before
+
+
 def test_one_row_in_five_may_be_wrong() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(9)

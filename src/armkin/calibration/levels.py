@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.calibration.chain import Model
 from armkin.calibration.fit import Fit, Measured, fit, residuals
+from armkin.calibration.sight import left_open
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
@@ -22,6 +23,8 @@ FOLDS = 5
 GAIN = 0.97  # of the file's squared error on unseen rows, what a first correction may leave,
 CERTAIN = 0.5  # and how many standard errors it must gain; a further one must only gain,
 FEW = 18.0  # with few rows by more: FEW / rows standard errors
+MANY = 10  # rows; with fewer a fit can look good by chance, and what it leaves open is looked at, too:
+OPEN = 0.5  # of the file's error, how much of the tip's place a fit to few rows may leave open
 CAP = 4.0  # errors beyond so many medians count as that: a row that is wrong decides nothing
 
 
@@ -55,7 +58,10 @@ def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
             errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
     level = 0
     for richer in range(1, len(LEVELS)):
-        if not np.array_equal(sets[richer], sets[level]) and _better(errors[level], errors[richer], first=level == 0):
+        if np.array_equal(sets[richer], sets[level]) or not _better(errors[level], errors[richer], first=level == 0):
+            continue
+        candidate = fits[richer]
+        if len(data) >= MANY or (candidate is not None and _settled(model, candidate, errors[0])):
             level = richer
     chosen = fits[level]
     assert chosen is not None
@@ -79,6 +85,11 @@ def _parts(count: int) -> list[NDArray[np.intp]]:
     """The rows in five parts of equal size, by chance (the same each time)."""
     order = np.random.default_rng(1).permutation(count)
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
+
+
+def _settled(model: Model, candidate: Fit, before: Array) -> bool:
+    """Whether the rows leave less open than the fit mends."""
+    return left_open(model, candidate) < OPEN * float(np.sqrt(np.mean(before**2)))
 
 
 def _better(simple: Array, rich: Array, *, first: bool) -> bool:

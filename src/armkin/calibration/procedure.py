@@ -13,7 +13,7 @@ from armkin.calibration import sight
 from armkin.calibration.chain import KINDS, model
 from armkin.calibration.doubts import check
 from armkin.calibration.fit import Measured
-from armkin.calibration.levels import LEVELS, Choice, choose, free_at
+from armkin.calibration.levels import LEVELS, MANY, Choice, choose, free_at
 from armkin.errors import UsageError
 from armkin.export import tables
 from armkin.formula import arrays
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 FLAGGED = 0.1  # a row of less weight is called wrong
 HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
-MANY = 10  # rows
 
 # Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
 _PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")
