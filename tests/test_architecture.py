@@ -42,10 +42,10 @@ MAY_IMPORT: dict[str, str] = {
     "board/ports": "errors",
     "board/firmware": "board/backend errors hardware formula model forward motors motion board/ports robot_file",
     "board/backend": "formula model motion motors board/ports",
-    "board/grbl": "errors formula model motors motion board/ports board/backend",
+    "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",
-    "board": "errors hardware formula model forward motors motion board/ports board/backend board/firmware"
+    "board": "errors hardware formula robot_file model forward motors motion board/ports board/backend board/firmware"
     " board/grbl board/feetech board/sim",
     "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/sim",

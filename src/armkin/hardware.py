@@ -90,6 +90,7 @@ class ForeignBoard:
 
     kind: str
     motors: str  # the kind of drive that it takes: stepper or bus
+    gripper: str  # the kind of drive of a gripper that it moves: spindle or bus
     axes: tuple[str, ...]  # names of its axes; a bus goes by ids
     baud: int
 
@@ -97,8 +98,8 @@ class ForeignBoard:
 FOREIGN = {
     board.kind: board
     for board in (
-        ForeignBoard("grbl", "stepper", ("X", "Y", "Z", "A", "B", "C"), 115_200),
-        ForeignBoard("feetech", "bus", (), 1_000_000),
+        ForeignBoard("grbl", "stepper", "spindle", ("X", "Y", "Z", "A", "B", "C"), 115_200),
+        ForeignBoard("feetech", "bus", "bus", (), 1_000_000),
     )
 }
 

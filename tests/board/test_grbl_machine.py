@@ -20,6 +20,7 @@ from armkin.board.sim.grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build import build
 from armkin.robot_file import parse
+from armkin.robot_file.model import Gripper
 from command_line import ROOT, THREE_DOF
 
 ARM = armkin.load("three_dof")
@@ -181,6 +182,27 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
             axes_of(build(parse(text.replace(old, new))))
     with pytest.raises(UsageError, match="GRBL drives steppers alone"):
         axes_of(armkin.load("ra02"))
+
+
+def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
+    """A stop clears GRBL's queue by a reset, which switches M3 off."""
+    port = board()
+    asked = iter(range(10_000))
+    one = machine(port, lambda: next(asked) > 30)
+    one.prepare(assume_home=True)
+    one.grip(Gripper.model_validate({"kind": "spindle", "open": 0, "closed": 120}), 120)
+    assert port.spindle == 120
+    with pytest.raises(StoppedError):
+        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]))])
+    assert port.spindle == 120
+    again = machine(port)
+    assert again.position() == "known"
+    again.hold()
+    assert port.spindle == 120
+    port.alarm(1)
+    with pytest.raises(LinkError, match="a limit switch closed"):
+        again.hold()
+    assert machine(port).position() == "lost"
 
 
 def test_a_pause_of_a_path_is_a_dwell() -> None:

@@ -118,7 +118,7 @@ def test_zero_writes_counts_and_leaves_the_rest_of_the_file(bus: str, tmp_path: 
         (("zero", "{grbl}", "--port", "sim"), 2, "zero is for arms whose joints have a bus servo"),
         (("grip", "{grbl}", "open", "--port", "sim"), 2, "no gripper that a board of kind grbl moves"),
         (("send", "{bus}", 0, 0, "--port", "sim", "--assume-home"), 5, "know their position"),
-        (("send", "{bus}", 0, 0), 2, "boards of kind feetech are not looked for"),
+        (("send", "{bus}", 0, 0), 2, "no port where a feetech board answers was found"),
         (("send", "{grbl}", 0, 200, 0, "--port", "sim"), 3, "nothing was moved"),
         (("relax", "{bus}", "--port", "sim", "--seconds", "-1"), 2, "must be from 0 to 3600"),
     ],
@@ -129,6 +129,95 @@ def test_what_cannot_be_done_is_refused(
     done = run(*(str(word).replace("{bus}", bus).replace("{grbl}", grbl) for word in words))
     assert (done.code, done.out) == (code, "")
     assert message in done.err
+
+
+HOMING = "homing: {switch: X, direction: %s, at: %s, speed: 20, backoff: 3, normally: open}"
+ENDS = {"q1": (1, 120), "q2": (-1, -20), "q3": (1, 120)}
+
+
+@pytest.fixture
+def homed(grbl: str) -> str:
+    """The GRBL arm with a switch on every joint, and a gripper on M3."""
+    text = Path(grbl).read_text()
+    for name, (direction, at) in ENDS.items():
+        text = text.replace(f"  - name: {name}\n", f"  - name: {name}\n    {HOMING % (direction, at)}\n")
+    begin, end = text.index("gripper:"), text.index("# The paper has no limit switches")
+    text = text[:begin] + "gripper: {kind: spindle, open: 40, closed: 200}\n" + text[end:]
+    Path(grbl).write_text(text)
+    return grbl
+
+
+def fitted(robot: str, **more: float) -> Grbl:
+    """A GRBL board as the robot file wants it."""
+    settings = {number: value for number, (_, value) in _wanted(robot).items()}
+    return Grbl(
+        axes=3, settings=settings | {int(key[1:]): value for key, value in more.items()}, ends={0: 0, 1: 0, 2: 0}
+    )
+
+
+def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(homed: str) -> None:
+    rehearsed = run("home", homed, "--port", "sim", "--json")
+    assert rehearsed.json["joints"] == pytest.approx([0, 90, -90], abs=0.03)
+    assert "moving to the home pose" in rehearsed.err
+    board = fitted(homed)
+    with PtyPort(board) as pty:
+        there = run("home", homed, "--port", pty.name, "--stay", "--json").json
+        assert there["joints"] == pytest.approx([119, -19, 119], abs=0.03)  # $27 = 1 deg off the switches
+        at = board.steps[:3]
+        home = run("home", homed, "--port", pty.name, "--json").json
+        assert (home["position"], home["pulses"]) == ("known", [0, 0, 0])
+        assert [a - b for a, b in zip(board.steps, at, strict=True)] == [-n for n in there["pulses"]]
+
+
+def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> None:
+    board = fitted(homed, s23=0)
+    with PtyPort(board) as pty:
+        refused = run("home", homed, "--port", pty.name)
+        assert (refused.code, board.steps) == (5, [0, 0, 0])
+        assert "would not home as three_dof_grbl needs: $23 (homing downwards) is 0" in refused.err
+        assert run("send", homed, 0, 89, -89, "--port", pty.name, "--assume-home").code == 0  # no matter to a move
+        assert run("setup", homed, "--port", pty.name, "--write").code == 0
+        assert run("home", homed, "--port", pty.name).code == 0
+
+
+def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(homed: str) -> None:
+    board = fitted(homed)
+    with PtyPort(board) as pty:
+        done = run("grip", homed, "closed", "--port", pty.name, "--json")
+        assert (board.spindle, done.json["gripper"], done.json["measured"]) == (200, 200, False)
+        assert "S, as sent: nothing measures it" in run("grip", homed, "open", "--port", pty.name).out
+        assert board.spindle == 40
+        assert "outside of the gripper's 40 to 200" in run("grip", homed, 201, "--port", pty.name).err
+        board.settings[30] = 100
+        refused = run("grip", homed, "closed", "--port", pty.name)
+        assert (refused.code, board.spindle) == (5, 40)
+        assert "does not give out S 200: $30 is 100" in refused.err
+
+
+def test_a_spindle_is_for_grbl_s_gripper_alone(homed: str, tmp_path: Path) -> None:
+    text, path = Path(homed).read_text(), tmp_path / "wrong.yaml"
+    for old, new, says in (
+        ("kind: spindle, open: 40", "kind: spindle, axis: X, open: 40", "a spindle has none"),
+        ("closed: 200", "closed: -200", "is an S word of M3"),
+        ("axis: X, full_steps: 200, microsteps: 16, gear: 1, pulley: 4", "kind: spindle", "which turns no joint"),
+        ("board: {kind: grbl}", "board: {kind: uno_cnc_shield}", "which uno_cnc_shield has not"),
+    ):
+        path.write_text(text.replace(old, new))
+        refused = run("info", path)
+        assert (refused.code, says in refused.err) == (4, True), refused.err
+
+
+def test_zero_records_the_jaw_too(bus: str, tmp_path: Path) -> None:
+    new = tmp_path / "new.yaml"
+    with PtyPort(ServoBus([Servo(1, 2100), Servo(2, 1600), Servo(6, 1900)])) as pty:
+        done = run("zero", bus, "--port", pty.name, "--pose", "0,45", "--gripper", "open", "--out", new)
+    assert done.code == 0
+    assert armkin.load(new).gripper == armkin.load(bus).gripper.model_copy(update={"zero": 1217})  # type: ignore[union-attr]
+
+
+def test_the_jaws_of_the_so_arms_move_as_far_as_their_urdf_says() -> None:
+    for robot, wide in (("so100", 114.592), ("so101", 100)):
+        assert run("grip", robot, "open", "--port", "sim", "--json").json["gripper"] == pytest.approx(wide, abs=0.1)
 
 
 def test_values_are_replaced_where_they_stand() -> None:

@@ -2,9 +2,15 @@
 
 import pytest
 
+import armkin
 from armkin.board import ports
-from command_line import THREE_DOF, run
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.settings import wanted
+from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.servo_bus import Servo, ServoBus
+from command_line import ROOT, THREE_DOF, run
 from pty_board import PtyBoard
+from pty_port import PtyPort
 
 
 def plugged_in(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
@@ -47,6 +53,21 @@ def test_several_boards_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
         several = run("send", THREE_DOF, 0, 90, -90)
         assert several.code == 2
         assert f"2 boards answer ({one.port}, {two.port})" in several.err
+
+
+def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, bus_arm = ("tests/robots/three_dof_grbl.yaml", "tests/robots/bus_arm.yaml")
+    settings = {number: value for number, (_, value) in wanted(axes_of(armkin.load(ROOT / robot))).items()}
+    servos = ServoBus([Servo(1, 2058), Servo(2, 2068)])
+    with PtyPort(Grbl(settings=settings)) as grbl, PtyPort(servos) as bus, PtyPort(ServoBus([Servo(1)])) as other:
+        plugged_in(monkeypatch, grbl.name, bus.name, other.name)
+        found = run("status", bus_arm, "--json")
+        assert found.json["port"] == bus.name
+        assert f"using {bus.name}, the only port where a feetech board answers" in found.err
+        plugged_in(monkeypatch, grbl.name, other.name)
+        assert run("status", robot, "--json").json["port"] == grbl.name
+        plugged_in(monkeypatch, other.name)
+        assert "no port where a feetech board answers was found" in run("status", bus_arm).err
 
 
 def test_a_dry_run_asks_for_no_port(monkeypatch: pytest.MonkeyPatch) -> None:

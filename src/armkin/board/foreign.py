@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.errors import UsageError
+from armkin.errors import LinkError, UsageError
 from armkin.hardware import FOREIGN, ForeignBoard
 from armkin.model import units
 from armkin.motion.plan import plan as plan_joints
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
+    from armkin.robot_file.model import Gripper
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Foreign:
 
             axes = axes_of(self.arm)
             settings = {number: value for number, (_, value) in wanted(axes).items()}
-            return Grbl(axes=max(axis.index for axis in axes) + 1, settings=settings)
+            count = max(axis.index for axis in axes) + 1
+            return Grbl(axes=count, settings=settings, ends=dict.fromkeys(range(count), 0))
         from armkin.board.feetech.machine import servo_ids
         from armkin.board.sim.servo_bus import Servo, ServoBus
 
@@ -85,9 +87,66 @@ class Foreign:
         if np.count_nonzero(arm.motor_gain) != arm.n:
             raise UsageError("GRBL homes motors, not joints: this arm's motors turn several joints at once")
         at = units.joints_in(arm, [homing.at for homing in arm.homing if homing is not None])
-        upward = [homing.direction > 0 for homing in arm.homing if homing is not None]
-        order = np.abs(arm.motor_gain).argmax(axis=1)  # motor -> its joint
-        machine.home(pulses(arm, at).tolist(), [upward[j] for j in order])
+        machine.home(pulses(arm, at).tolist())
+
+    def go_home(self, machine: Backend) -> None:
+        """Move to the home pose from where the arm stands."""
+        machine.prepare()
+        machine.run([self.plan(machine.counts(), self.arm.home[None], 1.0)])
+
+    def gripper(self) -> Gripper:
+        """The arm's gripper. Raises UsageError if it has none that this kind of board moves."""
+        gripper, board = self.arm.gripper, self.board
+        if gripper is None or gripper.kind != board.gripper:
+            like = {"spindle": "{kind: spindle, open: 0, closed: 200}, S words of M3", "bus": "{kind: bus, id: 6, ...}"}
+            raise UsageError(
+                f"{self.arm.name} has no gripper that a board of kind {board.kind} moves; it takes gripper: "
+                + like[board.gripper]
+            )
+        return gripper
+
+    def grip_value(self, value: str | float) -> float:
+        """Where the gripper is to go: open, closed, or a value between them. Raises UsageError for others."""
+        gripper = self.gripper()
+        low, high = sorted((gripper.open, gripper.closed))
+        wanted = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
+        if not low <= wanted <= high:
+            raise UsageError(f"grip: {wanted:g} is outside of the gripper's {low:g} to {high:g}")
+        return wanted
+
+    def grip(self, machine: Backend, value: float) -> float:
+        """Move the gripper, and return where it comes to rest; of GRBL, which measures nothing, what was sent."""
+        from armkin.board.feetech.machine import ServoMachine
+        from armkin.board.grbl.machine import GrblMachine
+
+        assert isinstance(machine, GrblMachine | ServoMachine)
+        return machine.grip(self.gripper(), self.grip_value(value))
+
+    def answers(
+        self, name: str, baud: int | None = None, stop: Callable[[], bool] = lambda: False, *, reset: bool = True
+    ) -> bool:
+        """Whether such a board answers at a port: GRBL to a status request, or every servo of the arm to its id."""
+        from armkin.board.ports import SerialPort
+
+        try:
+            link = SerialPort(name, baud or self.board.baud, reset=reset)
+        except LinkError:
+            return False
+        try:
+            if self.board.kind == "grbl":
+                from armkin.board.grbl.session import Session
+
+                Session(link).open()
+                return True
+            from armkin.board.feetech.bus import Bus
+            from armkin.board.feetech.machine import servo_ids
+
+            bus = Bus(link)
+            return all(not stop() and bus.ping(number) for number in servo_ids(self.arm))
+        except LinkError:
+            return False
+        finally:
+            link.close()
 
     def jog(self, machine: Backend, joint: int, rate: float, seconds: float) -> None:
         """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most."""

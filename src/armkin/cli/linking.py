@@ -78,6 +78,11 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int,
     )
     with stoppable() as stop:
         found = answering(None if configuration is None else configuration.board.number, baud, stop, reset=reset)
+    return _only(found, kind)
+
+
+def _only(found: Sequence[str], kind: str) -> str:
+    """The one port that was found. Raises UsageError if there are none or several."""
     if len(found) == 1:
         output.note(f"using {found[0]}, the only port where {kind} answers")
         return found[0]
@@ -105,7 +110,9 @@ def backend(
     from armkin.board.stopping import stoppable
 
     port = (
-        foreign_port(port, board) if isinstance(board, Foreign) else port_name(port, board, baud or BAUD, reset=reset)
+        foreign_port(port, board, baud, reset=reset)
+        if isinstance(board, Foreign)
+        else port_name(port, board, baud or BAUD, reset=reset)
     )
     if port == SIM:
         output.note(simulated)
@@ -154,14 +161,19 @@ def held(machine: Backend, resume: bool) -> Note | None:
     return resuming.recall(machine)
 
 
-def foreign_port(given: str | None, board: Foreign) -> str:
-    """The port given; who listens at the others is not tried, because other machines speak these languages, too."""
-    if given is None:
-        raise UsageError(
-            f"--port is missing: boards of kind {board.board.kind} are not looked for\n"
-            "armkin ports lists them, ARMKIN_PORT names one for every command; sim is a board in this process"
-        )
-    return given
+def foreign_port(given: str | None, board: Foreign, baud: int | None, *, reset: bool = True) -> str:
+    """The port given (or ARMKIN_PORT), else the only one where a board of the robot file's kind answers.
+
+    GRBL is asked for its status, a bus for its servos' numbers: nothing moves.
+    """
+    if given is not None:
+        return given
+    from armkin.board.firmware.finding import others
+    from armkin.board.stopping import stoppable
+
+    with stoppable() as stop:
+        found = [name for name in others() if board.answers(name, baud, stop, reset=reset)]
+    return _only(found, f"a {board.board.kind} board")
 
 
 def foreign(arm: Arm) -> Foreign | None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from armkin.hardware import BOARDS, FOREIGN
-from armkin.robot_file.model import Triple, dot
+from armkin.robot_file.model import Gripper, Triple, dot
 
 if TYPE_CHECKING:
     from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotKeys
@@ -22,7 +22,12 @@ Problem = tuple[Path, str]
 _STEPPER_KEYS = ("full_steps", "microsteps", "gear", "pulley", "lead")
 _SERVO_KEYS = ("travel", "pulse_us", "zero")
 _BUS_KEYS = ("id", "counts", "zero")
-_KEYS = {"stepper": _STEPPER_KEYS, "servo": _SERVO_KEYS, "bus": _BUS_KEYS}
+_KEYS: dict[str, tuple[str, ...]] = {
+    "stepper": _STEPPER_KEYS,
+    "servo": _SERVO_KEYS,
+    "bus": _BUS_KEYS,
+    "spindle": (),
+}
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
 # A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
 _ROUNDING = 1e-3
@@ -159,9 +164,15 @@ def _drive(drive: Drive) -> Iterator[Problem]:
     own = _KEYS[drive.kind]
     what = "bus servo" if drive.kind == "bus" else drive.kind
     for key in (key for key in dict.fromkeys(sum(_KEYS.values(), ())) if key in given and key not in own):
-        message = f"a {what} has no {key}; it takes {', '.join(own)}"
+        message = f"a {what} has no {key}; it takes {', '.join(own) or 'open and closed alone'}"
         kind, named = ("bus", "bus servo") if key in ("id", "counts") else ("servo", "servo")
         yield (key,), message + (f"; for a {named} write kind: {kind}" if drive.kind == "stepper" else "")
+    if drive.kind == "spindle":
+        if not isinstance(drive, Gripper):
+            yield ("kind",), "a spindle is GRBL's M3 output, which turns no joint; it can be the gripper's"
+        if drive.axis is not None or drive.invert:
+            yield ("axis" if drive.axis is not None else "invert",), "a spindle has none: M3 is GRBL's one such output"
+        return
     if drive.kind == "bus":
         if missing := [key for key in ("id", "counts") if getattr(drive, key) is None]:
             yield (), f"a bus servo needs {' and '.join(missing)}, for example id: 1, counts: 4096, zero: 2048"
@@ -286,6 +297,12 @@ def _gripper(robot: RobotKeys) -> Iterator[Problem]:
         yield ("gripper", *path), message
     if gripper.open == gripper.closed:
         yield ("gripper", "closed"), f"is the same as open, {gripper.open:g}"
+    if gripper.kind == "spindle":
+        if robot.board is not None and robot.board.kind != "grbl":
+            yield ("gripper", "kind"), f"a spindle is GRBL's M3 output, which {robot.board.kind} has not"
+        for key in ("open", "closed"):
+            if not 0 <= getattr(gripper, key) <= 1e5:
+                yield ("gripper", key), f"is an S word of M3, from 0 to GRBL's $30; {getattr(gripper, key):g} is none"
     if gripper.kind == "servo" and gripper.travel is not None:
         turn = -1.0 if gripper.invert else 1.0
         for key in ("open", "closed"):

@@ -118,8 +118,10 @@ class Screw(_Model):
 class Drive(_Model):
     """One motor: a stepper with its chain to the joint, an RC servo, or a servo on a serial bus."""
 
-    kind: Literal["stepper", "servo", "bus"] = Field(
-        "stepper", description="A stepper (default), an RC servo, or a bus servo with an absolute position."
+    kind: Literal["stepper", "servo", "bus", "spindle"] = Field(
+        "stepper",
+        description="A stepper (default), an RC servo, or a bus servo with an absolute position; spindle: "
+        "a gripper on GRBL's M3 output.",
     )
     axis: Name | None = Field(
         None,
@@ -161,6 +163,8 @@ class Drive(_Model):
         """Pulses (microseconds, counts) per degree, or per mm if there is a lead; `invert` is not in it."""
         if self.kind == "bus":
             return (self.counts or 0) / 360.0
+        if self.kind == "spindle":
+            return 1.0
         if self.kind == "servo":
             (a0, a1), (p0, p1) = self.travel or (0.0, 1.0), self.pulse_us or (0, 0)
             return (p1 - p0) / (a1 - a0)
@@ -179,10 +183,14 @@ class Motor(Drive):
 
 
 class Gripper(Drive):
-    """The gripper's motor and its two positions, in degrees of the drive (mm with a lead)."""
+    """The gripper's motor and its two positions, in degrees of the drive (mm with a lead; S words of a spindle)."""
 
-    open: Value = Field(description="Position when open, in the drive's degrees (mm with a lead).")
-    closed: Value = Field(description="Position when closed, in the drive's degrees (mm with a lead).")
+    open: Value = Field(
+        description="Position when open, in the drive's degrees (mm with a lead), or a spindle's S word."
+    )
+    closed: Value = Field(
+        description="Position when closed, in the drive's degrees (mm with a lead), or a spindle's S word."
+    )
     max_speed: Rate | None = Field(None, description="deg/s or mm/s of the drive; needed to grip.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to grip.")
 

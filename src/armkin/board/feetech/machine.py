@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job
-from armkin.board.feetech import registers
+from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
 from armkin.errors import LinkError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
@@ -35,7 +35,6 @@ WATCH = 0.1  # [s] between readings of position and errors in motion
 LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
 SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
 SETTLING = 1.0  # [s] that it may take
-GRIP_SPEED = 500.0  # [counts/s] of a gripper without max_speed, 44 deg/s
 EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
 
 
@@ -191,28 +190,7 @@ class ServoMachine:
 
     def grip(self, gripper: Gripper, value: float) -> float:
         """Move the gripper and return where it comes to rest, both in its drive's degrees."""
-        number = gripper.id
-        if number is None or not self.bus.ping(number):
-            raise LinkError(f"the gripper's servo {number} does not answer on {self.port.name}")
-        per = gripper.pulses_per_unit() * (-1 if gripper.invert else 1)
-        goal = round(gripper.zero + per * value)
-        at = self.bus.read(number, registers.POSITION)
-        if not self.bus.read(number, registers.TORQUE):
-            self.bus.write(number, registers.GOAL_POSITION, at)
-            self.bus.write(number, registers.TORQUE, 1)
-        speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else GRIP_SPEED
-        self.bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))
-        self.bus.write(number, registers.GOAL_POSITION, goal)
-        since = self.port.now()
-        while abs(at - goal) > SETTLED and self.port.now() - since < SETTLING:
-            self.port.read(PERIOD)
-            if self._stop():
-                self.bus.write(number, registers.GOAL_POSITION, self.bus.read(number, registers.POSITION))
-                raise StoppedError
-            before, at = at, self.bus.read(number, registers.POSITION)
-            if at != before:
-                since = self.port.now()
-        return (at - gripper.zero) / per
+        return gripping.grip(self.bus, gripper, value, self._stop)
 
     def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""

@@ -25,6 +25,11 @@ def likely() -> Iterable[str]:
     return [port.device for port in list_ports() if port.board]
 
 
+def others() -> Iterable[str]:
+    """Names of the ports where a board with other firmware may be: Arduinos, and the chips of ESP32s and adapters."""
+    return [port.device for port in list_ports() if port.board or port.adapter]
+
+
 def _answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
     try:
         link = SerialPort(name, baud, reset=reset)

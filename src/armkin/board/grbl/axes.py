@@ -41,8 +41,16 @@ def axes_of(arm: Arm) -> list[Axis]:
                 f"{where}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with three decimals, "
                 f"which tell up to {COARSE:g} apart"
             )
-        found.append(Axis(motor.axis, name, steps, motor.invert, _finite(speed[k] / steps), _finite(accel[k] / steps)))
+        rates = _finite(speed[k] / steps), _finite(accel[k] / steps)
+        found.append(Axis(motor.axis, name, steps, motor.invert, *rates, _upward(arm, k)))
     return found
+
+
+def _upward(arm: Arm, motor: int) -> bool | None:
+    """Whether a motor's counts are greatest at its joint's switch; None: no switch, or it turns several joints."""
+    turned = np.flatnonzero(arm.motor_gain[motor])
+    homing = arm.homing[turned[0]] if len(turned) == 1 else None
+    return None if homing is None else (homing.direction > 0) == bool(arm.motor_gain[motor, turned[0]] > 0)
 
 
 def _finite(value: float) -> float:

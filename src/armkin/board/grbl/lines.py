@@ -97,6 +97,17 @@ def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
         return None
 
 
+def spindle(line: str) -> float | None:
+    """The S word in force, of the answer to ``$G``; None while the spindle is off or in other lines.
+
+    >>> spindle("[GC:G0 G54 G17 G21 G90 G94 M3 M9 T0 F0 S120]")
+    120.0
+    """
+    words = line[4:-1].split() if line.startswith("[GC:") and line.endswith("]") else []
+    speeds = [word[1:] for word in words if re.fullmatch(r"S\d+(\.\d*)?", word)]
+    return float(speeds[0]) if "M3" in words and speeds else None
+
+
 def alarm(number: int) -> str:
     """What an alarm means."""
     return ALARMS.get(number, f"alarm {number}")

@@ -18,6 +18,7 @@ from armkin.board.backend.job import Job
 from armkin.board.grbl import gcode, lines, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.session import GrblError, Session
+from armkin.board.grbl.spindle import Spindle
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
 from armkin.motion.plan import plan as plan_joints
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
+    from armkin.robot_file.model import Gripper
 
 MARK = 1000.0  # [units] added to G92: an offset of 0 means that nobody has said where the arm stands
 _REST = 30.0  # [s] that a hold may take
@@ -50,6 +52,7 @@ class GrblMachine:
         self.session.open()
         self._offset: np.ndarray[Any, np.dtype[np.int64]] | None = None  # machine steps less counts
         self.settings = self._read_settings()
+        self._spindle = Spindle(self.session)
         self._read()
 
     # Where it stands
@@ -192,11 +195,23 @@ class GrblMachine:
             if self.port.now() > end:
                 raise LinkError(f"GRBL does not come to rest: it says {status.state}; cut the motors' power")
             self.port.read(0.02)
-        counts = None if self._offset is None or status.state == "Alarm" else self._counts_of(status)
-        self.session.reset()
+        self.session.report = status
+        counts = None if self._offset is None or status.state == "Alarm" else self.counts()
+        self._reset()
         self._read()
         if counts is not None:
             self.vouch(counts)  # the reset has cleared it, at a standstill
+
+    def grip(self, gripper: Gripper, value: float) -> float:
+        """Set the M3 output that the gripper hangs on, and return the S word: GRBL measures nothing."""
+        try:
+            return self._spindle.grip(gripper, value, self.settings)
+        except GrblError as error:
+            raise self._explain(error) from None
+
+    def _reset(self) -> None:
+        self.session.reset()
+        self._spindle.again()
 
     def _hold(self) -> None:
         self.hold()
@@ -218,14 +233,20 @@ class GrblMachine:
             self._forget()
         return LinkError(f"{error}\n{self.standing()}")
 
-    def home(self, at: Sequence[float], upward: Sequence[bool]) -> None:
-        """Run GRBL's homing cycle; at: counts where each motor's switch closes, upward: which end it is at."""
+    def home(self, at: Sequence[float]) -> None:
+        """Run GRBL's homing cycle; at: counts where each motor's switch closes.
+
+        Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
+        """
+        wrong = [one for one in self.wrong() if one.number in settings.HOMING and one.found is not None]
+        if wrong:
+            raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
         try:
             self.session.ask("$H", patience=180.0)
         except GrblError as error:
             raise self._explain(error) from None
         pull = self.settings.get(27, 0.0)
-        away = [pull * axis.steps * (1 if up else -1) for axis, up in zip(self.axes, upward, strict=True)]
+        away = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
         self.vouch(np.rint(np.asarray(at) - away).astype(np.int64))
         self._read()
 
@@ -257,14 +278,10 @@ class GrblMachine:
         place = [report.position[axis.index] * axis.steps for axis in self.axes]
         return np.rint(place).astype(np.int64)
 
-    def _counts_of(self, status: lines.Report) -> np.ndarray[Any, np.dtype[np.int64]]:
-        self.session.report = status
-        return np.asarray(self.counts(), dtype=np.int64)
-
     def _forget(self) -> None:
         self._offset = None
         try:
-            self.session.reset()
+            self._reset()
         except LinkError:
             return  # in an alarm, or gone: forgotten all the same
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from armkin.board.grbl import lines
@@ -23,6 +24,7 @@ _BOOT = 4.0  # [s] a board may take to greet after its port was opened
 _ANSWER = 2.0  # [s] a line may take that moves nothing
 _POLL = 0.1  # [s] between status requests in motion
 _SILENCE = 2.0  # [s] without any line from GRBL, which is asked for reports all the time
+_SHORT = 0.25  # [s] that an empty line may take
 _REPORT = 0.5  # [s] a status report may take
 _LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
 
@@ -59,12 +61,20 @@ class Session:
             raise LinkError(
                 f"{self.port.name} does not answer as GRBL does: is it the right port, and its rate {self.port.baud}?"
             )
+        self._end_line()
         for line in self.ask("$I"):
             if match := re.match(r"\[VER:([^:\]]*)", line):
                 self.version = match[1]
             if match := re.match(r"\[OPT:[^,\]]*,(\d+),(\d+)", line):
                 self.buffer = max(32, min(int(match[2]), 4096))
         self.was_reset = False
+
+    def _end_line(self) -> None:
+        """End what another program may have left of a line: GRBL answers it, and an empty line, too."""
+        self._send("")
+        with suppress(GrblError):
+            self._wait(lambda: not self._sent, _SHORT)
+        self._sent.clear()
 
     def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
         """Send one line, wait for its ``ok``, and return what came before it."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from armkin.board.grbl.lines import LETTERS
 
+HOMING = (22, 23)  # settings that only homing needs
 COARSE = 500.0  # [steps a unit] beyond which GRBL's three decimals do not tell every step
 
 
@@ -21,6 +22,7 @@ class Axis:
     invert: bool
     max_speed: float  # [units/s]
     max_accel: float  # [units/s2]
+    upward: bool | None = None  # the limit switch is where the motor's counts are greatest; None: it has none
 
     @property
     def index(self) -> int:
@@ -54,6 +56,9 @@ def wanted(axes: Sequence[Axis]) -> dict[int, tuple[str, float]]:
         20: ("its own soft limits: armkin checks the joints'", 0),
         32: ("laser mode", 0),
     }
+    if all(axis.upward is not None for axis in axes):
+        found[22] = ("homing", 1)
+        found[23] = ("homing downwards", sum(1 << axis.index for axis in axes if not axis.upward))
     for axis in axes:
         found[100 + axis.index] = (f"{axis.name}: steps a unit", round(axis.steps, 3))
     for axis in axes:
@@ -74,14 +79,16 @@ def differences(axes: Sequence[Axis], found: Mapping[int, float]) -> list[Differ
         if there is not None and _same(number, there, value, axes):
             continue
         slower = number // 10 in (11, 12) and there is not None and there < value
-        result.append(Difference(number, what, there, value, serious=not slower and number != 1))
+        result.append(Difference(number, what, there, value, serious=not slower and number not in (1, *HOMING)))
     return result
 
 
 def _same(number: int, found: float, value: float, axes: Sequence[Axis]) -> bool:
-    if number == 3:  # other axes' directions are not ours
+    if number in (3, 23):  # other axes' directions are not ours
         ours = sum(1 << axis.index for axis in axes)
         return int(found) & ours == int(value) & ours
+    if number == 22:  # grblHAL keeps more in its other bits
+        return int(found) & 1 == 1
     if number == 10:
         return int(found) & 1 == 1  # machine position; the buffer is good to know, no more
     if number == 1:

@@ -175,6 +175,7 @@ class Found:
     description: str
     hardware: str
     board: str  # what it looks like, "" if unknown
+    adapter: str = ""  # a chip that other boards and servo buses have, "" if none
 
 
 _LOOKS = {
@@ -192,6 +193,15 @@ _LOOKS = {
 }
 
 
+# Chips of ESP32 boards (FluidNC, grblHAL) and servo bus adapters; no Arduino has them.
+_ADAPTERS = {
+    (0x1A86, 0x55D3): "CH343: a servo bus?",
+    (0x1A86, 0x55D4): "CH9102: an ESP32 or a servo bus?",
+    (0x10C4, 0xEA60): "CP210x: an ESP32 or a servo bus?",
+    (0x303A, 0x1001): "ESP32-S3",
+}
+
+
 def list_ports() -> list[Found]:
     """Serial ports, those that look like an Arduino first."""
     from serial.tools import list_ports as tools
@@ -201,7 +211,8 @@ def list_ports() -> list[Found]:
         looks = _LOOKS.get((port.vid or 0, port.pid or 0), "")
         if port.vid is None and looks == "" and port.description in ("n/a", None, port.name):
             continue  # a mainboard's empty ttyS
-        found.append(Found(port.device, port.description or "", port.hwid or "", looks))
+        adapter = _ADAPTERS.get((port.vid or 0, port.pid or 0), "")
+        found.append(Found(port.device, port.description or "", port.hwid or "", looks, adapter))
     return sorted(found, key=lambda f: (not f.board, f.device))
 
 

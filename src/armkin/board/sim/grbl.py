@@ -47,7 +47,7 @@ class Grbl:
     baud: int = 115_200
 
     def __post_init__(self) -> None:
-        defaults = {1: 25, 3: 0, 10: 1, 13: 0, 20: 0, 21: 0, 22: 0, 23: 0, 25: 20, 27: 1, 32: 0}
+        defaults = {1: 25, 3: 0, 10: 1, 13: 0, 20: 0, 21: 0, 22: 0, 23: 0, 25: 20, 27: 1, 30: 1000, 31: 0, 32: 0}
         for k in range(self.axes):
             defaults |= {100 + k: 250, 110 + k: 500, 120 + k: 10, 130 + k: 200}
         self.settings = {**defaults, **self.settings}
@@ -67,6 +67,7 @@ class Grbl:
         self._rx, self._line = deque[str](), ""
         self._blocks = deque[Block]()
         self._holding = self._relative = False
+        self.spindle: float | None = None  # the S word of M3
         self._say("\r\nGrbl 1.1h ['$' for help]")
 
     # The port
@@ -125,7 +126,7 @@ class Grbl:
         elif byte == 0x85:
             self._blocks.clear()
         elif byte in b"\r\n":
-            if self._line:
+            if self._line or byte == ord("\n"):
                 self._rx.append(self._line)
             self._line = ""
         elif sum(len(line) + 1 for line in self._rx) + len(self._line) < RX_BUFFER - 1:
@@ -174,14 +175,14 @@ class Grbl:
     # Lines
 
     def _ready(self, line: str) -> bool:
-        if line.startswith("$") and not line.startswith("$J"):
-            return not self._blocks
+        if line.startswith("M") or (line.startswith("$") and not line.startswith("$J")):
+            return not self._blocks  # a spindle's word waits for the motion before it
         if any(not block.line for block in self._blocks):
             return False
         return len(self._blocks) < BLOCKS
 
     def _obey(self, line: str) -> None:
-        error = self._system(line[1:]) if line.startswith("$") else self._code(line)
+        error = 0 if not line else self._system(line[1:]) if line.startswith("$") else self._code(line)
         if error >= 0:
             self._say("ok" if error == 0 else f"error:{error}")
 
@@ -196,6 +197,9 @@ class Grbl:
         elif line == "I":
             self._say("[VER:1.1h.20190825:]")
             self._say(f"[OPT:V,{BLOCKS},{RX_BUFFER}]")
+        elif line == "G":
+            on = "M5" if self.spindle is None else "M3"
+            self._say(f"[GC:G1 G54 G17 G21 G90 G94 {on} M9 T0 F0 S{self.spindle or 0:g}]")
         elif line == "#":
             self._say(f"[G54:{','.join(['0.000'] * self.axes)}]")
             self._say(f"[G92:{','.join(f'{value:.3f}' for value in self.g92)}]")
@@ -231,6 +235,8 @@ class Grbl:
             return 2
         codes = {float(value) for letter, value in words if letter == "G"}
         values = {letter: float(value) for letter, value in words if letter != "G"}
+        if "M" in values:
+            self.spindle = min(values.get("S", 0.0), self.settings[30]) if values["M"] == 3 else None
         if 4.0 in codes:
             self._blocks.append(Block((), (), values.get("P", 0.0), 0, 0, line=False))
             return -1 if self._blocks else 0

@@ -199,14 +199,16 @@ class Zero(Head):
     port: str
     counts: Annotated[list[int], "of every servo, in the pose given"]
     zero: Annotated[list[int], "of every drive"]
+    gripper_zero: Annotated[int | None, "with --gripper"]
 
 
 class GripOfServo(Head):
-    """`grip` on a servo bus."""
+    """`grip` on a board without armkin's firmware."""
 
     port: str
-    gripper: Annotated[float, "where it came to rest, in its drive's degrees"]
+    gripper: Annotated[float, "where it came to rest, in its drive's degrees; a spindle's S word as it was sent"]
     target: float
+    measured: Annotated[bool, "false on GRBL, which measures nothing"]
 
 
 class Grip(Head):

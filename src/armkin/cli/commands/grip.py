@@ -44,7 +44,7 @@ def grip(
 
     arm = inputs.load(robot)
     if (other := linking.foreign(arm)) is not None:
-        _grip_servo(arm, other, value, port, baud, not no_reset, json)
+        _grip_other(arm, other, value, port, baud, not no_reset, json)
         return
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     gripper = gripping.gripper_of(arm.name, configuration)
@@ -66,27 +66,21 @@ def grip(
         write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
 
 
-def _grip_servo(
+def _grip_other(
     arm: Arm, other: Foreign, value: str, port: str | None, baud: int | None, reset: bool, json: bool
 ) -> None:
-    """A gripper on a bus of servos, which may close on something before it is where it was sent."""
-    gripper = arm.gripper
-    if other.board.kind != "feetech" or gripper is None or gripper.kind != "bus":
-        raise UsageError(f"{arm.name} has no gripper that a board of kind {other.board.kind} moves")
-    named = {"open": gripper.open, "closed": gripper.closed}
-    target = named[_WORD[value]] if value in _WORD else number(value, "VALUE")
-    low, high = sorted(named.values())
-    if not low <= target <= high:
-        raise UsageError(f"VALUE: {value} is outside of the gripper's {low:g} to {high:g}")
-    from armkin.board.feetech.machine import ServoMachine
-
+    """A gripper on a board of another kind: a servo may close on something before it is where it was sent."""
+    gripper = other.gripper()
+    target = other.grip_value(_WORD[value] if value in _WORD else number(value, "VALUE"))
     with linking.backend(arm, other, port, baud, reset=reset) as machine:
-        assert isinstance(machine, ServoMachine)
-        at = machine.grip(gripper, target)
-    found = {**render.head(arm), "port": machine.port.name, "gripper": at, "target": target}
+        at = other.grip(machine, target)
+    unit = "S" if gripper.kind == "spindle" else "deg"
+    measured = gripper.kind == "bus"
+    found = {**render.head(arm), "port": machine.port.name, "gripper": at, "target": target, "measured": measured}
     with output.destination(None) as write:
-        held = "" if abs(at - target) < 1 else f" of {render.short(target)}: it holds something, or is blocked"
-        write(render.to_json(found) + "\n" if json else f"gripper: {render.short(at)} deg{held}\n")
+        held = "" if abs(at - target) < 1.5 else f" of {render.short(target)}: it holds something, or is blocked"
+        said = f"gripper: {render.short(at)} {unit}{held if measured else ', as sent: nothing measures it'}\n"
+        write(render.to_json(found) + "\n" if json else said)
 
 
 def _said(arm: Arm, gripper: Grip, count: int) -> str:

@@ -49,7 +49,7 @@ def home(
     arm = inputs.load(robot)
     other = linking.foreign(arm)
     if other is not None:
-        found = _of_others(arm, other, port, baud, joints, rest_at_home, not no_reset)
+        found = _of_others(arm, other, port, baud, joints, rest_at_home, stay, not no_reset)
     else:
         found = _ours(arm, port, baud, joints or (), rest_at_home, stay, not no_reset)
     with output.destination(None) as write:
@@ -103,6 +103,7 @@ def _of_others(
     baud: int | None,
     joints: Sequence[str] | None,
     rest_at_home: bool,
+    stay: bool,
     reset: bool,
 ) -> dict[str, Any]:
     """Home the arm on a board that homes by itself, all joints at once."""
@@ -115,4 +116,7 @@ def _of_others(
         raise UsageError(f"boards of kind {kind} home all joints at once: leave --rest-at-home out")
     with linking.backend(arm, other, port, baud, reset=reset) as backend:
         other.home(backend)
+        if not stay:
+            output.note("moving to the home pose")
+            other.go_home(backend)
         return {**render.head(arm), "port": backend.port.name, **where(backend)}

@@ -9,8 +9,11 @@ import typer
 
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli.numbers import number
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
+
+_ENDS = ("open", "closed")
 
 
 def zero(
@@ -19,6 +22,10 @@ def zero(
     pose: Annotated[
         str, typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in.")
     ] = "home",
+    gripper: Annotated[
+        str | None,
+        typer.Option("--gripper", metavar="open|closed|VALUE", help="Where the gripper stands: its zero, too."),
+    ] = None,
     out: Out = None,
     baud: Baud = None,
     no_reset: NoReset = False,
@@ -32,6 +39,7 @@ def zero(
     """
     import numpy as np
 
+    from armkin.board.feetech import gripping
     from armkin.board.feetech.machine import ServoMachine
     from armkin.model import units
     from armkin.motors import motor_names
@@ -44,23 +52,30 @@ def zero(
     if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
     q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
+    jaw = None if gripper is None else other.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
     with linking.backend(arm, other, port, baud, reset=not no_reset) as machine:
         assert isinstance(machine, ServoMachine)
         counts, name = list(machine.counts()), machine.port.name
+        grips = None if jaw is None else gripping.zero(machine.bus, other.gripper(), jaw)
     found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
     names = motor_names(arm)
     if out is not None:
         where: dict[tuple[str | int, ...], int] = {
             ("joints", arm.joint_names.index(n), "drive", "zero"): z for n, z in zip(names, found, strict=True)
         }
+        if grips is not None:
+            where["gripper", "zero"] = grips[1]
         text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), where)
         parse(text, out)  # nothing is written that no command would take
         with output.destination(out) as write:
             write(text)
     if out != "-":
         answer: dict[str, Any] = {**render.head(arm), "port": name, "counts": counts, "zero": found}
+        answer["gripper_zero"] = None if grips is None else grips[1]
         rows = [["joint", "count", "zero", "was"]]
         for joint, count, new, motor in zip(names, counts, found, arm.motors, strict=True):
             rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
+        if grips is not None:
+            rows.append(["gripper", *map(str, grips), f"{other.gripper().zero:g}"])
         with output.destination(None) as write:
             write(render.to_json(answer) + "\n" if json else render.table(rows) + "\n")

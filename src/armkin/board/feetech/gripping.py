@@ -1,0 +1,63 @@
+"""A gripper's servo on a bus: it may close on something before it is where it was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from armkin.board.backend import StoppedError
+from armkin.board.feetech import registers
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.feetech.bus import Bus
+    from armkin.robot_file.model import Gripper
+
+SPEED = 500.0  # [counts/s] of a gripper without max_speed, 44 deg/s
+ARRIVED = 12  # [counts] from the goal, 1 degree
+STANDING = 1.0  # [s] without a change of position after which the jaw holds something,
+THERE = 0.1  # [s] or, that close to the goal, has arrived
+PERIOD = 0.02  # [s] between readings
+
+
+def grip(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bool]) -> float:
+    """Move the gripper and return where it comes to rest, both in its drive's degrees.
+
+    Raises LinkError if its servo does not answer, StoppedError (the jaw stays where it is) if `stop` says so.
+    """
+    port, number, per = bus.port, _servo(bus, gripper), _per_unit(gripper)
+    goal = round(gripper.zero + per * value)
+    at = bus.read(number, registers.POSITION)
+    if not bus.read(number, registers.TORQUE):
+        bus.write(number, registers.GOAL_POSITION, at)  # so that it does not jump to an old goal
+        bus.write(number, registers.TORQUE, 1)
+    speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else SPEED
+    bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))
+    bus.write(number, registers.GOAL_POSITION, goal)
+    since = port.now()
+    while at != goal and port.now() - since < (THERE if abs(at - goal) <= ARRIVED else STANDING):
+        port.read(PERIOD)
+        if stop():
+            bus.write(number, registers.GOAL_POSITION, bus.read(number, registers.POSITION))
+            raise StoppedError
+        before, at = at, bus.read(number, registers.POSITION)
+        if at != before:
+            since = port.now()
+    return (at - gripper.zero) / per
+
+
+def zero(bus: Bus, gripper: Gripper, value: float) -> tuple[int, int]:
+    """The gripper's count now, and its `zero` if it stands at a value of its drive's degrees."""
+    count = bus.read(_servo(bus, gripper), registers.POSITION)
+    return count, round(count - _per_unit(gripper) * value)
+
+
+def _servo(bus: Bus, gripper: Gripper) -> int:
+    if gripper.id is None or not bus.ping(gripper.id):
+        raise LinkError(f"the gripper's servo {gripper.id} does not answer on {bus.port.name}")
+    return gripper.id
+
+
+def _per_unit(gripper: Gripper) -> float:
+    """Counts a degree, signed."""
+    return gripper.pulses_per_unit() * (-1 if gripper.invert else 1)
