@@ -189,7 +189,7 @@ def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
     port = board()
     asked = iter(range(10_000))
     one = machine(port, lambda: next(asked) > 30)
-    one.prepare(assume_home=True)
+    one.prepare(assume=one.arm.home)
     one.grip(Gripper.model_validate({"kind": "spindle", "open": 0, "closed": 120}), 120)
     assert port.spindle == 120
     with pytest.raises(StoppedError):

@@ -138,11 +138,14 @@ class Foreign:
 
                 Session(link).open()
                 return True
+            from armkin.board.feetech import registers
             from armkin.board.feetech.bus import Bus
             from armkin.board.feetech.machine import servo_ids
 
             bus = Bus(link)
-            return all(not stop() and bus.ping(number) for number in servo_ids(self.arm))
+            for number in servo_ids(self.arm):
+                bus.read(number, registers.MODEL)  # asks until it is answered, LinkError if it is not
+            return not stop()
         except LinkError:
             return False
         finally:
