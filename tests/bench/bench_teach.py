@@ -51,7 +51,7 @@ def teaching(robot: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
     """The process, its address, and when it was started."""
     began = time.perf_counter()
     command = [sys.executable, "-m", "armkin", "teach", robot, "--no-open"]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert process.stdout is not None
     try:
         yield process, process.stdout.readline().strip(), began

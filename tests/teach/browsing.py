@@ -22,12 +22,14 @@ _OPTIONS = (
 
 
 @contextmanager
-def chromium() -> Iterator[Browser]:
+def chromium(*options: str) -> Iterator[Browser]:
     """The browser; every start has a profile of its own."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
-    assert path, "the page's tests need chromium: README's line of system packages has it"
+    assert path, (
+        "the page's tests need chromium: install the packages of README's apt-get line, or leave them out: -m 'not browser'"
+    )
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, headless=True, args=list(_OPTIONS))
+        browser = playwright.chromium.launch(executable_path=path, headless=True, args=[*_OPTIONS, *options])
         yield browser
         browser.close()
 

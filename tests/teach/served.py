@@ -8,6 +8,8 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,9 @@ import armkin
 from armkin.teach.desk import Desk
 from armkin.teach.server import Server
 from command_line import ROOT
+
+ENDS = "note: Ctrl-C ends it\n"
+MOVES = "note: Ctrl-C ends it, and stops a moving arm first\n"
 
 
 @contextmanager
@@ -52,7 +57,7 @@ def teaching(*words: str) -> Iterator[str]:
         yield process.stdout.readline().strip()
     finally:
         process.terminate()
-        assert process.communicate(timeout=20)[1] == ""
+        assert process.communicate(timeout=20)[1] == (MOVES if "--port" in words else ENDS)
         assert process.returncode == 143
 
 
@@ -131,3 +136,34 @@ class Page:
         """As a browser closes a page: the connection ends."""
         self._events.close()
         self._connection.close()
+
+
+class Elsewhere:
+    """The page of a server in another process, by its address."""
+
+    def __init__(self, address: str) -> None:
+        self.base, _, self.key = address.partition("/#")
+        self.tab = ""
+        self.tab = self.act("open")["tab"]
+
+    def listen(self) -> None:
+        """Hold control, as a page that is open does, once the board has answered."""
+        self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}")
+        for _ in range(200):
+            if not self.act("open")["board"]["doing"]:
+                break
+            time.sleep(0.05)
+
+    def act(self, name: str, **fields: Any) -> Any:
+        headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}
+        request = urllib.request.Request(
+            f"{self.base}/api/{name}", json.dumps(fields).encode(), {**headers, "X-Armkin-Tab": self.tab}
+        )
+        for _ in range(100):
+            try:
+                return json.load(urllib.request.urlopen(request))
+            except urllib.error.HTTPError as error:
+                if error.code != 409:
+                    raise
+                time.sleep(0.05)  # busy still
+        raise AssertionError(f"{name}: busy all the time")

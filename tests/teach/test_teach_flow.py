@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import pytest
 from browsing import aim, chromium, idle, opened, settled, until, values
 from emulator import EmulatedBoard
-from playwright.sync_api import Browser
+from pins import net
+from playwright.sync_api import Browser, Page
 from served import teaching
 
 from command_line import run
@@ -22,8 +23,17 @@ def browser() -> Iterator[Browser]:
         yield one
 
 
-def net(board: EmulatedBoard) -> list[int]:
-    return [board.net()[axis] for axis in "XYZ"]
+def carried_out(page: Page, button: str, what: str) -> None:
+    """Press a button until the board has done what it says.
+
+    A computer that gives armkin no time for half a second has the firmware hold the arm: one presses again.
+    """
+    for _ in range(3):
+        page.click(button)
+        until(page, "document.querySelector('#arrived').textContent || document.querySelector('#trouble').textContent")
+        if "half a second" not in page.inner_text("#trouble"):
+            break
+    idle(page, f"{what}: done")
 
 
 def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
@@ -46,8 +56,7 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         page.click("#assume")
         idle(page, "assume home: done")
         assert net(board) == [0, 0, 0]
-        page.click("#send")
-        idle(page, "send: done")
+        carried_out(page, "#send", "send")
         assert net(board) == COUNTS
         assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
         # STOP on the way home: the position stays known.
@@ -85,6 +94,5 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         page.click("#record")
         page.wait_for_selector("#name-1")
         page.fill("#speed", "100")
-        page.click("#run")
-        idle(page, "run: done")
+        carried_out(page, "#run", "run")
         assert net(board) == COUNTS

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import sys
 import threading
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from emulator import EmulatedBoard
-from served import Page, served
+from pins import net, rests_within
+from served import MOVES, Elsewhere, Page, served
+from test_send import with_switches
 
 from armkin.board.firmware.session import Session
 from command_line import ROOT, run
@@ -34,24 +33,6 @@ def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
         page.idle()
         yield page, board
         page.close()
-
-
-def net(board: EmulatedBoard) -> list[int]:
-    return [board.net()[axis] for axis in "XYZ"]
-
-
-def rests_within(board: EmulatedBoard, seconds: float) -> None:
-    """Simulated time until the pins are still."""
-    clock = 16_000_000
-    begin = board.control("cycles")["cycle"]
-    before, since = net(board), begin
-    while True:
-        now, at = board.control("cycles")["cycle"], net(board)
-        if at != before:
-            before, since = at, now
-        if now - since > 0.2 * clock:
-            break
-    assert (since - begin) / clock < seconds
 
 
 def begin_move(page: Page, board: EmulatedBoard) -> None:
@@ -142,7 +123,8 @@ def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
         process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             assert process.stdout is not None
-            page = _Elsewhere(process.stdout.readline().strip())
+            page = Elsewhere(process.stdout.readline().strip())
+            page.listen()
             page.act("assume_home", consent=True)
             page.act("send", q=POSE, speed=50)
             end = time.monotonic() + 20
@@ -160,38 +142,10 @@ def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
             process.send_signal(signal.SIGTERM)
             assert process.wait(10) == 143
             assert process.stderr is not None
-            assert process.stderr.read() == ""
+            assert process.stderr.read() == MOVES
         finally:
             process.kill()
             process.communicate()
-
-
-class _Elsewhere:
-    """The page of a server in another process."""
-
-    def __init__(self, address: str) -> None:
-        self.base, _, self.key = address.partition("/#")
-        self.tab = ""
-        self.tab = self.act("open")["tab"]
-        self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}")
-        for _ in range(200):
-            if not self.act("open")["board"]["doing"]:
-                break
-            time.sleep(0.05)
-
-    def act(self, name: str, **fields: Any) -> Any:
-        headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}
-        request = urllib.request.Request(
-            f"{self.base}/api/{name}", json.dumps(fields).encode(), {**headers, "X-Armkin-Tab": self.tab}
-        )
-        for _ in range(100):
-            try:
-                return json.load(urllib.request.urlopen(request))
-            except urllib.error.HTTPError as error:
-                if error.code != 409:
-                    raise
-                time.sleep(0.05)  # busy still
-        raise AssertionError(f"{name}: busy all the time")
 
 
 def test_a_server_that_ends_stops_the_arm_first() -> None:
@@ -204,4 +158,36 @@ def test_a_server_that_ends_stops_the_arm_first() -> None:
         rests_within(board, 0.2)
         status = run("status", "robots/three_dof.yaml", "--port", board.port, "--json").json
         assert status["position"] == "retained"  # opening the port has reset the board, which stood still
+        page.close()
+
+
+def test_switches_are_found_from_the_page(tmp_path: Path) -> None:
+    robot = with_switches(tmp_path / "homing.yaml")
+    with EmulatedBoard() as board, served(robot, board.port) as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        assert page.idle()["position"] == "lost"
+        edges = {"X": -900, "Y": 1500, "Z": -1200}  # in steps from where the arm was left
+        for axis, edge in edges.items():
+            board.control(f"set-switch {axis} at {edge} {'above' if edge > 0 else 'below'} bounce 2ms")
+        assert page.act("home") == (200, {})
+        state = page.idle()
+        assert (state["position"], state["error"]) == ("known", "")
+        at = {"X": -4302, "Y": 3700, "Z": -2333}  # -121, 121 and -125 deg in steps from home
+        for axis, pulses, pins in zip("XYZ", state["pulses"], net(board), strict=True):
+            assert pulses - at[axis] == pytest.approx(pins - edges[axis], abs=1)
+        page.act("send", q=POSE, speed=100)
+        assert page.idle()["pulses"] == COUNTS
+        page.close()
+
+
+def test_switches_are_found_in_simulation(tmp_path: Path) -> None:
+    with served(with_switches(tmp_path / "homing.yaml"), "sim") as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        page.idle()
+        assert page.act("home") == (200, {})
+        state = page.idle()
+        assert (state["position"], state["error"]) == ("known", "")
+        assert state["joints"] == pytest.approx([-121, 121, -125], abs=4)  # backed off from the switches by 2
         page.close()

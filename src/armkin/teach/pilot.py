@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, StoppedError
 from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.homing import switches
 from armkin.board.firmware.machine import Machine
 from armkin.board.foreign import Foreign, foreign
 from armkin.board.opening import open_port
@@ -39,10 +40,12 @@ class Pilot:
     """An arm's board; `tell` hears its state whenever that changes."""
 
     def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
-        """Raises UsageError if the robot file does not say what the board must know."""
+        """Raises UsageError if the robot file does not say what the board must know, LinkError if there is no such
+        port: a board that does not answer yet is connected again on demand.
+        """
         self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
         self.board: Configuration | Foreign = foreign(arm) or configure(arm, rehearsal=port == SIM)
-        self.link: Port | None = None
+        self.link: Port | None = self._plug()
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
         self._lock = threading.Lock()
@@ -145,21 +148,25 @@ class Pilot:
     def _open(self) -> Backend:
         """The machine; our firmware's in a new session: what ended the last one is over."""
         first = self.machine is None
-        if isinstance(self.board, Foreign):
-            if self.link is None:
-                baud = self.baud or self.board.board.baud
-                self.link = Paced(self.board.simulated()) if self.port == SIM else SerialPort(self.port, baud)
-            if self.machine is None:
-                self.machine = self.board.machine(self.link, self._watch)
-            else:
-                self.machine.refresh()
-        else:
-            if self.link is None:
-                self.link = open_port(self.port, board=self.board.board, baud=self.baud or BAUD, paced=True)
+        if self.link is None:
+            self.link = self._plug()
+        if not isinstance(self.board, Foreign):
             self.machine = Machine(self.link, self.arm, self.board, self._watch)
+        elif self.machine is None:
+            self.machine = self.board.machine(self.link, self._watch)
+        else:
+            self.machine.refresh()
         if first and self.link.simulated:
             self.machine.prepare()  # a board in this process starts with the arm at home
         return self.machine
+
+    def _plug(self) -> Port:
+        """The port, open."""
+        if isinstance(self.board, Foreign):
+            baud = self.baud or self.board.board.baud
+            return Paced(self.board.simulated()) if self.port == SIM else SerialPort(self.port, baud)
+        levels = switches(self.arm, self.board)
+        return open_port(self.port, board=self.board.board, baud=self.baud or BAUD, paced=True, switches=levels)
 
     def _watch(self) -> bool:
         """Asked at every turn of a session: tell where the pins are now, and whether to stop."""

@@ -1,0 +1,59 @@
+"""A page that is gone while the arm moves, in a real browser on the emulated board."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+from browsing import aim, chromium, idle, until
+from emulator import EmulatedBoard
+from pins import net, rests_within
+from served import Elsewhere, teaching
+
+COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
+
+
+@pytest.mark.parametrize("how", ["its tab is closed", "its browser is killed"])
+def test_a_page_that_is_gone_holds_the_arm(how: str) -> None:
+    """The board is asked by another page afterwards: the arm's position is known, and is that of the pins."""
+    mark = f"--armkin-test={uuid.uuid4()}"
+    with EmulatedBoard() as board, teaching("three_dof", "--port", board.port) as url:
+        with chromium(mark) as browser:
+            page = browser.new_page()
+            page.goto(url)
+            page.wait_for_selector("html[data-ready]")
+            until(page, "document.querySelector('#standing').textContent.includes('position lost')")
+            page.check("#consent")
+            page.click("#assume")
+            idle(page, "assume home: done")
+            aim(page, 390, 80, 300)
+            page.fill("#speed", "20")
+            page.click("#send")
+            end = time.monotonic() + 20
+            while net(board)[1] > -500:
+                assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
+                time.sleep(0.01)
+            if how == "its tab is closed":
+                page.close()
+            else:
+                os.kill(process_with(mark), signal.SIGKILL)
+            rests_within(board, 1.0)
+        stopped = net(board)
+        assert COUNTS[1] + 500 < stopped[1] < -500  # far from where it was going
+        state = Elsewhere(url).act("open")["board"]
+        assert (state["position"], state["pulses"]) == ("known", stopped)
+
+
+def process_with(word: str) -> int:
+    """Number of the process that was started with a word."""
+    found = [
+        int(folder.name)
+        for folder in Path("/proc").iterdir()
+        if folder.name.isdigit() and word.encode() in (folder / "cmdline").read_bytes().split(b"\0")
+    ]
+    assert len(found) == 1, found
+    return found[0]
