@@ -26,7 +26,7 @@ def chromium(*options: str) -> Iterator[Browser]:
     """The browser; every start has a profile of its own."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     assert path, (
-        "the page's tests need chromium: install the packages of README's apt-get line, or leave them out: -m 'not browser'"
+        "no chromium: install the packages of README's apt-get line, or leave these tests out: -m 'not browser'"
     )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, headless=True, args=[*_OPTIONS, *options])

@@ -21,7 +21,7 @@ from armkin.teach.server import Server
 from command_line import ROOT
 
 ENDS = "note: Ctrl-C ends it\n"
-MOVES = "note: Ctrl-C ends it, and stops a moving arm first\n"
+MOVES = "note: Ctrl-C ends it, after the arm has been stopped\n"
 
 
 @contextmanager
@@ -126,7 +126,7 @@ class Page:
         """The board's state once it has nothing to do."""
         board = self.server.desk.board
         assert board is not None
-        end = time.monotonic() + 20
+        end = time.monotonic() + 40
         while board.pilot.doing or board.pilot.stopping:
             assert time.monotonic() < end, board.pilot.state()
             time.sleep(0.005)

@@ -40,12 +40,10 @@ class Pilot:
     """An arm's board; `tell` hears its state whenever that changes."""
 
     def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
-        """Raises UsageError if the robot file does not say what the board must know, LinkError if there is no such
-        port: a board that does not answer yet is connected again on demand.
-        """
+        """Raises UsageError if the robot file does not say what the board must know."""
         self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
         self.board: Configuration | Foreign = foreign(arm) or configure(arm, rehearsal=port == SIM)
-        self.link: Port | None = self._plug()
+        self.link: Port | None = None
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
         self._lock = threading.Lock()
