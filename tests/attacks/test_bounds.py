@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import time
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+import armkin
+from armkin.board.firmware.configuration import configure
+from armkin.board.moving import Planner
 from command_line import ROOT, run
 
 LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
@@ -66,3 +74,25 @@ def test_a_file_without_end_is_refused(words: str, message: str) -> None:
     assert done.code in (1, 2, 4)
     assert done.out == ""
     assert message in done.err
+
+
+def test_plans_that_were_sent_are_not_kept() -> None:
+    """Rows on standard input may come for hours."""
+    arm = armkin.load("three_dof")
+    planner = Planner(arm, configure(arm), 1.0)
+    sent: list[weakref.ref[Any]] = []
+
+    def plans() -> Iterator[Any]:
+        at = planner.counts(arm.home)
+        for goal in np.deg2rad([[0, 85, -85], [5, 80, -80], [0, 85, -85]]):
+            made = planner.plan(at, goal[None])
+            at = made.end.tolist()
+            sent.append(weakref.ref(made))
+            yield made
+
+    for made in planner.noted(plans()):
+        del made
+    gc.collect()
+    assert [one() for one in sent] == [None, None, None]
+    assert planner.done.waypoints == 3
+    assert planner.done.summary()["pulses"] == planner.counts(np.deg2rad([0, 85, -85]))

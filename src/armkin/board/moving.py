@@ -39,7 +39,7 @@ class Planner:
     def __init__(self, arm: Arm, board: Configuration | Foreign, speed: float, blend: float = 0.0) -> None:
         """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
         self.arm, self.speed, self.blend = arm, speed, blend
-        self.done: list[Planned] = []
+        self.done = Total(arm)  # what has been sent
         self._plan: Callable[[Sequence[int], Array, float], Planned]
         self._lay: Callable[[Trajectory, NDArray[np.int64]], Planned]
         if isinstance(board, Foreign):
@@ -69,22 +69,43 @@ class Planner:
         return self._lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
-        """The same plans, remembered for the summary."""
+        """The same plans, summed up in `done`; none is kept: rows may come for hours."""
         for made in plans:
             if made is not None:
-                self.done.append(made)
+                self.done.add(made)
             yield made
 
-    def summary(self, plans: Sequence[Planned], start: Sequence[int] | None = None) -> Summary:
-        """JSON: what the plans come to."""
+
+class Total:
+    """What plans, one after another, come to."""
+
+    def __init__(self, arm: Arm, plans: Iterable[Planned] = ()) -> None:
+        self.arm, self.waypoints, self.segments, self.duration = arm, 0, 0, 0.0
+        self.first: list[int] = []  # counts; none before the first plan
+        self.last: list[int] = []
+        self.speed: Array = np.zeros(arm.n)  # greatest of each joint
+        self.rate: Array = np.zeros(len(motor_names(arm)))  # greatest of each motor
+        for made in plans:
+            self.add(made)
+
+    def add(self, made: Planned) -> None:
+        """One more plan."""
+        self.first = self.first or made.start.tolist()
+        self.last = made.end.tolist()
+        self.waypoints += len(made.trajectory.stretches)
+        self.segments += made.segments
+        self.duration += made.duration
+        self.speed = np.maximum(self.speed, made.trajectory.top_speed)
+        self.rate = np.maximum(self.rate, made.top_rate)
+
+    def summary(self, start: Sequence[int] | None = None) -> Summary:
+        """JSON; start: counts where the arm stood, by default the first plan's."""
         arm = self.arm
-        first = list(start) if start is not None else plans[0].start.tolist()
-        last = plans[-1].end.tolist() if plans else first
-        top = np.max([plan.trajectory.top_speed for plan in plans], axis=0) if plans else np.zeros(arm.n)
-        rate = np.max([plan.top_rate for plan in plans], axis=0) if plans else np.zeros(len(first))
+        first = self.first if start is None else list(start)
+        last = self.last or first
         end = joints(arm, last)
         return {
-            "waypoints": sum(len(plan.trajectory.stretches) for plan in plans),
+            "waypoints": self.waypoints,
             "start_joints": units.joints_out(arm, joints(arm, first)).tolist(),
             "joints": units.joints_out(arm, end).tolist(),
             "joint_units": units.names(arm),
@@ -94,10 +115,10 @@ class Planner:
             "pulses": last,
             "moves": [b - a for a, b in zip(first, last, strict=True)],
             "position_mm": (fk(arm, end)[:3, 3] + 0.0).tolist(),
-            "duration_s": sum(plan.duration for plan in plans),
-            "segments": sum(plan.segments for plan in plans),
-            "top_speed": units.joints_out(arm, top).tolist(),
-            "top_rate": rate.tolist(),
+            "duration_s": self.duration,
+            "segments": self.segments,
+            "top_speed": units.joints_out(arm, self.speed).tolist(),
+            "top_rate": self.rate.tolist(),
         }
 
 

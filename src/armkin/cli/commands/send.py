@@ -80,7 +80,7 @@ def send(
     its path; its position stays known.
     """
     from armkin.board.firmware.machine import Machine
-    from armkin.board.moving import Planner, Stream, where
+    from armkin.board.moving import Planner, Stream, Total, where
 
     fraction = number(speed, "--speed") / 100
     if not 0 < fraction <= 1:
@@ -111,7 +111,7 @@ def send(
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
         _write_trace(arm, plans, trace)
         with output.beside(trace) as write:
-            summed = planner.summary(plans)
+            summed = Total(arm, plans).summary()
             write(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
             )
@@ -130,7 +130,7 @@ def send(
             _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(machine, planner, plans, held)
-        planned = planner.summary(planner.done, began)
+        planned = planner.done.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     with output.beside(trace) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
