@@ -73,3 +73,31 @@ def test_standard_input_that_cannot_be_read_is_named(words: str, tmp_path: Path)
     assert "standard input: cannot read: " in done.stderr
     assert "Traceback" not in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["unreadable"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_ctrl_c_while_modules_are_imported_is_silent() -> None:
+    """Later and later, from the first own line on: nothing is printed, whatever is being imported."""
+    began = time.monotonic()
+    subprocess.run([*ARMKIN, "fk", "three_dof", "home"], check=True, capture_output=True)
+    whole = time.monotonic() - began
+    program = "import armkin.cli, sys; print(flush=True); armkin.cli.main()"
+    for i in range(12):
+        command = [sys.executable, "-c", program, "fk", "three_dof", "home"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(0.005 + whole * i / 12)
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=30)
+        assert error == b""
+        assert process.returncode in (0, 130)
+
+
+def test_the_command_line_imports_next_to_nothing_before_it_takes_signals() -> None:
+    program = "import sys; before = set(sys.modules); import armkin.cli; print(*sorted(set(sys.modules) - before))"
+    program = f"import sys; sys.path.insert(0, {str(ROOT / 'src')!r}); {program}"
+    done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True)
+    assert "typing" not in done.stdout.split()
+    assert len(done.stdout.split()) < 20

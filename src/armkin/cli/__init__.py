@@ -8,15 +8,31 @@ A command is a function of the same name in a module of the same name, written f
 neighbours at its top, so that ``armkin --help`` stays cheap.
 """
 
+from __future__ import annotations
+
 import gc
 import io
 import os
 import sys
-from typing import NoReturn
+
+TYPE_CHECKING = False  # importing typing takes long enough for a Ctrl-C, which `main` takes care of
+
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 
 def main() -> NoReturn:
     """Run the command line in `sys.argv` and end the process with its exit code."""
+    try:
+        code = _run()
+    except KeyboardInterrupt:
+        code = 130  # before `run` could take care of it
+    # All is written and closed. Leaving the ordinary way would take numpy, pydantic and Typer apart
+    # object by object, a fifth of the time of a short command.
+    os._exit(code)
+
+
+def _run() -> int:
     # Start-up makes many objects and hardly any garbage: look for it seldom.
     gc.set_threshold(100_000, 50, 100)
     # Threads take longer to start than matrices of this size could gain by them.
@@ -24,12 +40,6 @@ def main() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # of a terminal in ASCII or cp1252
-    try:
-        from armkin.cli.app import run
+    from armkin.cli.app import run
 
-        code = run(sys.argv[1:])
-    except KeyboardInterrupt:
-        code = 130  # before `run` could take care of it
-    # All is written and closed. Leaving the ordinary way would take numpy, pydantic and Typer apart
-    # object by object, a fifth of the time of a short command.
-    os._exit(code)
+    return run(sys.argv[1:])
