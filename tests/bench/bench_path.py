@@ -69,12 +69,13 @@ def branches(lines: int) -> None:
             columns = linked(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
             all_ = chains(arm, columns)
             mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
-            found = brute.reach(arm, way.targets(dense), 0.05)
+            alive = brute.carried(arm, way.targets(dense), 0.05)
             whole += mine >= way.length - 1e-9
-            if abs(mine - (dense[found] if found >= 0 else -1.0)) > 0.3 + 1e-6:
-                fine = np.linspace(max(min(mine, dense[max(found, 0)]) - 1.0, 0.0), way.length, 10_001)
-                finer = brute.reach(arm, way.targets(fine), 0.05)
-                differ += abs(mine - (fine[finer] if finer >= 0 else -1.0)) > 0.06
+            if abs(mine - (dense[len(alive) - 1] if alive else -1.0)) > 0.3 + 1e-6:
+                before = max(int(np.searchsorted(dense, min(mine, dense[max(len(alive) - 1, 0)]) - 1.0)) - 1, 0)
+                fine = np.linspace(dense[before], way.length, 10_001)
+                finer = len(brute.carried(arm, way.targets(fine), 0.05, start=alive[before])) if alive else 0
+                differ += abs(mine - (fine[finer - 1] if finer else -1.0)) > 0.06
             for chain in all_:
                 if len(chain.q) > 1:
                     f = np.linspace(0, 1, 20)[:, None]

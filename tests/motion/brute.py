@@ -67,16 +67,28 @@ def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarra
     return near
 
 
+def carried(
+    arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = None, start: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """Joint values (k, n) that some run from the first sample arrives at, at every sample up to the last it reaches.
+
+    start: (k, n) those at the first sample that count; by default all.
+    """
+    n = nodes(arm, targets, task)
+    first = n.q[0]
+    if start is not None and len(first):
+        away = np.abs(first[:, None] - start[None])
+        turning = ~arm.prismatic
+        away[..., turning] = np.abs((away[..., turning] + np.pi) % TURN - np.pi)
+        first = first[away.max(axis=2).min(axis=1, initial=np.inf) < 1e-6]
+    out = [first]
+    for i in range(len(targets) - 1):
+        if not len(out[-1]) or not len(n.q[i + 1]):
+            break
+        out.append(n.q[i + 1][edges(arm, out[-1], n.q[i + 1], tolerance).any(axis=0)])
+    return out if len(out[-1]) else out[:-1]
+
+
 def reach(arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = None) -> int:
     """The last sample that any run from the first sample arrives at; -1: no legal start."""
-    n = nodes(arm, targets, task)
-    if not len(n.q[0]):
-        return -1
-    alive = np.ones(len(n.q[0]), bool)
-    for i in range(len(targets) - 1):
-        if not len(n.q[i + 1]):
-            return i
-        alive = np.asarray(edges(arm, n.q[i][alive], n.q[i + 1], tolerance).any(axis=0))
-        if not alive.any():
-            return i
-    return len(targets) - 1
+    return len(carried(arm, targets, tolerance, task)) - 1

@@ -278,8 +278,10 @@ def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     """Greatest x at which a hold on the path asks no joint for more than `share` of its max_accel: (N,).
 
     On a hold the board lets the leading motor m (the one with the longest way to a stop) slow down with its
-    greatest acceleration, along the path: u = (-a_m - n''_m x) / n'_m, and a joint then accelerates with
-    -q'_j a_m / n'_m + x (q''_j - q'_j n''_m / n'_m).
+    greatest acceleration, along the path: u = -a_m / |n'_m| - n''_m x / n'_m, and a joint then accelerates with
+    -q'_j a_m / |n'_m| + x (q''_j - q'_j n''_m / n'_m). The two parts have their signs: where the path bends a joint
+    forward and the hold slows it down they take from each other. At x = 0 the first is at most max_accel, so that
+    what is kept at x is kept on the whole way down to rest.
     """
     gain = arm.motor_gain
     brakes = motor_accel(arm)
@@ -287,14 +289,15 @@ def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     out = np.full(len(path.s), np.inf)
     rate = path.d @ gain.T
     m = (np.abs(rate) / brakes).argmax(axis=1)
-    i = np.arange(len(m))
-    lead = rate[i, m]
+    lead = rate[np.arange(len(m)), m]
     lead = np.where(np.abs(lead) < _TINY, _TINY, lead)
     ratio = path.d / lead[:, None]  # q'_j / n'_m
-    left = share * arm.max_accel - np.abs(ratio) * brakes[m][:, None]
+    slowing = -ratio * np.sign(lead)[:, None] * brakes[m][:, None]
+    most = share * arm.max_accel
     for second, part in ((ends[0], slice(None, -1)), (ends[1], slice(1, None))):
         turned = (second * gain[m[part]]).sum(axis=1)
-        bend = np.abs(second - ratio[part] * turned[:, None])
-        cap = np.maximum(left[part], 0.0) / np.maximum(bend, _TINY)
+        bend = second - ratio[part] * turned[:, None]
+        left = most - np.sign(bend) * slowing[part]
+        cap = np.maximum(left, 0.0) / np.maximum(np.abs(bend), _TINY)
         out[part] = np.minimum(out[part], cap.min(axis=1))
     return out
