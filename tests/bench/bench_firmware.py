@@ -1,6 +1,7 @@
 """What the compiled firmware does, in the emulator, beside GRBL 1.1h's figures: `python tests/bench/bench_firmware.py`.
 
-Simulated time: the figures repeat to the cycle, whatever the machine. `--noise SEEDS`: noise runs (20).
+Simulated time: the figures repeat to the cycle, whatever the machine. `--noise SEEDS`: noise runs (20); `--curves
+PLACES`: planned curves, each held and its cable cut at so many places (20); `--only-curves`: these alone.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
+import curve_on_pins
 import measure
+import numpy as np
 from emulator import build_firmware
 
 
@@ -27,11 +30,46 @@ def row(what: str, ours: str, grbl: str = "") -> None:
     print(f"{what:46} {ours:34} {grbl}", flush=True)
 
 
+SPLINE = {
+    "start": {"point": [330, -80, 320]},
+    "moves": [{"spline": [[360, -20, 260], [310, 60, 300], [350, 90, 330], [300, 20, 350], [330, -80, 320]]}],
+}
+ZIGZAG = {
+    "start": {"point": [300, -90, 300]},
+    "blend": 8,
+    "moves": [{"line": [380, -50, 300]}, {"line": [310, 0, 280]}, {"line": [380, 50, 320]}, {"line": [300, 90, 300]}],
+}
+
+
+def curves(places: int) -> None:
+    """Curves on three_dof: whole, held, and with the cable cut."""
+    for name, moves in (("circle", curve_on_pins.CIRCLE), ("spline", SPLINE), ("rounded zigzag", ZIGZAG)):
+        laid = curve_on_pins.lay(moves)
+        run = curve_on_pins.whole_run(laid)
+        faults = "" if run.exact and not (run.overruns or run.violations or run.error) else "  FAULTS"
+        figures = f"late {run.late_us:.1f} us, off {run.off_mm:.3f} mm, {run.segments_a_second:.0f} segments/s{faults}"
+        row(f"{name}, {laid.curve.duration:.2f} s", figures)
+        for cable in (False, True):
+            rng = np.random.default_rng(3)
+            got = [curve_on_pins.held(laid, s, cable=cable) for s in rng.uniform(0.05, 0.9, places)]
+            known, on = sum(g.known for g in got), sum(g.goes_on for g in got)
+            off, accel = max(g.off_way_mm for g in got), max(g.accel for g in got)
+            figures = f"known {known}, go on {on}, off {off:.3f} mm, {accel:.2f} of max_accel"
+            row(f"{name}: {'cable cut' if cable else 'held'} at {places} places", figures)
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--noise", type=int, default=20, metavar="SEEDS")
-    seeds = options.parse_args().noise
+    options.add_argument("--curves", type=int, default=20, metavar="PLACES")
+    options.add_argument("--only-curves", action="store_true")
+    given = options.parse_args()
+    seeds = given.noise
 
+    if given.curves:
+        curves(given.curves)
+    if given.only_curves:
+        return
     row("", "armkin", "GRBL 1.1h")
     for board, grbl in (("uno_cnc_shield", "29864 B, 1633 B"), ("mega_ramps14", ""), ("uno_servos", "")):
         flash, ram = flash_and_ram(board)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import curve_on_pins
 import numpy as np
 import pytest
 from emulator import EmulatedBoard
@@ -16,6 +17,7 @@ from emulator import EmulatedBoard
 import armkin
 from command_line import ROOT, THREE_DOF, run
 
+HALF_A_STEP = 0.14  # [mm] of all motors, at the tip
 CIRCLE = "moves:\n  - point: [350, 0, 300]\n  - circle: {centre: [300, 0, 300]}\n"
 
 
@@ -66,3 +68,28 @@ def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: Emul
     back = run("path", THREE_DOF, path, "--port", board.port, "--json")
     assert back.code == 0, back.err
     assert net(board) == counts
+
+
+@pytest.fixture(scope="module")
+def circle() -> curve_on_pins.Laid:
+    return curve_on_pins.lay(curve_on_pins.CIRCLE)
+
+
+def test_every_step_of_a_curve_comes_when_the_protocol_says(circle: curve_on_pins.Laid) -> None:
+    run = curve_on_pins.whole_run(circle)
+    assert run.exact
+    assert (run.overruns, run.violations, run.error) == (0, 0, 0)
+    assert run.late_us <= 5.0
+    assert run.off_mm <= 0.05 + HALF_A_STEP
+    assert run.segments_a_second <= 100
+
+
+@pytest.mark.parametrize(("share", "cable"), [(0.22, False), (0.61, False), (0.4, True)])
+def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
+    circle: curve_on_pins.Laid, share: float, cable: bool
+) -> None:
+    got = curve_on_pins.held(circle, share, cable=cable)
+    assert got.known
+    assert got.goes_on
+    assert got.off_way_mm <= 0.05 + HALF_A_STEP
+    assert got.accel <= 1.6

@@ -1,0 +1,249 @@
+"""A planned curve on the compiled firmware, in simulated time: steps, holds and a cut cable, read from the pins.
+
+`tests/bench/bench_firmware.py --curves` prints the figures, `test_path_on_pins.py` holds samples of them to their bars.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from bare_host import BareHost, Batch, batches
+from emulator import EmulatedBoard, Trace
+
+import armkin
+from armkin.board.firmware import protocol
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import cut
+from armkin.board.firmware.protocol import HALF, STEP, Segment, State
+from armkin.board.firmware.segments import CLOCK
+from armkin.formula.arrays import Array
+from armkin.motion.curve import Curve
+from armkin.motion.trajectory import Trajectory
+
+CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
+WINDOW = 0.1  # [s] in which an acceleration is read from edges
+
+
+@dataclass(frozen=True)
+class Laid:
+    """The curve of a plan as frames, and where it is."""
+
+    plan: armkin.PathPlan
+    curve: Curve
+    segments: list[Segment]
+    work: list[Batch]
+    start: list[int]
+
+    @property
+    def arm(self) -> armkin.Arm:
+        return self.plan.arm
+
+    def off(self, counts: Array) -> Array:
+        """Distance [mm] of the tip at counts (N, motors) from the curve."""
+        tip = armkin.fk(self.arm, armkin.joints(self.arm, counts))[:, :3, 3]
+        way = armkin.fk(self.arm, self.curve.at(np.linspace(0.0, self.curve.duration, 2000)))[:, :3, 3]
+        out = np.full(len(tip), np.inf)
+        near = np.array([((way - p) ** 2).sum(axis=1).argmin() for p in tip])
+        for a in (np.maximum(near - 1, 0), np.minimum(near, len(way) - 2)):  # the chords on either side
+            along = way[a + 1] - way[a]
+            f = ((tip - way[a]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
+            foot = way[a] + np.clip(f, 0.0, 1.0)[:, None] * along
+            out = np.minimum(out, np.linalg.norm(tip - foot, axis=1))
+        return out
+
+
+def lay(moves: object, size: int = 4) -> Laid:
+    """Plan moves whose last stretch is a curve, cut that into frames of three_dof's board."""
+    arm = armkin.load("three_dof")
+    plan = armkin.path(arm, moves)
+    curve = plan.motion.stretches[-1]
+    assert isinstance(curve, Curve)
+    start = armkin.pulses(arm, curve.start)
+    board = configure(arm).board
+    laid = cut(Trajectory(arm, curve.start, (curve,)), start, clock=board.clock, min_interval=board.min_interval)
+    [move] = laid.moves()
+    segments = list(move.segments)
+    return Laid(plan, curve, segments, batches((0, 1, 2), start.tolist(), segments, size), start.tolist())
+
+
+def ready(board: EmulatedBoard, laid: Laid) -> BareHost:
+    """The board configured for the arm, which stands at the curve's start."""
+    host = BareHost(board)
+    host.run(0.02)
+    configuration = configure(laid.arm)
+    host.setup(configuration.image, dict(enumerate(laid.start)))
+    board.control("clear")
+    return host
+
+
+def predicted(segments: Sequence[Segment], start: Sequence[int]) -> list[Array]:
+    """When every motor steps by PROTOCOL.md's arithmetic: cycles since the motion's begin, for each motor."""
+    at = 0
+    places = np.array([count * STEP + HALF for count in start])
+    out: list[list[Array]] = [[] for _ in start]
+    for s in segments:
+        j = np.arange(1, s.ticks + 1)
+        grown = np.concatenate([[0], np.cumsum(4 * s.bend * ((s.ticks - j[:-1]) % 16 == 0))])
+        change = (256 * s.add + grown) >> 8
+        interval = np.concatenate([[s.interval << 16], (s.interval << 16) + np.cumsum(change[:-1])])
+        ticks = at + np.cumsum(interval >> 16)
+        for k, rate in enumerate(s.rates):
+            count = (places[k] + rate * np.arange(s.ticks + 1)) // STEP
+            out[k].append(ticks[np.diff(count) != 0])
+        places += s.ticks * np.array(s.rates)
+        at = int(ticks[-1])
+    return [np.concatenate(steps) for steps in out]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A whole curve."""
+
+    exact: bool  # counts, pins and plan agree at the end
+    overruns: int
+    violations: int
+    error: int
+    late_us: float  # a step's distance from PROTOCOL.md's arithmetic, at most
+    off_mm: float  # the tip's from the curve, at most, at any step
+    segments_a_second: float
+
+
+def whole_run(laid: Laid) -> Run:
+    """Stream it all, then look at every edge."""
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as board:
+        host = ready(board, laid)
+        status = host.stream(laid.work, poll=0.05)
+        stats, trace = board.stats(), board.trace()
+        axes = [stats["axes"][name] for name in "XYZ"]
+        end = list(laid.work[-1].end)
+        exact = list(status.counts[:3]) == end and [c + a["net"] for c, a in zip(laid.start, axes, strict=True)] == end
+        wanted = predicted(laid.segments, laid.start)
+        seen = [trace.rises(f"{name}.STEP") for name in "XYZ"]
+        late = np.inf
+        if [len(x) for x in seen] == [len(x) for x in wanted]:
+            apart = np.concatenate([a - b for a, b in zip(seen, wanted, strict=True)])
+            late = float(np.ptp(apart)) / 2 / CLOCK * 1e6  # the motion's begin is that which makes it least
+        return Run(
+            exact,
+            status.overruns,
+            sum(sum(a["violations"].values()) for a in axes),
+            status.error,
+            late,
+            float(laid.off(counts_of(trace, laid.start)[1][::7]).max()),
+            len(laid.segments) / laid.curve.duration,
+        )
+
+
+def counts_of(trace: Trace, start: Sequence[int]) -> tuple[Array, Array]:
+    """Cycle of every step, and all counts after it: (N,), (N, 3)."""
+    steps = [trace.steps(name) for name in "XYZ"]
+    cycle = np.concatenate([c for c, _ in steps])
+    change = np.zeros((len(cycle), 3), np.int64)
+    at = 0
+    for k, (c, direction) in enumerate(steps):
+        change[at : at + len(c), k] = direction
+        at += len(c)
+    order = np.argsort(cycle, kind="stable")
+    return cycle[order], np.asarray(start) + np.cumsum(change[order], axis=0)
+
+
+@dataclass(frozen=True)
+class Held:
+    """A curve that ended before its end."""
+
+    known: bool  # the board says it knows where it stands, and that is what the pins made
+    off_mm: float  # how far from the curve it stands
+    off_way_mm: float  # and how far the tip was at most, from the first step on
+    accel: float  # greatest acceleration of a joint while it slowed down, as a share of its max_accel
+    goes_on: bool  # the next motion, back to the curve's start, ends at exact counts
+    milliseconds: float  # to a stop, from the cause
+
+
+def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
+    """HOLD, or no more bytes in either direction (cable), after a share of the curve's time."""
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as board:
+        host = ready(board, laid)
+        moment = share * laid.curve.duration
+        _until(host, laid.work, moment)
+        begin = board.control("cycles")["cycle"]
+        if not cable:
+            host.run(0.0, protocol.wire(protocol.hold(0)))
+        host.run(1.6)
+        status = host.rest()
+        trace = board.trace()
+        cycle, counts = counts_of(trace, laid.start)
+        rest = np.array(status.counts[:3])
+        if cable:  # the board notices 500 ms after the last byte
+            begin = int(trace.edges("uart.in")[0][trace.edges("uart.in")[0] <= begin][-1]) + CLOCK // 2
+        known = bool((rest == counts[-1]).all()) and (status.known & 0b111) == 0b111
+        accel = _accelerations(laid.arm, trace, laid.start, begin)
+        host.hello(77)
+        host.order(protocol.enable(0, 3))
+        back = _straight(laid.arm, rest, laid.start)
+        after = host.stream(back)
+        return Held(
+            known,
+            float(laid.off(rest[None])[0]),
+            float(laid.off(counts[::7]).max()),
+            accel,
+            list(after.counts[:3]) == laid.start and after.error == 0,
+            float(cycle[-1] - begin) / CLOCK * 1e3,
+        )
+
+
+def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
+    """Stream batches as `BareHost.stream` does, and stop talking so long [s] after the motion began."""
+    begun: float | None = None
+    free, sent, done = host.status().free, 0, 0
+    first = host.sequence
+    asked = host.time
+    while begun is None or host.time < begun + moment:
+        out = b""
+        under_way = sum(len(b.segments) for b in work[done:sent])
+        if sent < len(work) and sent == done and under_way + len(work[sent].segments) <= free:
+            out = protocol.wire(work[sent].payload((first + sent) % 256))
+            sent += 1
+        elif host.time > asked + 0.01:
+            out, asked = protocol.wire(protocol.status_query(1)), host.time
+        for reply in host.run(0.5e-3, out):
+            if isinstance(reply, protocol.Info):
+                continue
+            done += (reply.next - (first + done)) % 256
+            free = reply.free
+            assert reply.error == 0, reply
+            if begun is None and reply.state == State.MOVING:
+                begun = host.time
+    host.sequence = (first + done) % 256
+
+
+def _straight(arm: armkin.Arm, start: Array, end: Sequence[int]) -> list[Batch]:
+    """A straight joint move between counts."""
+    from armkin.board.firmware.segments import line
+
+    move = line(start.tolist(), list(end), 1.0, 2.0)
+    return batches((0, 1, 2), start.tolist(), list(move.segments), 4)
+
+
+def _accelerations(arm: armkin.Arm, trace: Trace, start: Sequence[int], begin: int) -> float:
+    """Greatest acceleration of a joint after a cycle, as a share: parabolas fitted to the edges of WINDOW.
+
+    An edge says where a motor is exactly: on the border between two counts.
+    """
+    gain = arm.motor_gain
+    assert np.count_nonzero(gain) == arm.n, "one motor a joint"
+    worst = 0.0
+    for k, name in enumerate("XYZ"):
+        cycle, direction = trace.steps(name)
+        place = start[k] + np.cumsum(direction) - np.where(direction > 0, 0, -1)
+        t = cycle / CLOCK
+        joint = int(np.abs(gain[k]).argmax())
+        last = t[-1]
+        for a in np.arange(begin / CLOCK, last - WINDOW, WINDOW / 20):
+            inside = (t >= a) & (t <= a + WINDOW)
+            if inside.sum() < 12:
+                continue
+            fit = np.polyfit(t[inside] - a - WINDOW / 2, place[inside], 2)
+            worst = max(worst, float(abs(2 * fit[0] / gain[k, joint]) / arm.max_accel[joint]))
+    return worst
