@@ -10,6 +10,7 @@ import argparse
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
@@ -30,11 +31,11 @@ def row(what: str, ours: str, grbl: str = "") -> None:
     print(f"{what:46} {ours:34} {grbl}", flush=True)
 
 
-SPLINE = {
+SPLINE: dict[str, Any] = {
     "start": {"point": [330, -80, 320]},
     "moves": [{"spline": [[360, -20, 260], [310, 60, 300], [350, 90, 330], [300, 20, 350], [330, -80, 320]]}],
 }
-ZIGZAG = {
+ZIGZAG: dict[str, Any] = {
     "start": {"point": [300, -90, 300]},
     "blend": 8,
     "moves": [{"line": [380, -50, 300]}, {"line": [310, 0, 280]}, {"line": [380, 50, 320]}, {"line": [300, 90, 300]}],

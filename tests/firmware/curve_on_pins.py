@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from bare_host import BareHost, Batch, batches
@@ -22,7 +23,7 @@ from armkin.formula.arrays import Array
 from armkin.motion.curve import Curve
 from armkin.motion.trajectory import Trajectory
 
-CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
+CIRCLE: dict[str, Any] = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
 WINDOW = 0.1  # [s] in which an acceleration is read from edges
 
 
@@ -54,7 +55,7 @@ class Laid:
         return out
 
 
-def lay(moves: object, size: int = 4) -> Laid:
+def lay(moves: dict[str, Any], size: int = 4) -> Laid:
     """Plan moves whose last stretch is a curve, cut that into frames of three_dof's board."""
     arm = armkin.load("three_dof")
     plan = armkin.path(arm, moves)

@@ -297,6 +297,8 @@ class _Walk:
         if not carried.whole and not (self.split and carried.covered):
             raise report.refused(self.plan, carried)
         for k, run in enumerate(carried.runs):
+            if run.first == run.last:
+                continue
             fixed = self.q if not free and k == 0 else None
             curves = stretches(self.arm, route, carried.columns, run, near, self.pace, fixed=fixed)
             if free or k:

@@ -36,7 +36,8 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
     for k, run in enumerate(carried.runs):
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
-        plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0], q[-1]))
+        if end > begin:
+            plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0], q[-1]))
         if run.last < len(c.s) - 1 or k + 1 < len(carried.runs):
             plan.reconfigurations.append(_break(arm, c, run.chain, run.first, base))
 

@@ -28,7 +28,8 @@ def read(name: str) -> PathFile:
             raw = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(f"{name}: cannot read the path file: {reason}", file=name) from None
+        hint = _alike(name) if isinstance(error, FileNotFoundError) else ""
+        raise FileError(f"{name}: cannot read the path file: {reason}{hint}", file=name) from None
     if len(raw) > LARGEST:
         raise FileError(f"{name} is larger than {LARGEST // 1_000_000} MB: this is no path file", file=name)
     return parse(raw, name)
@@ -70,6 +71,20 @@ def json_schema() -> dict[str, Any]:
     from armkin.robot_file.schema import made_from
 
     return made_from(PathFile, "armkin path file")
+
+
+def _alike(name: str) -> str:
+    """Path files of the same folder with such a name, as the end of a message."""
+    import difflib
+    from pathlib import Path
+
+    folder = Path(name).parent
+    try:
+        there = [one.name for one in folder.iterdir() if one.suffix in (".yaml", ".yml", ".csv")]
+    except OSError:
+        return f"; there is no folder {folder}"
+    near = difflib.get_close_matches(Path(name).name, there, 1)
+    return f"; did you mean {folder / near[0]}?" if near else ""
 
 
 def _lists(value: Any) -> Any:
