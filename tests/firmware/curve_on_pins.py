@@ -18,7 +18,7 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import cut
 from armkin.board.firmware.protocol import HALF, STEP, Segment, State
-from armkin.board.firmware.segments import CLOCK
+from armkin.board.firmware.segments import CLOCK, line
 from armkin.formula.arrays import Array
 from armkin.motion.curve import Curve
 from armkin.motion.trajectory import Trajectory
@@ -182,14 +182,14 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
         accel = _accelerations(laid.arm, trace, laid.start, begin)
         host.hello(77)
         host.order(protocol.enable(0, 3))
-        back = _straight(laid.arm, rest, laid.start)
-        after = host.stream(back)
+        goal = laid.start if (rest != laid.start).any() else [count + 200 for count in laid.start]
+        after = host.stream(_straight(rest.tolist(), goal))
         return Held(
             known,
             float(laid.off(rest[None])[0]),
             float(laid.off(counts[::7]).max()),
             accel,
-            list(after.counts[:3]) == laid.start and after.error == 0,
+            list(after.counts[:3]) == goal and after.error == 0,
             float(cycle[-1] - begin) / CLOCK * 1e3,
         )
 
@@ -219,12 +219,10 @@ def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
     host.sequence = (first + done) % 256
 
 
-def _straight(arm: armkin.Arm, start: Array, end: Sequence[int]) -> list[Batch]:
+def _straight(start: list[int], end: list[int]) -> list[Batch]:
     """A straight joint move between counts."""
-    from armkin.board.firmware.segments import line
-
-    move = line(start.tolist(), list(end), 1.0, 2.0)
-    return batches((0, 1, 2), start.tolist(), list(move.segments), 4)
+    move = line(start, end, 1.0, 2.0)
+    return batches((0, 1, 2), start, list(move.segments), 4)
 
 
 def _accelerations(arm: armkin.Arm, trace: Trace, start: Sequence[int], begin: int) -> float:

@@ -9,13 +9,13 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, along
+from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.plan import check_limits, check_rates
@@ -63,7 +63,14 @@ class Cut:
     @cached_property
     def segments(self) -> int:
         """Number of device segments."""
-        return sum(len(move.segments) for move in self.moves())
+        number, at = 0, self.start
+        for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
+            if self._is_line(stretch, at, end):
+                number += count(stretch.law)
+            else:
+                number += len(self._move(stretch, at, end, False).segments)
+            at = end
+        return number
 
     def moves(self, rough: Callable[[], bool] = lambda: False) -> Iterator[Move]:
         """The moves, one a stretch, made as they are asked for; rough: asked then, see `along`."""
@@ -72,8 +79,12 @@ class Cut:
             yield self._move(stretch, at, end, rough())
             at = end
 
+    @staticmethod
+    def _is_line(stretch: Stretch, start: Counts, end: Counts) -> TypeGuard[Straight]:
+        return isinstance(stretch, Straight) and stretch.law.is_trapezoid and bool((start != end).any())
+
     def _move(self, stretch: Stretch, start: Counts, end: Counts, rough: bool) -> Move:
-        if isinstance(stretch, Straight) and stretch.law.is_trapezoid and (start != end).any():
+        if self._is_line(stretch, start, end):
             a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
             return along(a, b, stretch.law, clock=clock, min_interval=least, rough=rough)
         arm = self.trajectory.arm

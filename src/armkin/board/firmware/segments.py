@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Protocol
 
 import numpy as np
@@ -39,6 +39,8 @@ _TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no ed
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
+_EAGER = 2000  # segments of a line that are made at once
+_AT_ONCE = 512  # bounds of segments that are held, of a longer line
 _MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
 
 
@@ -167,25 +169,52 @@ def along(
 ) -> Move:
     """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length.
 
-    rough: half as many, with an acceleration that is right to 10 %.
+    rough: half as many, with an acceleration that is right to 10 %. A line of very many makes them as asked for.
     """
     first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
-    span = last - first
-    if not span.any():
+    if not (last - first).any():
         return Move(first, last, (), 0)
-    cutter = Cutter(first.tolist(), clock, min_interval)
-    bounds = _on_steps(law, list(_bounds(law, _ROUGH if rough else _RATIOS)), int(np.abs(span).max()))
-    times = np.array(bounds)
-    done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
-    made = []
-    for k, (a, b) in enumerate(pairwise(bounds)):
-        share = 1.0 if k + 2 == len(bounds) else done[k + 1]
-        made.append(
-            cutter.piece(b - a, (first + span * share).tolist(), changing(float(speed[k]), float(speed[k + 1])))
-        )
-    if [p // STEP for p in cutter.places] != last.tolist():
-        raise AssertionError("a line's rates do not lead to its end")
-    return Move(first, last, tuple(made), sum(map(cycles_of, made)))
+    line = LineSegments(first, last, law, clock, min_interval, rough)
+    if len(line) > _EAGER:
+        return Move(first, last, line, round(law.duration * clock))
+    made = tuple(line)
+    return Move(first, last, made, sum(map(cycles_of, made)))
+
+
+@dataclass(frozen=True)
+class LineSegments:
+    """The segments of a straight line; iterating makes them anew, in bounded memory."""
+
+    start: Counts  # (motors,)
+    end: Counts
+    law: Profile
+    clock: int
+    min_interval: int
+    rough: bool
+
+    def __iter__(self) -> Iterator[Segment]:
+        """The segments in order."""
+        law, span = self.law, self.end - self.start
+        cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
+        bounds = _on_steps(law, _bounds(law, _ROUGH if self.rough else _RATIOS), int(np.abs(span).max()))
+        for times, ending in bounds:
+            done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
+            if ending:
+                done[-1] = 1.0
+            for k, (a, b) in enumerate(pairwise(times.tolist())):
+                change = changing(float(speed[k]), float(speed[k + 1]))
+                yield cutter.piece(b - a, (self.start + span * done[k + 1]).tolist(), change)
+        if [p // STEP for p in cutter.places] != self.end.tolist():
+            raise AssertionError("a line's rates do not lead to its end")
+
+    def __len__(self) -> int:
+        return count(self.law, self.rough)
+
+
+def count(law: Profile, rough: bool = False) -> int:
+    """How many segments a line with this law has."""
+    ratios = _ROUGH if rough else _RATIOS
+    return sum(parts if isinstance(parts, int) else len(parts) for _, _, parts in _phases(law, ratios))
 
 
 def changing(begin: float, end: float) -> float:
@@ -208,20 +237,28 @@ def line(
     return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
-def _bounds(law: Profile, ratios: Sequence[float]) -> Iterable[float]:
-    """When segments end: the speed changes by 12 % in each, cruises have long ones."""
-    yield 0.0
+def _phases(law: Profile, ratios: Sequence[float]) -> Iterator[tuple[float, float, int | list[float]]]:
+    """A law's phases: begin, end, and into how many segments they are cut evenly, or where else.
+
+    The speed changes by 12 % in each; cruises have long ones.
+    """
     ramp = law.peak / max(law.accel, 1e-12)
     for k, (t0, t1) in enumerate(pairwise(law.times.tolist())):
         accel, jerk = float(law.states[k, 2]), float(law.jerk[k])
         if t1 - t0 < 1e-9:
             continue
         if jerk == 0.0 and accel != 0.0:
-            yield from _ramp(law, t0, t1, accel, ratios)
+            yield t0, t1, _ramp(law, t0, t1, accel, ratios)
             continue
         longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
-        parts = math.ceil((t1 - t0) / longest)
-        yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1))
+        yield t0, t1, math.ceil((t1 - t0) / longest)
+
+
+def _bounds(law: Profile, ratios: Sequence[float]) -> Iterator[float]:
+    """When segments end, from 0 on."""
+    yield 0.0
+    for t0, t1, parts in _phases(law, ratios):
+        yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1)) if isinstance(parts, int) else parts
 
 
 def _ramp(law: Profile, t0: float, t1: float, accel: float, ratios: Sequence[float]) -> list[float]:
@@ -240,13 +277,27 @@ def _ramp(law: Profile, t0: float, t1: float, accel: float, ratios: Sequence[flo
     return [t for t in times if t0 + 1e-6 < t < t1 - 1e-6] + [t1]
 
 
-def _on_steps(law: Profile, bounds: list[float], steps: int) -> list[float]:
-    """Bounds moved to where the motor with the most steps has made whole ones, where it makes several between them."""
-    if len(bounds) < 3:
-        return bounds
-    times = np.array(bounds)
-    at, speed = law.at(times) / law.length * steps, law.at(times, 1) / law.length * steps
-    near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
-    inner = np.where((near > 4) & (speed[1:-1] > 0), (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9), 0.0)
-    times[1:-1] += inner
-    return [float(t) for t in times]
+def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tuple[NDArray[np.float64], bool]]:
+    """Bounds moved to where the motor with the most steps has made whole ones, where it makes several between them.
+
+    In blocks, each of which begins with the last bound of the one before; the last one is told.
+    """
+    rest = iter(bounds)
+    known: list[float] = []
+    begin = 0.0
+    while True:
+        more = list(islice(rest, _AT_ONCE))
+        known += more
+        times = np.array(known)
+        if len(times) > 2:
+            at, speed = law.at(times) / law.length * steps, law.at(times, 1) / law.length * steps
+            near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
+            whole = (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9)
+            times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), whole, 0.0)
+        times[0] = begin
+        if len(more) < _AT_ONCE:
+            yield times, True
+            return
+        yield times[:-1], False  # what the last one is moved to depends on the next
+        begin = float(times[-2])
+        known = known[-2:]
