@@ -47,7 +47,7 @@ def measure(name: str, arm: Arm, count: int) -> None:
     plan = method.prepare(*arm)
     prepare = seconds(lambda: method.prepare(*arm), 3)
     begin = time.perf_counter()
-    found, doubtful, _ = method.solve(plan, T)
+    found, doubtful, *_ = method.solve(plan, T)
     batch = (time.perf_counter() - begin) / count
     alone = np.median([seconds(partial(method.solve, plan, T[i : i + 1]), 1) for i in range(15)])
     branches = (~np.isnan(found[..., 0])).sum(axis=1)

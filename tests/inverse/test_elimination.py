@@ -132,7 +132,7 @@ def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Bool]:
     T = forward(arm, q)
     plan = method.prepare(*arm)
     assert plan.complete
-    found, doubtful, _ = method.solve(plan, T)
+    found, doubtful, *_ = method.solve(plan, T)
     lost = miss(arm, q, found) > within
     assert not lost.any(), f"{lost.sum()} of {len(q)} lost, the first: {q[lost][0]}"
     assert pose_residual(arm, found, T) < 1e-10
@@ -320,7 +320,7 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
     arm = random_arm(3)
     plan = method.prepare(*arm)
     q = singular_joints(arm, 60)
-    found, _, _ = method.solve(plan, forward(arm, q))
+    found, _, *_ = method.solve(plan, forward(arm, q))
     q = q[(~np.isnan(found[..., 0])).sum(axis=1) == 1]
     assert len(q) >= 3
     T = forward(arm, q)
@@ -328,12 +328,12 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
     for way in (1e-10, -1e-10):
         beyond = T.copy()
         beyond[:, :3, 3] += way * 1000 * left[:, :3, 5]
-        found, doubtful, _ = method.solve(plan, beyond)
+        found, doubtful, *_ = method.solve(plan, beyond)
         assert (~np.isnan(found[..., 0])).sum(axis=1).min() >= 1
         assert doubtful.all()
         assert pose_residual(arm, found, beyond) < 1e-9
         beyond[:, :3, 3] += 1e5 * way * 1000 * left[:, :3, 5]  # and 1e-5 m: inside two answers, outside none
-        found, _, _ = method.solve(plan, beyond)
+        found, _, *_ = method.solve(plan, beyond)
         assert set((~np.isnan(found[..., 0])).sum(axis=1)) <= {0, 2}
 
 
@@ -343,14 +343,14 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
 def test_no_targets_unreachable_targets_and_targets_that_are_no_numbers() -> None:
     arm = ARMS["JACO"]
     plan = method.prepare(*arm)
-    found, doubtful, _ = method.solve(plan, np.empty((0, 4, 4)))
+    found, doubtful, *_ = method.solve(plan, np.empty((0, 4, 4)))
     assert found.shape == (0, 0, 6)
     assert doubtful.shape == (0,)
     T = forward(arm, random_joints(arm, 3, 14))
-    alone, _, _ = method.solve(plan, T[2:])
+    alone, _, *_ = method.solve(plan, T[2:])
     T[0, 0, 3] += 1e4
     T[1, 1, 1] = np.nan
-    found, doubtful, _ = method.solve(plan, T)
+    found, doubtful, *_ = method.solve(plan, T)
     assert np.isnan(found[:2]).all()
     assert not doubtful[:2].any()
     np.testing.assert_allclose(found[2], alone[0], atol=1e-11)
@@ -360,15 +360,15 @@ def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPat
     arm = ARMS["CRX"]
     plan = method.prepare(*arm)
     T = forward(arm, random_joints(arm, 600, 15))
-    whole, doubt, _ = method.solve(plan, T)
+    whole, doubt, *_ = method.solve(plan, T)
     monkeypatch.setattr(method, "BLOCK", 512)
-    together, doubtful, _ = method.solve(plan, T)
+    together, doubtful, *_ = method.solve(plan, T)
     np.testing.assert_array_equal(np.isnan(together), np.isnan(whole))
     np.testing.assert_allclose(together, whole, atol=1e-9)
     np.testing.assert_array_equal(doubtful, doubt)
-    together, _, _ = method.solve(plan, T)
+    together, _, *_ = method.solve(plan, T)
     for i in (0, 255, 256, 599):
-        alone, _, _ = method.solve(plan, T[i : i + 1])
+        alone, _, *_ = method.solve(plan, T[i : i + 1])
         rows = together[i][~np.isnan(together[i][:, 0])]
         assert distance(arm, alone[0], rows).max() < 1e-9
 
@@ -392,6 +392,6 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     arm = dh([0, 90, 90, 60, 60, 0], [0, 300, 0, 50, 0, 0], [100, 50, 20, 250, 80, 100], [0.0] * 6)
     plan = method.prepare(*arm)
     assert not plan.complete
-    found, doubtful, _ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
+    found, doubtful, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
     assert found.shape[1] <= 16
     assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import truth
+from geometries import case, right_angles
 from oracle import goal, screws
 from test_every_branch import NAMES, shipped
 
@@ -107,6 +108,29 @@ def test_compound_singularities(name: str, q: list[float]) -> None:
     joints = np.radians([q])
     for near in (None, joints):
         verdict = truth.judge(arm, screw, None, joints, goal(task, screw, joints).array(), near)
+        assert verdict, verdict
+
+
+@pytest.mark.parametrize(
+    ("seed", "q"),
+    [
+        (0, [-90, -90, 180, 90, 180, -90]),  # a corner of the workspace: no target beside it can be reached
+        (0, [-45, -90, 45, -135, 0, -135]),
+        (4, [90, 90, 0, 180, 0, 180]),  # regular, but the main pencil is singular at this target
+        (4, [-90, -90, 0, 180, 90, -90]),
+        (4, [-135, -90, 45, -135, -90, 90]),
+    ],
+)
+def test_singular_pencils_of_right_angled_arms(seed: int, q: list[float]) -> None:
+    """What the elimination finds for the target itself is no proof that there is nothing."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(seed)), "pose")
+    task, geometry = solver(arm, "pose")
+    assert geometry.name == "general elimination"
+    joints = np.radians([q])
+    target = goal(task, screw, joints).array()
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, "pose", joints, target, near)
+        truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 60, 1)
         assert verdict, verdict
 
 

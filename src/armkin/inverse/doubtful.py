@@ -101,7 +101,7 @@ def examined(
             return others(goal[some], close[some], lost)
 
         seen = singularities.examine(
-            arm, task, q, np.arange(q.shape[1]) % columns, loose, goal, close, more,
+            arm, task, q, np.arange(q.shape[1]) % max(columns, 1), loose, goal, close, more,
             None if unsettled is None else unsettled[rows],
         )  # fmt: skip
         width = seen.q.shape[1]

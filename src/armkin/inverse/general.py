@@ -56,7 +56,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     prepared = method.prepare(link, prismatic)
 
     def rows(T: Array) -> Rows:
-        q, _, settled = method.solve(prepared, T)
+        q, _, settled, shaken, guesses = method.solve(prepared, T)
         n = arm.n
         with np.errstate(invalid="ignore"):
             hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
@@ -70,8 +70,10 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
         return Rows(
             np.take_along_axis(own, order[:, :, None], axis=1),
-            hit.sum(axis=1) > count,
+            (hit.sum(axis=1) > count) | shaken,
             settled & prepared.complete,
+            shaken,
+            guesses[:, :, :n],
         )
 
     return Geometry(
@@ -85,8 +87,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
 
 def _six(prepared: method.Elimination, T: Array) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose and the arm has a regular pencil."""
-    q, doubt, settled = method.solve(prepared, T)
-    return Rows(q, doubt, settled & prepared.complete)
+    q, doubt, settled, shaken, guesses = method.solve(prepared, T)
+    nothing = np.isnan(q[:, :, 0]).all(axis=1)  # of a target that had to be moved, that is no proof
+    return Rows(q, doubt | shaken, settled & prepared.complete & ~(shaken & nothing), shaken, guesses)
 
 
 def _with_wrist(arm: Arm, task: Task) -> Geometry | None:

@@ -207,7 +207,7 @@ def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entr
 def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool) -> tuple[Batch, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
-    q, doubt, complete = geometry.rows(target)
+    q, doubt, complete, lost, guesses = geometry.rows(target)
     B = q.shape[1]
     out = empty(len(target), B, arm.n)
     out.q[...], inside = nearest_row(arm, q, near[:, None, :])
@@ -221,6 +221,12 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
     doubtful = np.flatnonzero(doubt)
     if examine and len(doubtful):
         solve = geometry.rows
+
+        def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
+            found = q[doubtful[some]]
+            if guesses is not None:
+                found = np.concatenate([found, guesses[doubtful[some]]], axis=1)
+            return found, np.zeros(found.shape[:2], bool)
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them."""
@@ -236,8 +242,8 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
             target,
             near,
             doubtful,
-            lambda some: (q[doubtful[some]], np.zeros((len(some), B), bool)),
+            candidates,
             others,
-            ~complete,
+            np.zeros(len(target), bool) if lost is None else lost,
         )
     return out, B

@@ -45,7 +45,8 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         T = np.empty((len(goal), 4, 4))
         pose.write(pose_of(list(goal.T)), T)
         found = solve_rows(T)
-        return found._replace(q=found.q[:, :, :5])
+        guesses = None if found.guesses is None else found.guesses[:, :, :5]
+        return found._replace(q=found.q[:, :, :5], guesses=guesses)
 
     return Geometry(
         inner.name,

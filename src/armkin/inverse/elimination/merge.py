@@ -116,6 +116,17 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     return q, doubtful
 
 
+def best(answers: Answers, count: int, most: int) -> Array:
+    """Of every pose (N = count) at most so many answers, those of the smallest residual: (N, B, 6), NaN past them."""
+    answers = answers.take(np.lexsort((answers.residual, answers.pose)))
+    number = np.bincount(answers.pose, minlength=count)
+    column = _column(number)
+    q = np.full((count, min(int(number.max(initial=0)), most), 6), np.nan)
+    some = column < most
+    q[answers.pose[some], column[some]] = answers.q[some]
+    return q
+
+
 def _column(number: Int) -> Int:
     """0, 1, .. for each of the runs of lengths ``number`` (N,)."""
     end = np.cumsum(number)

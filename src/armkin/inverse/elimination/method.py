@@ -39,11 +39,11 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import closed_loop, roots, slides
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.merge import Answers, concatenate, merge, pack, projection
+from armkin.inverse.elimination.merge import Answers, best, concatenate, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.inverse.elimination.walks import Role, roles
-from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING
+from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SEED
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
@@ -53,6 +53,7 @@ BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunk
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 SHAKES = (0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
+GUESSES = 8  # postures close to answers that are kept of a pose
 SAMPLES = 11  # random poses on which roles are compared
 # log10 of a role's raw error: nothing better needed, good enough, unfit
 EXCELLENT, HEALTHY, USELESS = -9.5, -8.0, -5.0
@@ -102,13 +103,13 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
         if _enough(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
-    best = rated[0].pencil
+    first = rated[0].pencil
     others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
-    hidden_joint = best.hidden_joint
+    hidden_joint = first.hidden_joint
     others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
-    again = build(best.role, closed.links, closed.prismatic, PSI[1])
-    plans = [best, *others[:1], again, *others[1:]]
+    again = build(first.role, closed.links, closed.prismatic, PSI[1])
+    plans = [first, *others[:1], again, *others[1:]]
     while len(plans) < len(SHAKES):
         plans.append(plans[-2])
     return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0].error)
@@ -188,6 +189,8 @@ class Branches(NamedTuple):
     q: Array
     doubtful: Bool
     settled: Bool
+    shaken: Bool
+    guesses: Array
 
 
 def solve(elimination: Elimination, T: Array) -> Branches:
@@ -203,15 +206,19 @@ def solve(elimination: Elimination, T: Array) -> Branches:
         doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
         answers that were merged across more than rounding, or with two roots that just touch or just miss.
         settled: (N,), targets of which some pass showed none of the signs of (v): every isolated branch is listed.
+        shaken: (N,), targets of which no pass that left them where they are did: a singular posture may be missing.
+        guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
     count = T.shape[0]
     parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
     q = np.full((count, max((part.q.shape[1] for part in parts), default=0), 6), np.nan)
-    doubtful, settled = np.zeros((2, count), dtype=np.bool_)
+    doubtful, settled, shaken = np.zeros((3, count), dtype=np.bool_)
+    guesses = np.full((count, max((part.guesses.shape[1] for part in parts), default=0), 6), np.nan)
     for number, part in enumerate(parts):
         rows = slice(number * BLOCK, number * BLOCK + len(part.doubtful))
-        q[rows, : part.q.shape[1]], doubtful[rows], settled[rows] = part
-    return Branches(q, doubtful, settled)
+        q[rows, : part.q.shape[1]], doubtful[rows], settled[rows], shaken[rows] = part[:4]
+        guesses[rows, : part.guesses.shape[1]] = part.guesses
+    return Branches(q, doubtful, settled, shaken, guesses)
 
 
 def _solve_block(elimination: Elimination, T: Array) -> Branches:
@@ -221,27 +228,33 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
     goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
     if not elimination.plans:
         answers, touching = _slides(closed, goal)
-        settled = np.ones(count, dtype=np.bool_)
+        settled, shaken = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        near = _none()
     else:
-        answers, touching, settled = _passes(elimination, goal)
+        answers, near, touching, settled, shaken = _passes(elimination, goal)
     answers = answers.take(finite[answers.pose])
     answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack(answers, count)
-    q *= np.where(closed.prismatic, closed.length, 1.0)
-    return Branches(q, (weak | merged | touching) & finite, settled)
+    unit = np.where(closed.prismatic, closed.length, 1.0)
+    guesses = best(near.take((finite & shaken)[near.pose]), count, GUESSES)
+    return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
-def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool, Bool]:
-    """Answers of all passes, each over the poses that the last one left open; touching pairs and settled poses (N,)."""
-    found = []
-    touching = np.zeros(goal.shape[0], dtype=np.bool_)
+def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bool, Bool, Bool]:
+    """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
+    poses with touching pairs, settled ones, and those that went to a pass which moves them."""
+    found, guesses = [], [_none()]
+    touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
     open_poses = np.arange(goal.shape[0])
     for number, pencil in enumerate(elimination.plans):
+        shaken[open_poses] |= SHAKES[number] > 0
         still = np.zeros(open_poses.size, dtype=np.bool_)
         for begin in range(0, open_poses.size, CHUNK):
             part = open_poses[begin : begin + CHUNK]
-            answers, unsettled, touch = _attempt(elimination.loop, pencil, goal[part], number)
+            answers, unsettled, touch, near = _attempt(elimination.loop, pencil, goal[part], number)
             found.append(answers._replace(pose=part[answers.pose]))
+            if number > 0:
+                guesses.append(near._replace(pose=part[near.pose]))
             still[begin : begin + CHUNK] = unsettled
             touching[part] |= touch
         open_poses = open_poses[still]
@@ -249,11 +262,11 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Bool, Bool]
             break
     settled = np.ones(goal.shape[0], dtype=np.bool_)
     settled[open_poses] = False
-    return concatenate(found) if found else _none(), touching, settled
+    return concatenate(found) if found else _none(), concatenate(guesses), touching, settled, shaken
 
 
-def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool]:
-    """Answers of one pass for goals (N, 4, 4), the poses it leaves open and those with touching roots."""
+def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
+    """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
     careful, shake = number > 0, SHAKES[number]
     seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful])
     target = goal[seed.pose]
@@ -292,7 +305,8 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     order = np.lexsort((key, real.pose))
     twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
     unsettled[real.pose[order][1:][twice]] = True
-    return answers, unsettled, touching
+    guesses = _answers(closed, seed.pose, done, ~good & (done.residual < SEED))
+    return answers, unsettled, touching, guesses
 
 
 def _shaken(goal: Array, size: float) -> Array:

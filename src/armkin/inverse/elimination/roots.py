@@ -18,6 +18,7 @@ from armkin.inverse.numeric.tolerances import INFINITE
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
+_ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
 
 
 class Seeds(NamedTuple):
@@ -39,8 +40,13 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
     lead = pencil.W.shape[0]
-    G = nudged(np.linalg.solve, equations[:, :, :lead], equations[:, :, lead:])
-    rough = np.abs(G).max(axis=(1, 2)) > 1e6
+    count = equations.shape[2] - lead
+    rest = np.empty((X.shape[0], lead, count + 1))
+    rest[:, :, :count], rest[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
+    G = nudged(np.linalg.solve, equations[:, :, :lead], rest)
+    # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
+    rough = (np.abs(G[:, :, :count]).max(axis=(1, 2)) > 1e6) | (np.abs(G[:, :, count]).max(axis=1) > 1e9)
+    G = G[:, :, :count]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
     companion[:, :12] = -G

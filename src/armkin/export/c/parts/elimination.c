@@ -31,6 +31,8 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
             C[i * ARM_MOST + j] = -G[i * wide + lead + j];
             most = fabs(G[i * wide + lead + j]) > most ? fabs(G[i * wide + lead + j]) : most;
         }
+    for (i = 0; i < lead; i++) /* of a singular pencil the rest may vanish on both sides: its pivots tell */
+        open |= !(fabs(G[i * wide + i]) > 1e-11);
     for (i = 0; i < size - lead; i++)
         C[(lead + i) * ARM_MOST + 2 * pencil->r + i] = 1;
     if (!(most <= 1e6)) {
@@ -139,8 +141,10 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
             target[4 * i + j] = goal[3 * j + i] / (j == 3 ? ARM_LENGTH : 1);
     arm_times(arm_from_base, target, scaled);
     arm_times(scaled, arm_from_tool, there);
-    for (pass = 0; pass < ARM_PASSES && open; pass++)
+    for (pass = 0; pass < ARM_PASSES && open; pass++) {
+        edge |= arm_shakes[pass] > 0; /* a singular posture may be missing where the target had to be moved */
         open = arm_attempt(there, pass, found, &number, &edge);
+    }
     for (i = 0; i < number; i++)
         exact += found[i].residual < 1e-10;
     for (i = k = 0; i < number; i++) /* a closest point stands in for answers only where there are none */
