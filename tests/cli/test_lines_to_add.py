@@ -54,3 +54,23 @@ def test_info_shows_the_lines() -> None:
     for line in run("info", "ur5e", "--json").json["lines_to_add"]:
         assert f"    {line}\n" in shown
     assert "to add" not in run("info", "three_dof").out
+
+
+@pytest.mark.parametrize("how", [("--dry-run",), ("--port", "sim")])
+def test_an_arm_without_published_accelerations_is_rehearsed_with_one_that_is_given(how: tuple[str, ...]) -> None:
+    moveo = ("send", "moveo", 10, 10, 10, 10, 10, *how)
+    refused = run(*moveo)
+    assert (refused.code, refused.out) == (2, "")
+    assert "or rehearse with --accel 60, for example" in refused.err
+    slow, quick = (run(*moveo, "--accel", accel, "--json").json for accel in (5, 500))
+    assert slow["pulses"] == quick["pulses"]
+    if "duration_s" in slow:
+        assert slow["duration_s"] > quick["duration_s"]
+    given = run("send", "three_dof", -30, 5, -5, *how, "--accel", 1, "--json").json  # its own are not replaced
+    assert given["pulses"] == [-1067, -10144, 5667]
+    assert given.get("duration_s", 1.917) == pytest.approx(1.917, abs=0.01)
+
+
+def test_an_acceleration_for_a_real_arm_stands_in_its_file() -> None:
+    assert "--accel is for --dry-run" in run("send", "moveo", 1, 1, 1, 1, 1, "--accel", 60).err
+    assert "must be from" in run("send", "moveo", 1, 1, 1, 1, 1, "--dry-run", "--accel", 0).err

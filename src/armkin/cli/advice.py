@@ -61,7 +61,8 @@ def _incomplete(error: ArmkinError) -> str:
     name = error.fields.get("robot_file")
     if not error.fields.get("lines_to_add") or not name or shipped(name) is None or os.path.isfile(name):
         return error.advice
-    return f"{name} comes with armkin: add them to a copy, armkin export {name} --dh -o my_{name}.yaml"
+    copy = f"{name} comes with armkin: add them to a copy, armkin export {name} --dh -o my_{name}.yaml"
+    return f"{copy}\nor rehearse with --accel 60, for example" if error.fields.get("option") == "--accel" else copy
 
 
 def _lost(error: ArmkinError) -> str:

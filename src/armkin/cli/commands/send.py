@@ -69,6 +69,14 @@ def send(
         str | None,
         typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
+    accel: Annotated[
+        str | None,
+        typer.Option(
+            "--accel",
+            metavar="DEG/S2|MM/S2",
+            help="In a rehearsal (--dry-run, --port sim): of the joints whose max_accel nobody states.",
+        ),
+    ] = None,
     resume: Resume = False,
     baud: Baud = None,
     no_reset: NoReset = False,
@@ -87,6 +95,9 @@ def send(
         raise UsageError(f"--speed: '{speed}' must be above 0 and at most 100 percent")
     if start is not None and not dry_run:
         raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
+    rehearsal = dry_run or port == SIM
+    if accel is not None and not rehearsal:
+        raise UsageError("--accel is for --dry-run and --port sim: a real arm's max_accel stands in its robot file")
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     if resume:
@@ -95,7 +106,14 @@ def send(
     if path is not None:
         from armkin.cli.commands.path import sent
 
-        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
+        others = {
+            "joint values": q,
+            "--target": target,
+            "--batch": batch,
+            "--blend": blend,
+            "--near": near,
+            "--accel": accel,
+        }
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
@@ -104,7 +122,14 @@ def send(
         return
     radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
-    board = linking.board_of(arm, rehearsal=dry_run or port == SIM)
+    if accel is not None:
+        arm = _accelerated(arm, number(accel, "--accel"))
+    try:
+        board = linking.board_of(arm, rehearsal=rehearsal)
+    except UsageError as error:
+        if rehearsal and all(line.startswith("max_accel") for line in error.fields.get("lines_to_add", ["no"])):
+            error.fields["option"] = "--accel"
+        raise
     planner, stands = Planner(arm, board, fraction, radius), linking.assumed(arm, assume)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
@@ -144,6 +169,18 @@ def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], hel
 
     with resuming.under_way(machine, plans, held) as (left, _, note), linking.told(left, note) as tell:
         machine.run(planner.noted(left), tell)
+
+
+def _accelerated(arm: Arm, value: float) -> Arm:
+    """The arm with an acceleration [deg/s2 | mm/s2] for the joints that have none."""
+    import dataclasses
+
+    import numpy as np
+
+    if not 1e-6 <= value <= 1e6:
+        raise UsageError(f"--accel: {value:g} must be from 0.000001 to 1000000 deg/s2 (mm/s2)")
+    given = units.joints_in(arm, [value] * arm.n)
+    return dataclasses.replace(arm, max_accel=np.where(np.isnan(arm.max_accel), given, arm.max_accel))
 
 
 def _blend(text: str | None, batch: str | None) -> float:
