@@ -1,7 +1,7 @@
 """`armkin.compile` against numpy and EAIK in one run; the exported C against Python, pose by pose.
 
     pip install -e '.[bench]'
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/bench/bench_compiled.py [--poses 100000]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/bench/bench_compiled.py [--poses 80000]
     python tests/bench/bench_compiled.py --agree 100000        # exported C and armkin.compile beside armkin.ik
     python tests/bench/bench_compiled.py --memory 1000000      # peak memory beyond the results
 
@@ -152,7 +152,7 @@ def memory(count: int, only: str | None) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--poses", type=int, default=100_000)
+    parser.add_argument("--poses", type=int, default=80_000)
     parser.add_argument("--agree", type=int, metavar="N")
     parser.add_argument("--memory", type=int, metavar="N")
     parser.add_argument("--only", help="one robot")

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.solutions import Solutions
 
-ROOM = 24  # columns that there is room for from the beginning
+ROOM = 24  # columns that there is room for from the beginning, where moving to another place would cost memory
+MOVABLE = 32_000_000  # [bytes] up to which it does not, and allocators keep what was given back for the next call
 BLOCK = 4096  # rows moved at once
 
 
@@ -25,7 +26,7 @@ class Results:
 
     def __init__(self, N: int, B: int, n: int) -> None:
         self.N, self.B, self.n = N, B, n
-        self._take(max(B, ROOM))
+        self._take(max(B, ROOM) if 8 * N * max(B, 1) * n > MOVABLE else B)
         self.status, self.state = np.zeros(N, np.int8), np.empty(N, np.uint8)
         self.free, self.complete = np.zeros((N, n), bool), np.ones(N, bool)
 

@@ -50,7 +50,7 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     known &= ~_open(arm, task, q, valid, size[:, 1:], sigma, target)
     with np.errstate(invalid="ignore"):
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
-        clusters = (away < CLUSTER).sum(axis=2) > 2
+        clusters = ((away < CLUSTER).sum(axis=2) > 2) & (size[:, 1:] < SEED)
     if clusters.any():  # roots of third or fourth order: their mean is right to rounding
         mean = singularities.means(arm, q)[clusters]
         clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < size[:, 1:][clusters]
