@@ -84,18 +84,16 @@ def wider(out: Batch, width: int) -> Batch:
     return wide
 
 
-def pack(part: Batch, partial: Bool) -> None:
-    """Move the branches of some targets to the front, nan behind."""
-    some = np.flatnonzero(partial)
-    if not len(some):
-        return
-    valid = part.valid[some]
-    count = valid.sum(axis=1)
-    row, column = np.nonzero(valid)
-    place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)  # each row's own 0, 1, 2 ...
-    for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
-        old = array[some]
-        new = np.full_like(old, missing)
-        new[row, place] = old[row, column]
-        array[some] = new
-    part.valid[some] = np.arange(valid.shape[1]) < count[:, None]
+def pack(part: Batch, count: NDArray[np.int64]) -> None:
+    """Move the branches of targets, count (N,) of them, to the front, nan behind; those of as many together."""
+    for c in np.flatnonzero(np.bincount(count)[: part.valid.shape[1]]).tolist():
+        rows = np.flatnonzero(count == c)
+        every = slice(None) if len(rows) == len(part.valid) else rows
+        valid = part.valid[every]
+        B = valid.shape[1]
+        there = np.flatnonzero(valid)
+        for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+            width = array.shape[2:]
+            kept = array[every].reshape(len(rows) * B, *width).take(there, axis=0).reshape(len(rows), c, *width)
+            array[every, :c], array[every, c:] = kept, missing
+        part.valid[every] = np.arange(B) < c

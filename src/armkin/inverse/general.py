@@ -19,7 +19,7 @@ from armkin.forward import fk
 from armkin.inverse.closed import spherical
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, AT_ZERO, EXACT
@@ -126,8 +126,11 @@ def _of_five(
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
         virtual = None if prefer[0] is None else Pair(1.0, 0.0)
         found = solve(goal, [virtual, *prefer] if first else [*prefer, virtual])
-        # the residual is to be that of the five joints: it vanishes where the virtual one is at zero
-        return found._replace(pairs=found.pairs[own], angles=found.angles[own], miss=None)
+        miss, pair = None, found.pairs[0 if first else 5]
+        if found.miss is not None and not found.angles and pair.s is not None:
+            # the five joints miss the target by as much as the virtual one is off zero
+            miss = found.miss + distance2(list(pair), [1.0, 0.0])
+        return found._replace(pairs=found.pairs[own], angles=found.angles[own], miss=miss)
 
     return pairs
 

@@ -16,24 +16,28 @@ from armkin.inverse import singularities
 from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, SAME, SEED, SOLUTION
+from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CLOSED = 1e-12  # residual of a branch that needs no correction
+SHORT = 1e-6  # [rad, reaches] a step whose square is below rounding
 
 
 class Regular(NamedTuple):
     """What is known of K targets: known (K,) whether anything is, branch (K, B) candidates that are its branches.
 
-    double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another.
+    double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another. q: (K, B, n) the candidates,
+    those of changed targets (K,) corrected.
     """
 
     known: Bool
     branch: Bool
     double: Bool
+    q: Array
+    changed: Bool
 
 
 def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Array) -> Regular:
@@ -42,6 +46,7 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     both = np.concatenate([near[:, None], q], axis=1).reshape(-1, n)
     r, J = newton.scaled(arm, task, both, np.repeat(target, B + 1, axis=0))
     size = np.sqrt((r * r).sum(axis=1)).reshape(K, B + 1)
+    q, valid, changed = _corrected(arm, task, q, valid, r, J, size[:, 1:], target)
     # `near` is no branch itself, accepted candidates need no correction, and others are beyond it
     known = (size[:, 0] > SOLUTION) & valid.any(axis=1)
     known &= ~(valid & ~(size[:, 1:] < CLOSED)).any(axis=1)
@@ -69,7 +74,30 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     known &= ((one | one.swapaxes(1, 2)).sum(axis=2) < 2).all(axis=1)
     second = size[:, None, 1:] < size[:, 1:, None]  # the more exact of two stays
     branch = valid & ~(one & second).any(axis=2) & ~(one & ~second).any(axis=1)
-    return Regular(known, branch, merged | (branch & (sigma < DOUBLE)).any(axis=1))
+    return Regular(known, branch, merged | (branch & (sigma < DOUBLE)).any(axis=1), q, changed)
+
+
+def _corrected(
+    arm: Arm, task: Task, q: Array, valid: Bool, r: Array, J: Array, size: Array, target: Array
+) -> tuple[Array, Bool, Bool]:
+    """Candidates, accepted ones and changed targets, after one step of those that are only just not accepted.
+
+    r, J: of `near` and the candidates; size: (K, B) residuals, those of corrected candidates are written into it.
+    """
+    B = valid.shape[1]
+    k, b = np.nonzero(~valid & (size < NEARBY))
+    changed = np.zeros(len(q), bool)
+    if not len(k):
+        return q, valid, changed
+    at = k * (B + 1) + b + 1
+    step = (np.linalg.pinv(J[at]) @ r[at, :, None])[:, :, 0]
+    better = q[k, b] + step * np.where(arm.prismatic, arm.reach, 1.0)
+    left = newton.missing(arm, task, better, target[k])
+    good = (np.abs(step).max(axis=1) < SHORT) & (left < CLOSED)
+    k, b = k[good], b[good]
+    q, valid = q.copy(), valid.copy()
+    q[k, b], valid[k, b], size[k, b], changed[k] = better[good], True, left[good], True
+    return q, valid, changed
 
 
 def _open(arm: Arm, task: Task, q: Array, valid: Bool, size: Array, sigma: Array, target: Array) -> Bool:

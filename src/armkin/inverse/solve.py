@@ -148,7 +148,7 @@ def _closed(
         if not full:
             count = valid.sum(axis=0)
             part.status[count == 0] = Status.UNREACHABLE
-            pack(part, count < B)
+            pack(part, count)
         if len(doubtful):
             q, loose = np.empty((*runner.axes, len(doubtful), arm.n)), np.zeros((*runner.axes, len(doubtful)), bool)
             for i, value in enumerate(values):
@@ -217,7 +217,7 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
     out.complete[...] = complete
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
-    pack(out, count < B)
+    pack(out, count)
     doubtful = np.flatnonzero(doubt)
     if examine and len(doubtful):
         solve = geometry.rows
