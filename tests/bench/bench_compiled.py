@@ -133,6 +133,8 @@ s = solve(goal)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 names = ("q", "valid", "within_limits", "branch", "status", "free", "complete", "rounding")
 results = sum(getattr(s, name).nbytes for name in names)
+if not np.shares_memory(s.target, goal):  # the results keep their own
+    results += s.target.nbytes
 print(results / 1e6, (peak - before - results) / 1e6)
 """
 
