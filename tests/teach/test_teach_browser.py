@@ -235,6 +235,21 @@ def test_a_telephone_s_window(browser: Browser, server: Server) -> None:
         assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
 
 
+def test_what_went_wrong_is_seen_wherever_one_has_scrolled_to(browser: Browser) -> None:
+    with (
+        served(board="sim") as server,
+        opened(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page,
+    ):
+        page.locator("#home").scroll_into_view_if_needed()
+        page.click("#home")  # it has no switches
+        until(page, "document.querySelector('#trouble').textContent.includes('homing')")
+        for part in ("#trouble", "#stop"):
+            box = page.locator(part).bounding_box()
+            assert box is not None
+            assert box["y"] >= 0
+            assert box["y"] + box["height"] < 300
+
+
 def test_without_webgl_everything_else_works(browser: Browser) -> None:
     blind = "HTMLCanvasElement.prototype.getContext = () => null"
     with served(board="sim") as server, opened(browser, server.address, script=blind, quiet=False) as page:
@@ -293,6 +308,11 @@ def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
         until(second, "document.querySelector('#control').textContent.includes('another page')")
         assert second.evaluate("document.querySelector('#panels').inert")
         aim(first, 390, 80, 300)
+        first.click("#record")
+        first.wait_for_selector("#player:not([hidden])")
+        until(second, "document.querySelector('#name-0')")
+        second.wait_for_timeout(300)
+        assert second.inner_text("#trouble") == second.inner_text("#planned") == ""  # who watches asks for nothing
         first.fill("#speed", "20")
         until(second, "document.querySelector('#box-0').value === '10.1529'")
         first.click("#send")
@@ -302,6 +322,7 @@ def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
         second.click("#take")
         until(first, "document.querySelector('#panels').inert")
         until(second, "!document.querySelector('#panels').inert")
+        second.wait_for_selector("#player:not([hidden])")  # whoever holds control has the plan
 
 
 def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
@@ -319,6 +340,7 @@ def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
         page.click("#save")
     file = tmp_path / "path.yaml"
     download.value.save_as(file)
+    assert "armkin path robots/three_dof.yaml three_dof_path.yaml" in page.inner_text("#saved").replace(f"{ROOT}/", "")
     plan = armkin.path(armkin.load(str(ROOT / "robots/three_dof.yaml")), str(file))
     until(page, f"document.querySelector('#planned').textContent.startsWith('{plan.duration:.3f} s')")
     page.click("#clear")

@@ -29,6 +29,7 @@ class Page {
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
     this.jobs = 0; // that the board has ended
+    this.mine = false; // whether this page holds control; one that watches asks for nothing
     const pose = async () => {
       await this.asking.idle();
       return this.q;
@@ -39,11 +40,20 @@ class Page {
     this.program = new Program(arm, {
       pose, settled: () => this.ask({}), show: (q) => this.turn(q), played: (q) => this.played(q),
       trail: (tips) => this.view?.trail(tips),
-      trouble: (text) => trouble(text, "program"),
+      trouble: (text) => trouble(text, "program"), mine: () => this.mine,
     });
     this.asking = new Latest((fields) => this.answer(fields));
     get("robot").textContent = arm.robot;
     document.title = `${arm.robot} - armkin teach`;
+  }
+
+  /** This page holds control from now on, or does not any more. @param {boolean} mine */
+  hold(mine) {
+    if (mine === this.mine) return;
+    this.mine = mine;
+    for (const source of ["page", "program", "board"]) trouble("", source);
+    this.program.planning.push({});
+    this.ask({});
   }
 
   /** Turn the joints. @param {number[]} q */
@@ -67,6 +77,7 @@ class Page {
 
   /** @param {object} fields */
   ask(fields) {
+    if (!this.mine) return;
     document.documentElement.dataset.asking = "yes";
     this.asking.push({ ...fields, held: [...this.joints.held], best: this.motors.best.checked });
   }
@@ -207,11 +218,17 @@ function theme(/** @type {string} */ name, /** @type {Page} */ page) {
 }
 
 async function start() {
-  /** @type {{page: Page | null}} of the news that may come before there is a page */
-  const here = { page: null };
+  /** @type {{page: Page | null, mine: boolean}} of the news that may come before there is a page */
+  const here = { page: null, mine: false };
+  /** @type {() => void} */
+  let told = () => {};
+  const known = new Promise((resolve) => (told = () => resolve(null)));
   /** @param {{holder: string, pages: number}} news */
   const control = ({ holder, pages }) => {
     const mine = holder === "yours";
+    here.mine = mine;
+    here.page?.hold(mine);
+    told();
     get("control").textContent = mine ? (pages > 1 ? `in control, ${pages - 1} watching` : "") : holder === "another"
       ? "watching: another page holds control" : "nobody holds control";
     get("take").hidden = mine;
@@ -249,7 +266,9 @@ async function start() {
   one.show(opened.look);
   one.program.show(opened.program);
   if (opened.board) one.board.show(opened.board);
+  one.hold(here.mine);
   await one.draw();
+  await known; // who holds control
   document.documentElement.dataset.ready = "yes";
 }
 

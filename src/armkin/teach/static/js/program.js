@@ -8,10 +8,11 @@ export class Program {
   /**
    * @param {import("./types.js").Arm} arm
    * @param {{pose: () => Promise<number[]>, settled: () => void, show: (q: number[]) => void, played: (q: number[]) => void,
-   *   trail: (tips: number[][]) => void, trouble: (text: string) => void}} page
+   *   trail: (tips: number[][]) => void, trouble: (text: string) => void, mine: () => boolean}} page
    */
   constructor(arm, page) {
     this.page = page;
+    this.robot = arm.robot_file;
     this.player = new Player(arm, page.played, page.settled);
     this.chosen = -1;
     this.count = 0;
@@ -66,7 +67,7 @@ export class Program {
   }
 
   async plan() {
-    if (!this.count) {
+    if (!this.count || !this.page.mine()) {
       this.player.load(null);
       this.page.trail([]);
       get("planned").textContent = "";
@@ -103,6 +104,7 @@ export class Program {
       const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/yaml" })), download: name });
       link.click();
       URL.revokeObjectURL(link.href);
+      get("saved").textContent = `armkin path ${this.robot} ${name} plans it again, armkin send ${this.robot} --path ${name} runs it.`;
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
     }
