@@ -115,6 +115,7 @@ class Page {
       this.view.haunt([]);
     } else if (ended) {
       this.ask({});
+      this.program.planning.push({}); // it starts where the arm stands
       this.show(this.look);
     } else this.haunt();
   }
@@ -258,7 +259,7 @@ async function start() {
   /** @type {Object<string, () => void>} */
   const actions = {
     r: () => one.program.record(),
-    p: () => one.program.player.toggle(),
+    p: () => one.program.play(),
     g: () => one.board.grip(one.board.open ? "closed" : "open"),
   };
   for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);

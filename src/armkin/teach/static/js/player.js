@@ -24,7 +24,6 @@ export class Player {
       this.go(this.slider.valueAsNumber);
     });
     this.slider.addEventListener("change", settled);
-    get("play").addEventListener("click", () => this.toggle());
     get("back").addEventListener("click", () => this.step(-1));
     get("forth").addEventListener("click", () => this.step(1));
   }

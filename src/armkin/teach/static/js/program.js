@@ -16,6 +16,9 @@ export class Program {
     this.player = new Player(arm, page.played, page.settled);
     this.chosen = -1;
     this.count = 0;
+    this.shown = "";
+    /** @type {Promise<void>} */
+    this.editing = Promise.resolve();
     this.planning = new Latest(() => this.plan());
     const click = (/** @type {string} */ id, /** @type {() => void} */ action) => get(id).addEventListener("click", action);
     click("record", () => this.record());
@@ -24,6 +27,7 @@ export class Program {
     click("redo", () => this.edit({ do: "redo" }));
     click("clear", () => this.edit({ do: "clear" }));
     click("save", () => this.save());
+    click("play", () => this.play());
     click("add-wait", () => this.edit({ do: "record", kind: "wait", seconds: 1 }));
     click("add-open", () => this.edit({ do: "record", kind: "grip", value: "open" }));
     click("add-close", () => this.edit({ do: "record", kind: "grip", value: "closed" }));
@@ -44,7 +48,12 @@ export class Program {
     }
   }
 
-  async record() {
+  record() {
+    this.editing = this.recorded();
+    return this.editing;
+  }
+
+  async recorded() {
     const kind = /** @type {HTMLSelectElement} */ (get("kind")).value;
     const index = this.chosen >= 0 && this.chosen < this.count - 1 ? { index: this.chosen } : {};
     this.chosen = index.index === undefined ? -1 : this.chosen + 1;
@@ -57,7 +66,13 @@ export class Program {
   }
 
   /** @param {string} action @param {object} fields */
-  async change(action, fields) {
+  change(action, fields) {
+    this.editing = this.changed(action, fields);
+    return this.editing;
+  }
+
+  /** @param {string} action @param {object} fields */
+  async changed(action, fields) {
     try {
       this.show(await act(action, fields));
       this.page.trouble("");
@@ -129,7 +144,19 @@ export class Program {
       const box = /** @type {HTMLInputElement} */ (get(`program-${key}`));
       if (document.activeElement !== box) box.value = state[key] === null ? "" : String(state[key]);
     }
+    const said = JSON.stringify(state);
+    if (said === this.shown) return; // the answer to an edit, and the news of it, are one
+    this.shown = said;
     this.planning.push({});
+  }
+
+  /** Play or pause; what has just been edited is planned first. */
+  async play() {
+    if (!this.player.playing) {
+      await this.editing;
+      await this.planning.idle();
+    }
+    this.player.toggle();
   }
 
   /** @param {import("./types.js").ProgramMove} move @param {number} k */
