@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from command_line import ROOT
@@ -101,3 +102,21 @@ def test_the_command_line_imports_next_to_nothing_before_it_takes_signals() -> N
     done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True)
     assert "typing" not in done.stdout.split()
     assert len(done.stdout.split()) < 20
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_ctrl_c_while_a_board_waits_for_the_plan_of_20_000_waypoints(tmp_path: Path) -> None:
+    """It took until the plan was whole, 16 s; nothing moves then, so that there is nothing to wait for."""
+    turns = np.cumsum(np.random.default_rng(1).choice([-1.0, 1.0], 20_000)) % 90
+    rows = "".join(f"{a:.1f},{90 - a / 3:.1f},{-90 + a / 5:.1f}\n" for a in turns)
+    (tmp_path / "rows.csv").write_text(rows)
+    command = [*ARMKIN, "send", str(ROOT / "robots/three_dof.yaml"), "--batch", "rows.csv", "--port", "sim"]
+    process = subprocess.Popen([*command, "--blend", "3"], cwd=tmp_path, stderr=subprocess.PIPE)
+    assert process.stderr is not None
+    assert b"simulated board" in process.stderr.readline()  # the port is open, and planning begins
+    time.sleep(0.3)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    assert b"stopped" in process.communicate(timeout=20)[1]
+    assert process.returncode == 130
+    assert time.monotonic() - began < 2.0  # 0.5 s on a machine that does nothing else

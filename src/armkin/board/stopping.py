@@ -14,6 +14,7 @@ class Stop:
 
     def __init__(self) -> None:
         self.signal = 0
+        self.at_once = False  # nothing moves: there is nothing to wait for
 
     def __call__(self) -> bool:
         return self.signal != 0
@@ -23,6 +24,27 @@ class Stop:
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number
+        if self.at_once:
+            raise StoppedError
+
+
+_active: list[Stop] = []  # signal handlers belong to the process, and so does who listens to them
+
+
+@contextmanager
+def planning() -> Iterator[None]:
+    """Work before anything moves: a signal ends it at once, within whatever `stoppable` it is done."""
+    if not _active:
+        yield
+        return
+    stop = _active[-1]
+    stop.at_once = True
+    try:
+        if stop():
+            raise StoppedError
+        yield
+    finally:
+        stop.at_once = False
 
 
 @contextmanager
@@ -31,10 +53,12 @@ def stoppable() -> Iterator[Stop]:
     stop = Stop()
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     before = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
+    _active.append(stop)
     try:
         yield stop
     except StoppedError:
         raise SystemExit(128 + stop.signal) from None
     finally:
+        _active.remove(stop)
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -175,6 +175,7 @@ def _carried_out(
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
     from armkin.board import following, resuming
     from armkin.board.moving import where
+    from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
     board, stands = linking.board_of(arm, rehearsal=port == SIM), linking.assumed(arm, assume)
@@ -182,10 +183,11 @@ def _carried_out(
         linking.prepare(arm, machine, assume, stands)
         held = linking.held(machine, resume)
         began = machine.counts() if held is None else held.start
-        plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
-        following.check_gripper(plan, board)
-        laid = following.parts(plan, began, machine.lay)
-        _files(plan, out, plot)
+        with planning():
+            plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
+            following.check_gripper(plan, board)
+            laid = following.parts(plan, began, machine.lay)
+            _files(plan, out, plot)
         with resuming.under_way(machine, laid, held) as (left, first, note), linking.told(left, note) as tell:
             following.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}

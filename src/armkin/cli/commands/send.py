@@ -89,6 +89,7 @@ def send(
     """
     from armkin.board.firmware.machine import Machine
     from armkin.board.moving import Planner, Stream, Total, where
+    from armkin.board.stopping import planning
 
     fraction = number(speed, "--speed") / 100
     if not 0 < fraction <= 1:
@@ -151,8 +152,9 @@ def send(
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
                 machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
         else:
-            plans = _all(planner, goals, began)  # every refusal before anything moves
-            _write_trace(arm, plans, trace)
+            with planning():
+                plans = _all(planner, goals, began)  # every refusal before anything moves
+                _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(machine, planner, plans, held)
         planned = planner.done.summary(began)
