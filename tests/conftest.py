@@ -9,11 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from slow import SLOW
+
 if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
     _NEEDS = ("pty_board", "pty_port", "import pty", "import fcntl", "emulator")
     _FILES = Path(__file__).parent.rglob("test_*.py")
     collect_ignore = [str(path) for path in _FILES if any(word in path.read_text("utf-8") for word in _NEEDS)]
 
+_HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
 _HELPERS = {"emulator", "measure", "bare_host"}
 _TOOLS = ("avr-gcc", "arm-none-eabi-gcc", "npm")
@@ -32,8 +35,10 @@ def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of the firmware; without its compiler they are skipped, and say why."""
+    """Mark slow tests, and those of the firmware; without its compiler they are skipped, and say why."""
     for item in items:
+        if _is_slow(item):
+            item.add_marker(pytest.mark.slow)
         if not _needs_emulator(item):
             continue
         item.add_marker(pytest.mark.emulator)
@@ -41,6 +46,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.xdist_group("emulator"))
         if any(shutil.which(tool) is None for tool in _TOOLS):
             item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
+
+
+def _is_slow(item: pytest.Item) -> bool:
+    names = SLOW.get(Path(item.path).relative_to(_HERE).as_posix()) if _HERE in Path(item.path).parents else None
+    return names is not None and (not names or getattr(item, "originalname", item.name) in names)
 
 
 def _needs_emulator(item: pytest.Item) -> bool:

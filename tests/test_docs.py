@@ -11,6 +11,7 @@ import armkin
 from armkin.errors import UsageError
 from armkin.inverse import recognise
 from armkin.robot_file import catalogue
+from slow import SLOW
 from test_architecture import MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
@@ -71,3 +72,9 @@ def test_the_sources_of_the_formulas_stand_in_the_code_too() -> None:
     for author in ("Pieper", "Hawkins", "Siciliano", "Raghavan", "Manocha", "Richter-Gebert"):
         assert author in text
         assert author in code
+
+
+def test_tests_that_are_called_slow_are_there() -> None:
+    for name, functions in SLOW.items():
+        text = (ROOT / "tests" / name).read_text()
+        assert all(f"def {function}(" in text for function in functions), name
