@@ -16,13 +16,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 import curve_on_pins
 import measure
+import measure_pico as pico
 import numpy as np
-from emulator import build_firmware
+from emulator import BUILD, PICO, build_firmware
 
 
 def flash_and_ram(board: str) -> tuple[int, int]:
     """Bytes of flash and of variables."""
-    out = subprocess.run(["avr-size", str(build_firmware(board))], capture_output=True, text=True, check=True).stdout
+    built = build_firmware(board)
+    size = ["arm-none-eabi-size", str(BUILD / f"{board}.elf")] if board == PICO else ["avr-size", str(built)]
+    out = subprocess.run(size, capture_output=True, text=True, check=True).stdout
     text, data, bss = map(int, out.splitlines()[1].split()[:3])
     return text + data, data + bss
 
@@ -57,6 +60,30 @@ def curves(places: int) -> None:
             off, accel = max(g.off_way_mm for g in got), max(g.accel for g in got)
             figures = f"known {known}, go on {on}, off {off:.3f} mm, {accel:.2f} of max_accel"
             row(f"{name}: {'cable cut' if cable else 'held'} at {places} places", figures)
+
+
+def pico_rows() -> None:
+    """The Pico's rows; no silicon has been measured."""
+    flash, ram = flash_and_ram(PICO)
+    row("pico6: flash, variables", f"{flash} B, {ram} B")
+    for interval in (pico.CLOCK // 100_000, 160):
+        got = pico.stepping(interval)
+        fault = "" if got.exact and not (got.overruns or got.violations) else "  FAULTS"
+        what = f"pico6: {got.rate / 1000:.0f} kHz on six axes, farthest edge"
+        row(what, f"{got.off_us:.3f} us, {got.overruns} overruns{fault}")
+    row("pico6: first step after the first batch", f"{pico.first_step_ms('uart'):.2f} ms")
+    for by, axes, rates, batch in (
+        ("USB", pico.SIX, (10_000, 15_000, 20_000), 11),
+        ("UART at 250000", (0, 1, 2, 3), (1_400, 1_550), 14),
+        ("UART at 250000", pico.SIX, (1_000, 1_100), 11),
+    ):
+        best = 0.0
+        for rate in rates:
+            got_rate, exact = pico.segments_per_second("usb" if by == "USB" else "uart", axes, rate, batch)
+            if not exact:
+                break
+            best = got_rate
+        row(f"pico6: segments a second of {len(axes)} axes, {by}", f"{best:.0f}")
 
 
 def main() -> None:
@@ -103,6 +130,7 @@ def main() -> None:
         stop = measure.hold(cause=cause)
         figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"
         row(f"{cause} from full speed / ideal ramp", figures, "173 / 133 ms" if cause == "hold" else "")
+    pico_rows()
     if seeds:
         runs = [measure.noise(seed) for seed in range(seeds)]
         good = sum(r.exact and r.on_path for r in runs)

@@ -140,6 +140,7 @@ class EmulatedBoard:
     `bootloader`: milliseconds that a bootloader takes after an external reset; it hides the reset's cause.
     `commands`: of the control channel, carried out before the program starts: ("pin A0 0",).
     `baud`: the host's true rate, if it shall differ from what the board has set.
+    `by`: which of a Pico's lines the port is.
     """
 
     def __init__(
@@ -156,6 +157,7 @@ class EmulatedBoard:
         baud: int | None = None,
         trace: bool = False,
         seed: int = 1,
+        by: Literal["uart", "usb"] = "uart",
     ) -> None:
         self.board = board
         self.clock_hz = CYCLES_HZ.get(board, CLOCK_HZ)
@@ -169,6 +171,8 @@ class EmulatedBoard:
             self._options.append("--no-reset-on-open")
         if baud is not None:
             self._options += ["--baud", str(baud)]
+        if by != "uart":
+            self._options += ["--by", by]
         for command in commands:
             self._options += ["--do", command]
         self._traced = trace

@@ -8,21 +8,17 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from bare_host import WIDE, BareHost, Batch, batches, image_for
 from emulator import BUILD, PICO, EmulatedBoard, build_firmware
+from golden import talks
+from measure_pico import CLOCK, KNOWN, SIX, net, ready, segments_per_second, stepping
 
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import Error, Flag, State, whole
 
-CLOCK = 25_000_000
-CYCLES = 5  # of the emulator's cycle counter, one of the board's clock
-SIX = (0, 1, 2, 3, 4, 5)
-KNOWN = {**dict.fromkeys(SIX, 0), 6: 1500, 7: 1500}
 MODERATE = replace(WIDE, lower=-50_000, upper=50_000, max_rate=8000, max_accel=160_000)
 TMC2209 = {"step_high": 1, "step_low": 1, "dir_setup": 1, "wake": 1}
-DRV8825 = {"step_high": 19, "step_low": 19, "dir_setup": 7, "wake": 2}
 
 
 @pytest.fixture
@@ -32,20 +28,10 @@ def board() -> Iterator[EmulatedBoard]:
         yield emulated
 
 
-def ready(board: EmulatedBoard, axis: protocol.AxisImage = MODERATE, **changes: object) -> BareHost:
-    host = BareHost(board)
-    host.setup(replace(image_for(PICO, axis, **DRV8825), **changes), KNOWN)  # type: ignore[arg-type]
-    return host
-
-
 def move(host: BareHost, start: int, steps: int) -> None:
     """X by `steps`, at 8,000 steps/s."""
     segment = whole(abs(steps), CLOCK // 8000, 0, (steps,))
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
-
-
-def net(board: EmulatedBoard) -> tuple[int, ...]:
-    return tuple(board.net().values())
 
 
 # The build
@@ -87,48 +73,11 @@ def test_it_fits_the_memory_with_room_for_the_stack() -> None:
 # Steps
 
 
-def edges_by_the_protocol(segments: list[protocol.Segment], axis: int) -> list[int]:
-    """Clock cycles, from the first tick, at which an axis's STEP rises: PROTOCOL.md, section 6, word for word."""
-    out, now, place = [], 0, protocol.HALF
-    for segment in segments:
-        interval, add = segment.interval << 16, segment.add
-        for tick in range(1, segment.ticks + 1):
-            now += interval >> 16
-            interval += add >> 8
-            if (segment.ticks - tick) % 16 == 0:
-                add += 4 * segment.bend
-            before = place // protocol.STEP
-            place += segment.rates[axis]
-            if place // protocol.STEP != before:
-                out.append(now)
-    return out
-
-
-def test_six_axes_at_100_khz_and_every_edge_is_where_the_protocol_puts_it(board: EmulatedBoard) -> None:
-    host = ready(board, replace(WIDE, max_rate=150_000, max_accel=1 << 23))
-    ways = (1, -1, 1, -1, 1, 0.6)
-    pairs = [(100, 1000), (100, 500), (100, 333), (1500, 250), (100, 300), (100, 400), (100, 1000)]
-    there = [whole(n, interval, 0, tuple(round(n * way) for way in ways)) for n, interval in pairs]
-    back = [replace(s, rates=tuple(-r for r in s.rates)) for s in there]
-    work = batches(SIX, (0,) * 6, there, 4)
-    work += batches(SIX, work[-1].end, back, 4)
-    status = host.stream(work)
-    assert (status.error, status.overruns) == (0, 0)
-    assert status.counts[:6] == work[-1].end == net(board)
-    trace = board.trace()
-    first = trace.rises("X.STEP")[0]
-    for axis, name in enumerate("XYZABC"):
-        rises = trace.rises(f"{name}.STEP")
-        half = np.array(edges_by_the_protocol(there, axis))
-        mine = rises[: len(half)]
-        assert np.array_equal((mine - first) // CYCLES, half - edges_by_the_protocol(there, 0)[0])
-        assert len(rises) == 2 * len(half)
-    figures = board.stats()["axes"]
-    assert figures["X"]["interval_min_us"] == pytest.approx(10, abs=0.01)
-    for axis_figures in figures.values():
-        assert sum(axis_figures["violations"].values()) == 0
-        assert axis_figures["positive"] == axis_figures["negative"] > 1200
-        assert axis_figures["high_min_us"] == pytest.approx(1.92)
+def test_six_axes_at_100_khz_and_every_edge_is_where_the_protocol_puts_it() -> None:
+    got = stepping(CLOCK // 100_000, ticks=1500)
+    assert got.exact
+    assert (got.rate, got.off_us, got.overruns, got.violations) == (100_000, 0, 0, 0)
+    assert got.high_us == pytest.approx(1.92)
 
 
 def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard) -> None:
@@ -150,7 +99,7 @@ def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard)
 def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: EmulatedBoard) -> None:
     board.control("set-switch C at 3000 above")
     guards = (*[protocol.GuardImage()] * 5, protocol.GuardImage(False, (0, 0, 0, 0, 0, 1, 0, 0)))
-    host = ready(board, guards=guards)
+    host = ready(board, MODERATE, guards=guards)
     segment = whole(20_000, CLOCK // 8000, 0, (20_000,))
     host.order(Batch((5,), (0,), (segment,), at_rest=True).payload(0))
     host.run(0.3)
@@ -170,7 +119,7 @@ def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: Emula
 
 
 def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
-    host = ready(board)
+    host = ready(board, MODERATE)
     move(host, 0, 20_000)
     host.run(0.2)
     board.control("pin GP26 0")
@@ -189,7 +138,7 @@ def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
 
 def test_a_cut_of_the_motors_power_is_a_lost_position(board: EmulatedBoard) -> None:
     board.control("pin GP27 1")
-    host = ready(board, power_sensed=True)
+    host = ready(board, MODERATE, power_sensed=True)
     move(host, 0, 20_000)
     host.run(0.2)
     board.control("pin GP27 0")
@@ -200,7 +149,7 @@ def test_a_cut_of_the_motors_power_is_a_lost_position(board: EmulatedBoard) -> N
 
 
 def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None:
-    host = ready(board)
+    host = ready(board, MODERATE)
     move(host, 0, 20_000)
     host.run(0.2)
     board.control("cut both")
@@ -217,7 +166,7 @@ def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None
 @pytest.mark.parametrize("where", [-3000, 40])
 def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int) -> None:
     board.control(f"set-switch B at {where} below")
-    host = ready(board)
+    host = ready(board, MODERATE)
     rate = (0, 0, 0, 0, -4000, 0, 0, 0)
     host.order(protocol.home(0, switch=4, closed=False, slow=26, backoff=300, travel=8000, time=200, rate=rate))
     status = host.rest()
@@ -229,7 +178,7 @@ def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int)
 @pytest.mark.parametrize("cause", ["external", "watchdog", "power"])
 @pytest.mark.parametrize("moving", [False, True])
 def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: str, moving: bool) -> None:
-    host = ready(board)
+    host = ready(board, MODERATE)
     move(host, 0, 1000)
     host.run(0.05 if moving else 0.2)
     board.control(f"reset {cause}")
@@ -248,7 +197,7 @@ def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: st
 
 
 def test_a_program_that_hangs_is_reset_by_the_watchdog(board: EmulatedBoard) -> None:
-    host = ready(board)
+    host = ready(board, MODERATE)
     board.control("hang")
     host.run(0.3)
     info = host.hello(2)
@@ -300,3 +249,42 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
         at = status.counts[:6]
     board.control("restore")
     assert at == end == net(board)
+
+
+# USB
+
+
+@pytest.mark.parametrize("name", ["move_pico6.talk", "refuse_pico6.talk"])
+def test_the_golden_conversations_over_usb(name: str) -> None:
+    talk = next(t for t in talks() if t.name == name)
+    with EmulatedBoard(PICO, speed="step", by="usb") as board:
+        board.run(0.05)  # until the host has set it up
+        assert talk.replay(board) > 10
+        usb = board.stats()["usb"]
+        assert usb["connected"]
+        assert usb["received"] > 500
+        assert board.stats()["uart"]["received"] == 0
+
+
+def test_twenty_thousand_segments_a_second_over_usb() -> None:
+    rate, exact = segments_per_second("usb", SIX, 20_000, batch=11)
+    assert exact
+    assert rate >= 19_999
+
+
+def test_fifteen_hundred_segments_a_second_over_the_uart() -> None:
+    rate, exact = segments_per_second("uart", (0, 1, 2, 3), 1_550, batch=14, count=400)
+    assert exact
+    assert rate >= 1_500
+
+
+def test_a_tick_that_is_brought_too_late_is_told_and_ends_in_a_hold(board: EmulatedBoard) -> None:
+    host = ready(board, MODERATE)
+    move(host, 0, 20_000)
+    host.run(0.2)
+    board.control("absent 200us")  # an edge is due every 125 us
+    host.run(0.1)
+    status = host.rest()
+    assert (status.error, status.known) == (Error.OVERRUN, 0xFF)
+    assert status.counts[0] == net(board)[0]
+    assert 8000 * 0.2 < status.counts[0] < 8000 * 0.3

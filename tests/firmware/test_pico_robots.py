@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from emulator import PICO, EmulatedBoard
@@ -21,11 +23,12 @@ ARMS = {
 def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
     robot = ROOT / "robots" / f"{name}.yaml"
     pose = ARMS[name]
+    by: Literal["uart", "usb"] = "usb" if name == "parol6_pico6" else "uart"
     planned = run("send", robot, *pose, "--dry-run", "--json")
     assert planned.code == 0, planned.err
     rehearsed = run("send", robot, *pose, "--port", "sim", "--json")
     assert rehearsed.code == 0, rehearsed.err
-    with EmulatedBoard(PICO, speed="max", trace=True, driver="tmc2209") as board:
+    with EmulatedBoard(PICO, speed="max", trace=True, driver="tmc2209", by=by) as board:
         sent = run("send", robot, *pose, "--port", board.port, "--assume-home", "--json")
         assert sent.code == 0, sent.err
         assert sent.json["pulses"] == rehearsed.json["pulses"] == planned.json["pulses"]

@@ -8,6 +8,7 @@ import { CLOCK_HZ, Chip, readUf2 } from './chip.mjs';
 import { Commands } from './commands.mjs';
 import { Line } from './line.mjs';
 import { Pins } from './pins.mjs';
+import { Usb } from './usb.mjs';
 
 const SLICE = CLOCK_HZ / 4000;
 
@@ -17,6 +18,7 @@ const { values: options } = parseArgs({
     speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, 'no-reset-on-open': { type: 'boolean' },
     driver: { type: 'string', default: 'a4988' }, do: { type: 'string', multiple: true, default: [] }, baud: { type: 'string', default: '250000' },
     trace: { type: 'string' }, seed: { type: 'string', default: '1' }, fd: { type: 'string' },
+    by: { type: 'string', default: 'uart' },
   },
 });
 
@@ -33,21 +35,28 @@ const line = new Line(
   },
   (byte, cycle) => pins.record(250, byte, cycle),
 );
+const usb = new Usb((byte, cycle) => {
+  heard.push(byte);
+  pins.record(251, byte, cycle);
+});
+const host = options.by === 'usb' ? usb : line; // what the port is connected to
 const chip = new Chip(
   readUf2(fs.readFileSync(options.elf)),
   (rp2040, self) => {
     pins.attach(rp2040, self);
     line.attach(rp2040, self);
+    usb.attach(rp2040, self);
   },
   Number(options.seed),
 );
-const commands = new Commands({ chip, pins, line, heard, stepped });
+const commands = new Commands({ chip, pins, line, usb, host, heard, stepped });
 chip.outside = {
   get next() {
-    return Math.min(line.next, commands.next);
+    return Math.min(line.next, usb.next, commands.next);
   },
   due(cycle) {
     line.due(cycle);
+    usb.due(cycle);
     commands.due(cycle);
   },
 };
@@ -64,10 +73,12 @@ for (const command of options.do) {
   }
 }
 say({ ok: true, port: options.port, board: 'pico6' });
-if (options.stdin) {
+if (options.stdin || process.stdin.isTTY) {
   const lines = readline.createInterface({ input: process.stdin });
   lines.on('line', (text) => say(commands.carryOut(text)));
-  lines.on('close', end);
+  if (options.stdin) {
+    lines.on('close', end);
+  }
 }
 
 function end() {
@@ -112,7 +123,7 @@ function turn() {
 if (!stepped) {
   port = new net.Socket({ fd: Number(options.fd), readable: true, writable: true });
   port.on('data', (data) => {
-    line.write(data);
+    host.write(data);
     spoken = chip.cycle;
   });
   port.on('error', end);

@@ -57,6 +57,7 @@ export class Chip {
     this.outside = { next: Infinity, due: () => {} };
     this.sram = null;
     this.pendingReset = null;
+    this.absent = 0; // cycles that the processor does nothing: an interrupt that is held off
     this.boot('power');
   }
 
@@ -99,6 +100,15 @@ export class Chip {
     core.exceptionEntry = (number) => {
       this.extra += EXCEPTION_ENTRY;
       entry(number);
+    };
+    // With interrupts off, WFI ends when one is pending, and it is taken once they are on again; rp2040js takes it at once.
+    const check = core.checkForInterrupts.bind(core);
+    core.checkForInterrupts = () => {
+      if (core.waiting && core.PM) {
+        core.waiting = !(core.pendingInterrupts & core.enabledInterrupts);
+        return false;
+      }
+      return check();
     };
     core.exceptionReturn = (value) => {
       this.extra += EXCEPTION_RETURN;
@@ -212,7 +222,10 @@ export class Chip {
       if (core.waiting && core.pendingInterrupts & core.enabledInterrupts) {
         core.waiting = false; // an interrupt that was pending before WFI ends it at once, which rp2040js misses
       }
-      if (core.waiting) {
+      if (this.absent) {
+        this.cycle += this.absent;
+        this.absent = 0;
+      } else if (core.waiting) {
         const next = Math.min(end, Math.ceil(alarm), this.pioNext);
         this.cycle = Math.max(next, this.cycle + 1);
       } else {

@@ -63,7 +63,7 @@ export class Commands {
       const { chip, pins, line } = this;
       return {
         board: 'pico6', mcu: 'rp2040', clock_hz: CLOCK_HZ, state: chip.booted ? 'running' : 'no boot block', seconds: chip.cycle / CLOCK_HZ,
-        resets: chip.resets, last_reset: chip.lastReset, ...pins.stats(), uart: line.stats(), line: line.ways,
+        resets: chip.resets, last_reset: chip.lastReset, ...pins.stats(), uart: line.stats(), usb: this.usb.stats(), line: line.ways,
       };
     },
 
@@ -142,7 +142,7 @@ export class Commands {
       }
       const end = this.chip.cycle + cycles(time);
       const until = rest[0] === 'until' ? bytes(rest.splice(0, 2)[1])[0] : null;
-      this.line.write(bytes(rest[0] ?? ''));
+      this.host.write(bytes(rest[0] ?? ''));
       const { heard } = this;
       let seen = 0;
       this.chip.runUntil(end, () => {
@@ -162,6 +162,11 @@ export class Commands {
 
     flush() {
       this.pins.flush();
+    },
+
+    /** The processor does nothing for so long. */
+    absent([time]) {
+      this.chip.absent = cycles(time);
     },
 
     /** The program runs in a circle from here on. */

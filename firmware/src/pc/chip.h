@@ -2,6 +2,8 @@
 #pragma once
 #include <stdint.h>
 
+#include "../plain.h"
+
 #define HAL_LOCK() {
 #define HAL_UNLOCK() }
 #define HAL_BARRIER() __asm__ volatile("" ::: "memory")
@@ -13,22 +15,3 @@
 #else
 #define HAL_RECEIVE 127
 #endif
-
-typedef uint32_t fine_t;
-typedef int32_t sfine_t;
-
-void dda_direction(uint16_t back);
-
-// Kept to 24 bits by hand.
-#define DDA_AXIS(i, ...)                                   \
-    {                                                      \
-        const uint32_t sum = dda.phase[i] + dda.rate[i];    \
-        bits |= (sum >> 24) << (i);                        \
-        dda.phase[i] = sum & 0xFFFFFF;                     \
-    }
-
-#define DDA_ADVANCE(planned)            \
-    planned = dda.interval >> 16;       \
-    dda.interval += dda.add >> 8;
-
-#define HAL_NEAR(pointer)

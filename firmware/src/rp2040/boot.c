@@ -41,6 +41,7 @@ extern uint32_t ram_begin[], ram_end[], ram_image[], bss_begin[], bss_end[], sta
 void __attribute__((interrupt)) pio_interrupt(void);
 void __attribute__((interrupt)) timer_interrupt(void);
 void __attribute__((interrupt)) uart_interrupt(void);
+void __attribute__((interrupt)) usb_interrupt(void);
 
 // Nothing is fed any more, so STEP stays low; the watchdog makes it a reset in motion: the position is lost.
 __attribute__((section(".flash"), noreturn)) static void fault(void) {
@@ -60,11 +61,10 @@ __attribute__((section(".flash"), noreturn, optimize("no-tree-loop-distribute-pa
     fault();
 }
 
-typedef void (*vector)(void);
 #define VECTORS                                                                                                \
     {                                                                                                          \
         [0] = (vector)stack_top, [1] = start, [2] = fault, [3] = fault, [11] = fault, [14] = fault, [15] = fault, \
-        [16 + IRQ_TIMER0] = timer_interrupt, [16 + IRQ_PIO0] = pio_interrupt, [16 + IRQ_UART0] = uart_interrupt   \
+        [16 + IRQ_TIMER0] = timer_interrupt, [16 + IRQ_USB] = usb_interrupt, [16 + IRQ_PIO0] = pio_interrupt, [16 + IRQ_UART0] = uart_interrupt   \
     }
 __attribute__((section(".vectors"), used)) static const vector first_vectors[48] = VECTORS;
 __attribute__((aligned(256))) const vector vectors[48] = VECTORS;  // in RAM

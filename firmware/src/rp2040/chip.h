@@ -2,6 +2,8 @@
 #pragma once
 #include <stdint.h>
 
+#include "../plain.h"
+
 #define HAL_BARRIER() __asm__ volatile("dmb" ::: "memory")
 #define HAL_LOCK()                                                       \
     {                                                                    \
@@ -15,22 +17,3 @@
 #define HAL_TABLE
 #define HAL_READ32(p) (*(p))
 #define HAL_RECEIVE RECEIVE
-
-typedef uint32_t fine_t;
-typedef int32_t sfine_t;
-
-void dda_direction(uint16_t back);
-
-// The upper 24 bits of a register would do, but the core keeps phases in the lower ones.
-#define DDA_AXIS(i, ...)                                 \
-    {                                                    \
-        const uint32_t sum = dda.phase[i] + dda.rate[i]; \
-        bits |= (sum >> 24) << (i);                      \
-        dda.phase[i] = sum & 0xFFFFFF;                   \
-    }
-
-#define DDA_ADVANCE(planned)        \
-    planned = dda.interval >> 16;   \
-    dda.interval += dda.add >> 8;
-
-#define HAL_NEAR(pointer)

@@ -5,9 +5,8 @@
 #include "../core/protocol.h"
 #include "pico.h"
 
-enum { SERVO_PERIOD_MS = 20, BYTES_AT_ONCE = 64, MS = 1000 };
+enum { SERVO_PERIOD_MS = 20, MS = 1000 };
 
-extern const uint32_t vectors[];
 volatile bool awake;
 
 static uint32_t last;  // microsecond of the last millisecond
@@ -41,7 +40,7 @@ static void sleep(void) {
     }
 }
 
-int main(void) {
+__attribute__((noinline)) int main(void) {  // not into start(), which stays in the flash
     REG(VTOR) = (uint32_t)vectors;
     const uint8_t cause = reset_cause();
     clocks_setup();
@@ -56,12 +55,12 @@ int main(void) {
     irq_enable(IRQ_TIMER0, 3);
     watchdog_start();  // for hangs only
     for (;;) {
-        uint8_t byte;
+        const uint8_t *bytes;
         awake = false;
         watchdog_feed();
-        for (uint8_t n = 0; n < BYTES_AT_ONCE && serial_get(&byte); n++) {
-            protocol_byte(byte);
-            awake = true;
+        const uint8_t count = serial_get(&bytes);
+        for (uint8_t n = 0; n < count; n++) {
+            protocol_byte(bytes[n]);
         }
         milliseconds();
         protocol_poll();

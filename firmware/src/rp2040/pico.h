@@ -3,13 +3,21 @@
 #include "../board.h"
 #include "rp2040.h"
 
+typedef void (*vector)(void);
+extern const vector vectors[];
+
 extern volatile bool awake;  // an interrupt has left something for the main loop
 
 void stepper_setup(void);
 
 void serial_setup(void);
-bool serial_get(uint8_t *byte);
+uint8_t serial_get(const uint8_t **bytes);  // so many that came, in a row; the call takes them
 void serial_pump(void);  // bytes to send, as the line takes them
+
+void usb_setup(void);
+uint8_t usb_get(const uint8_t **bytes);
+bool usb_ready(void);  // for a packet of at most 63 bytes
+void usb_send(const uint8_t *data, uint8_t length);
 
 void servo_setup(void);
 void servo_frame(void);  // every 20 ms

@@ -1,4 +1,4 @@
-// The serial line: UART 0 on GP0 and GP1.
+// The serial line: UART 0 on GP0 and GP1, or the USB. Both listen; answers go where the last byte came from.
 #ifdef __arm__
 #include "../core/hal.h"
 #include "pico.h"
@@ -14,10 +14,12 @@ enum { RX_EMPTY = 1 << 4, TX_FULL = 1 << 5 };              // FR
 enum { RECEIVED = 1 << 4, TIMED_OUT = 1 << 6 };            // IMSC: four bytes wait, or fewer and nothing follows
 enum { OVERRUN = 1 << 11 };                                // DR
 
-static uint8_t received[RING], sending[SENDING];
+enum { AT_ONCE = 64 };  // bytes, between two looks at the clock
+static uint8_t received[RING], taken[AT_ONCE], sending[SENDING];
 static volatile bool spilled;
 static volatile uint16_t received_head, received_tail;
 static uint16_t sending_head, sending_tail;
+static bool by_usb;
 
 void uart_interrupt(void) {
     while (!(REG(UART_FR) & RX_EMPTY)) {
@@ -35,14 +37,32 @@ void uart_interrupt(void) {
     awake = true;
 }
 
-bool serial_get(uint8_t *byte) {
-    const uint16_t tail = received_tail;
-    if (tail == received_head) {
-        return false;
+static void speak(bool usb) {
+    if (by_usb != usb) {
+        by_usb = usb;
+        sending_tail = sending_head;  // it was for the other line
     }
-    *byte = received[tail];
-    received_tail = (tail + 1) & MASK;
-    return true;
+}
+
+uint8_t serial_get(const uint8_t **bytes) {
+    const uint16_t tail = received_tail, head = received_head;
+    if (tail == head) {
+        const uint8_t count = usb_get(bytes);
+        if (count) {
+            speak(true);
+        }
+        return count;
+    }
+    speak(false);
+    const uint16_t run = (head > tail ? head : RING) - tail;
+    const uint8_t count = run < AT_ONCE ? run : AT_ONCE;
+    for (uint8_t n = 0; n < count; n++) {
+        taken[n] = received[tail + n];
+    }
+    *bytes = taken;
+    received_tail = (tail + count) & MASK;
+    awake = true;  // there may be more
+    return count;
 }
 
 bool hal_spilled(void) {
@@ -63,8 +83,27 @@ void hal_send(uint8_t byte) {
     sending_head = (sending_head + 1) & SENDING_MASK;
 }
 
+// A packet is shorter than it may be: a full one would want an empty one behind it (USB 2.0, 5.8.3).
+static void pump_usb(void) {
+    uint8_t packet[63], length = 0;
+    if (!usb_ready()) {
+        return;
+    }
+    while (sending_tail != sending_head && length < sizeof packet) {
+        packet[length++] = sending[sending_tail];
+        sending_tail = (sending_tail + 1) & SENDING_MASK;
+    }
+    if (length) {
+        usb_send(packet, length);
+    }
+}
+
 // The UART keeps 32 bytes: 1.3 ms at 250000 baud, and the main loop turns once a millisecond.
 void serial_pump(void) {
+    if (by_usb) {
+        pump_usb();
+        return;
+    }
     while (sending_tail != sending_head && !(REG(UART_FR) & TX_FULL)) {
         REG(UART_DR) = sending[sending_tail];
         sending_tail = (sending_tail + 1) & SENDING_MASK;
@@ -83,5 +122,6 @@ void serial_setup(void) {
     pin_function(UART_TX_PIN, F_UART, PAD_4MA);
     pin_function(UART_RX_PIN, F_UART, PAD_INPUT | PAD_UP | PAD_SCHMITT);
     irq_enable(IRQ_UART0, 1);
+    usb_setup();
 }
 #endif

@@ -190,6 +190,7 @@ _LOOKS = {
     (0x1A86, 0x7523): "CH340: a Uno or Mega clone?",
     (0x1A86, 0x5523): "CH341: a Uno or Mega clone?",
     (0x0403, 0x6001): "FTDI: an older Arduino?",
+    (0x1209, 0x0001): "pico6?",  # pid.codes' number for tests, which armkin's Pico has
 }
 
 
