@@ -67,8 +67,8 @@ def correct(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6, least
         before = best_size[active]
         better = size < before
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
-        # done when rounding is all that is left, or what no step takes away: at a root of any order each takes half
-        least_gain = np.isfinite(size) & (size > 1e-15) & ((size > 1e-8) | (size < 0.5 * before))
+        # done when rounding is all that is left
+        least_gain = np.isfinite(size) & (size > 1e-15) & ((size > 1e-11) | (size < 0.5 * before))
         going = least_gain if k else np.isfinite(size) & (size > 0)
         active, r, size = active[going], r[going], size[going]
         if k == steps or not len(active):
