@@ -103,11 +103,11 @@ def main() -> None:
         flash, ram = flash_and_ram(board)
         row(f"{board}: flash, variables", f"{flash} B, {ram} B", grbl)
     for board in ("uno_cnc_shield", "mega_ramps14"):
-        got = measure.stepping(board, 25_000, seconds=2.0)
-        fault = "" if got.exact and not (got.overruns or got.violations or got.error) else "  FAULTS"
-        figures = f"{got.jitter_us:.1f} us, {got.overruns} overruns{fault}"
+        run = measure.stepping(board, 25_000, seconds=2.0)
+        fault = "" if run.exact and not (run.overruns or run.violations or run.error) else "  FAULTS"
+        figures = f"{run.jitter_us:.1f} us, {run.overruns} overruns{fault}"
         row(f"{board}: 25 kHz on all, jitter p2p", figures, "misses ticks" if board == "uno_cnc_shield" else "")
-        row(f"{board}: stack never touched", f"{got.stack_free} B")
+        row(f"{board}: stack never touched", f"{run.stack_free} B")
     top = measure.ceiling("uno_cnc_shield", range(30_000, 36_000, 500))
     row("uno_cnc_shield: clean up to, 4 axes + servo", f"{top / 1000:.1f} kHz", "20 kHz, 3 axes")
     top = measure.ceiling("mega_ramps14", range(25_000, 28_000, 500))
@@ -126,6 +126,12 @@ def main() -> None:
                 break
             best = got_rate
         row(f"short segments a second at {baud}", f"{best:.0f}", grbl)
+    for speed, grbl in ((1.0, "73 us (X)"), (0.2, "88 us (X)"), (0.05, "354 us (X)"), (0.02, "")):
+        got = measure.smoothness(speed)
+        figures = " / ".join(f"{one.peak_to_peak_us:.0f}" for one in got)
+        row(f"step intervals at {speed:.0%}, X / Y / Z, peak to peak", f"{figures} us", grbl)
+        worst = max(one.worst for one in got)
+        row("  worst of all, ramps included, of max(60 us, 2 %)", f"{worst:.0%}")
     for cause in ("hold", "abort", "silence"):
         stop = measure.hold(cause=cause)
         figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armkin.board.firmware import segments
+from armkin.board.firmware import lines, segments
 from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.protocol import Segment
 from armkin.board.sim.velocity import times_valid
@@ -74,7 +74,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
     rate = data.draw(st.floats(500, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
     accel = min(400_000, rate / data.draw(RAMPS))
-    move = segments.line(start, end, rate / max(n, 1), accel / max(n, 1))
+    move = lines.line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
     for s in move.segments:
@@ -108,7 +108,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 20_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 400_000))
 def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
-    move = segments.line([0], [n], rate / n, accel / n)
+    move = lines.line([0], [n], rate / n, accel / n)
     times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
     place = np.cumsum([0, *(s.ticks * s.rates[0] / 2**23 for s in move.segments)])
     # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
@@ -124,17 +124,17 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
 @given(st.integers(1, 5_000), st.floats(500, CLOCK / MIN_INTERVAL), st.floats(0.002, 0.03))
 def test_a_short_ramp_pays_for_no_long_cruise(n: int, rate: float, ramp: float) -> None:
     """Whole cycles an interval once left a long cruise 0.1 ms too long, and the next piece a quarter too fast."""
-    move = segments.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
+    move = lines.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
     gaps = np.diff(np.array(tick_times(move.segments)), prepend=0)
     per_tick = np.repeat([abs(s.rates[0]) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
-    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.12
+    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.03  # whole cycles an interval
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 30_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 200_000))
 def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
-    move = segments.line([0], [n], rate / n, accel / n)
+    move = lines.line([0], [n], rate / n, accel / n)
     length = [segments.cycles_of(s) / CLOCK for s in move.segments]
     for i in range(len(length) - 30):
         s = list(move.segments)[i]
@@ -191,7 +191,7 @@ def test_a_start_outside_the_limits_may_come_back(three_dof: Arm) -> None:
 def test_missing_rates_are_named() -> None:
     arm = arms.load("robots/planar_2dof.yaml")
     with pytest.raises(
-        UsageError, match=r"joints q1, q2 have no max_speed, .* add to robots/planar_2dof.yaml:\n  max_speed: \.\.\."
+        UsageError, match=r"joints q1, q2 have no max_speed, .* add to robots/planar_2dof.yaml:\n  max_speed: 30 "
     ):
         plan_moves(arm, [1500, 1500], [0.1, 0.1])
 
@@ -226,10 +226,10 @@ def test_a_piece_at_rest_has_one_speed() -> None:
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     law = profile.trapezoid(1.0, 0.06, 2.0)
-    whole = segments.LineSegments(np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, False)
+    whole = lines.LineSegments(np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, False)
     once = list(whole)
-    assert len(once) == len(whole) == segments.count(law) > 40
-    monkeypatch.setattr(segments, "_AT_ONCE", 3)
+    assert len(once) == len(whole) == lines.count(law, 90_001) > 40
+    monkeypatch.setattr(lines, "_AT_ONCE", 3)
     assert list(whole) == once
 
 

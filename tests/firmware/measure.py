@@ -11,9 +11,14 @@ from pathlib import Path
 import numpy as np
 from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for, run_up
 from emulator import BUILD, FIRMWARE, EmulatedBoard, make
+from numpy.typing import NDArray
 
+import armkin
 from armkin.board.firmware import protocol
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import plan
 from armkin.board.firmware.protocol import whole
+from armkin.motion.profile import Profile
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order
 
@@ -256,3 +261,59 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
         net = emulated.stats()["axes"]
         exact = at == end and tuple(net[a]["net"] for a in "XYZ") == end
         return Noise(exact, on_path and bool((np.diff(x) > 0).all()), sessions, host.resent, host.time)
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """How far step intervals of one axis are from those of the time law, ramps included."""
+
+    axis: str
+    peak_to_peak_us: float  # of the cruise
+    period_us: float  # there
+    worst: float  # greatest deviation of any step of the move, over max(60 us, 2 % of its period)
+
+
+def smoothness(speed: float) -> list[Smooth]:
+    """The published move of three axes, at a share of the joints' speeds: from the edges on the pins."""
+    arm = armkin.load("three_dof")
+    configuration = configure(arm)
+    cut = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]), speed=speed, min_interval=448)
+    move = next(cut.moves())
+    work = [protocol.Segment(80, 20_000, 0, (0, 0, 0)), *move.segments]  # a pause in front, while the queue fills
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        host.setup(configuration.image, {0: 0, 1: 0, 2: 0})
+        status = host.stream(batches((0, 1, 2), (0, 0, 0), work, 5), give_up=200.0, poll=0.1)
+        assert status.error == 0, status
+        assert status.counts[:3] == tuple(cut.end.tolist())
+        trace = emulated.trace()
+        law = cut.trajectory.stretches[0].law  # type: ignore[attr-defined]
+        return [
+            _smooth(name, trace.rises(f"{name}.STEP") / CLOCK, int(n), law)
+            for name, n in zip("XYZ", cut.end, strict=True)
+        ]
+
+
+def _smooth(name: str, seconds: NDArray[np.float64], steps: int, law: Profile) -> Smooth:
+    """Intervals between an axis's steps against the trapezoid's: when it has passed 1/2, 3/2, ... steps."""
+    share = (np.arange(abs(steps)) + 0.5) / abs(steps)
+    ramp = law.peak / law.accel
+    way = law.peak * ramp / 2
+    exact = np.where(
+        share < way,
+        np.sqrt(2 * share / law.accel),
+        np.where(
+            share > 1 - way,
+            law.duration - np.sqrt(2 * np.maximum(1 - share, 0) / law.accel),
+            ramp + (share - way) / law.peak,
+        ),
+    )
+    off, period = np.diff(seconds) - np.diff(exact), np.diff(exact)
+    cruise = (exact[:-1] > ramp) & (exact[1:] < law.duration - ramp)
+    return Smooth(
+        name,
+        float(np.ptp(off[cruise])) * 1e6,
+        float(np.median(period[cruise])) * 1e6,
+        float((np.abs(off) / np.maximum(60e-6, 0.02 * period)).max()),
+    )

@@ -60,3 +60,11 @@ def test_noise_on_both_lines_moves_nothing_wrong(seed: int) -> None:
     assert got.resent > 100  # the noise was there
     assert got.on_path
     assert got.exact
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.2])
+def test_steps_come_when_the_time_law_says_ramps_included(speed: float) -> None:
+    """Every interval, from the first step to the last, to 60 us or 2 % of its period; the cruise peak to peak."""
+    for got in measure.smoothness(speed):
+        assert got.worst <= 1.2, got  # the interrupt's own latency comes on top of the arithmetic
+        assert got.peak_to_peak_us <= max(60, 0.02 * got.period_us) + 8, got

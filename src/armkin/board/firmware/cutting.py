@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move, along, count
+from armkin.board.firmware.lines import along, count
+from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.plan import check_limits, check_rates
@@ -66,7 +67,7 @@ class Cut:
         number, at = 0, self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
             if self._is_line(stretch, at, end):
-                number += count(stretch.law)
+                number += count(stretch.law, int(np.abs(end - at).max()))
             else:
                 number += len(self._move(stretch, at, end, False).segments)
             at = end

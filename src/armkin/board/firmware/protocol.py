@@ -24,6 +24,7 @@ from armkin.board.firmware.image import Image as Image
 from armkin.board.firmware.image import RowImage as RowImage
 from armkin.board.firmware.segment import BLOCK as BLOCK
 from armkin.board.firmware.segment import COARSE as COARSE
+from armkin.board.firmware.segment import FINE as FINE
 from armkin.board.firmware.segment import HALF as HALF
 from armkin.board.firmware.segment import STEP as STEP
 from armkin.board.firmware.segment import Segment as Segment

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 STEP = 1 << 23  # units of a rate and of a place in one step
 HALF = STEP // 2  # where an axis stands at rest, above its count
 COARSE = 1 << 8  # units of a rate from 2^-8 step a tick on
-_FINE = 1 << 15  # smaller rates are sent in units of 1
+FINE = 1 << 15  # smaller rates are sent in units of 1
 _FULL = STEP - 128  # the greatest rate: a step a tick, but for 2^-16
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
@@ -68,14 +68,14 @@ class Segment:
 
 def nearest_rate(exact: float) -> int:
     """The rate nearest to one in 2^-23 steps a tick that a wide segment can say."""
-    if abs(exact) < _FINE - 0.5:
+    if abs(exact) < FINE - 0.5:
         return round(exact)
     return _coarse(exact)
 
 
 def _coarse(exact: float) -> int:
     rate = round(exact / COARSE)
-    return rate * COARSE if abs(rate) < _FINE - 1 else int(math.copysign(_FULL, rate))
+    return rate * COARSE if abs(rate) < FINE - 1 else int(math.copysign(_FULL, rate))
 
 
 def _short(rate: int) -> int:
@@ -85,7 +85,7 @@ def _short(rate: int) -> int:
 
 def _long(short: int) -> int:
     """And back."""
-    return short * COARSE if abs(short) != _FINE - 1 else int(math.copysign(_FULL, short))
+    return short * COARSE if abs(short) != FINE - 1 else int(math.copysign(_FULL, short))
 
 
 def whole(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
@@ -106,8 +106,8 @@ def pack(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     """A segment's bytes; bit i of the wide form's `fine` is axis i."""
     if not wide:
         return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_short, s.rates))
-    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < _FINE]
-    short = (r if abs(r) < _FINE else _short(r) for r in s.rates)
+    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE]
+    short = (r if abs(r) < FINE else _short(r) for r in s.rates)
     head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
     return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine), *short)
 
@@ -124,5 +124,5 @@ def read_segment(data: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
         return Segment(ticks, interval, add * 256, tuple(map(_long, short)))
     ticks, interval = struct.unpack_from("<HH", data)
     bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", data, 7)
-    rates = tuple(r if fine >> i & 1 and r != -_FINE else _long(r) for i, r in zip(axes, short, strict=True))
+    rates = tuple(r if fine >> i & 1 and r != -FINE else _long(r) for i, r in zip(axes, short, strict=True))
     return Segment(ticks, interval, int.from_bytes(data[4:7], "little", signed=True), rates, bend)

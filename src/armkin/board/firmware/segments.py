@@ -11,36 +11,29 @@ by 13 % over a segment, the acceleration is right to 2 %.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment, nearest_rate
-from armkin.motion.profile import Profile, trapezoid
+from armkin.board.firmware.protocol import BLOCK, COARSE, FINE, HALF, STEP, Segment, nearest_rate
 
 Counts = NDArray[np.int64]
 
 CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 576  # [cycles] between ticks, that every board makes
 
-# Speed at a segment's fast end over that at its slow end, from a ramp's top down: so few that the board's queue (32)
-# holds nearly all of a short move, however late the host is.
-_RATIOS = (1.13,) * 10 + (1.18, 1.22, 1.3, 1.4, 1.6, 1.9)
-_ROUGH = (1.2,) * 12  # for a line that is too bad for so many
-_FIRST = 0.002  # [s] a ramp's first segment at least
-_CRUISE = (0.2, 0.4)  # [s] a cruise segment
-_JERK = 0.02  # [s] a segment in which the acceleration changes
-_TICK = 1.12  # shortest intervals that a tick lasts
+_TICK = 1.12  # shortest intervals that a tick lasts at a segment's fast end
 _TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no edge is farther off than that
+_COARSEST = 55e-6  # [s] of a tick, where a finer one would not fit the rates as well
+_STEADY = 0.004  # change of speed that is none
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
+_DRIFT = 0.02  # steps
+_SLOW = 40  # ticks a step, from where the ticks need not fit the steps
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
-_EAGER = 2000  # segments of a line that are made at once
-_AT_ONCE = 512  # bounds of segments that are held, of a longer line
 _MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
 
 
@@ -90,19 +83,27 @@ class Cutter:
         self.places = [int(count) * STEP + HALF for count in start]
         self.late = 0.0  # [cycles] that the segments so far should have lasted longer
 
-    def piece(self, seconds: float, counts: Sequence[float], change: float = 0.0) -> Segment:
+    def piece(self, seconds: float, counts: Sequence[float], change: float = 0.0, drift: float = _DRIFT) -> Segment:
         """A straight line to `counts` (motors,), fractions included, in so many seconds.
 
         change: speed at its end less that at its beginning, over the mean: -2 to 2. The speed changes evenly.
+        drift: steps that a motor may be off at its end, for the next piece to make up for.
         """
         left = [round(c * STEP) + HALF - p for c, p in zip(counts, self.places, strict=True)]
         most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
         exact = seconds * self.clock + self.late
-        ticks = self._ticks(exact, most)
+        if abs(change) < _STEADY:
+            change = 0.0
+        ticks = self._ticks(exact, most, _TICK * (1 + abs(change) / 2))
+        if change == 0.0 and (ticks > _SLOW * most or _drift(ticks, left) > drift):
+            ticks = _exact_ticks(ticks, left)
         add, bend = _parabola(exact / ticks, ticks, change)
         interval = round((exact - _added(ticks, add, bend)) / ticks)
         if add == 0 and ticks > 1:
             interval, add = _even(exact, ticks)
+        elif rest := exact - ticks * interval - _added(ticks, add, bend):  # what whole cycles an interval leave
+            more = add + round(rest * 2 * 65536 / ticks**2)
+            add = more if more * add > 0 and (more + (bend * ((ticks - 1) // BLOCK) >> 6)) * more > 0 else add
         segment = Segment(ticks, interval, add, tuple(nearest_rate(x / ticks) for x in left), bend)
         short = self.min_interval - min(segment.interval, segment.last_interval)
         if short > 0:
@@ -111,17 +112,36 @@ class Cutter:
         self.late = min(exact - cycles_of(segment), float(ticks))  # what the shortest interval costs is not made up for
         return segment
 
-    def _ticks(self, cycles: float, steps: float) -> int:
+    def _ticks(self, cycles: float, steps: float, spare: float) -> int:
         """How many ticks a piece has: whole ones for each step of its fastest motor, if it makes many."""
-        least = max(_TICK * self.min_interval, _TICK_S * self.clock)
+        least = max(spare * self.min_interval, _TICK_S * self.clock)
         each = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
         tick = max(least, min(each / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
         over = int(each / tick) if each < math.inf else 0
         if 1 <= over <= _FINE:
-            tick = each / over
+            exact = over if over > _SLOW else 1 << over.bit_length() - 1  # a power of two: a rate without rounding
+            tick = each / (exact if each / exact <= _COARSEST * self.clock else over)
         elif over == 0 and each < math.inf:
             tick = each
         return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
+
+
+def _drift(ticks: int, left: Sequence[int]) -> float:
+    """How far the rounding of rates leaves the motors from their places [steps]."""
+    return max(abs(x - ticks * nearest_rate(x / ticks)) for x in left) / STEP
+
+
+def _exact_ticks(ticks: int, left: Sequence[int]) -> int:
+    """The number of ticks, within 3 % of `ticks`, whose rates come nearest to what is left (motors,).
+
+    A rate has 2^-15 step a tick: over thousands of ticks that is up to a tenth of a step, which a short ramp behind a
+    slow cruise would have to make up for.
+    """
+    near = np.arange(ticks - ticks // 32, ticks + ticks // 32 + 1)
+    exact = np.abs(np.array(left, dtype=float))[:, None] / near
+    rates = np.where(exact < FINE - 0.5, np.rint(exact), np.rint(exact / COARSE) * COARSE)
+    off = np.abs(exact - rates) * near
+    return int(near[off.max(axis=0).argmin()])
 
 
 def _even(cycles: float, ticks: int) -> tuple[int, int]:
@@ -158,146 +178,8 @@ def _parabola(mean: float, ticks: int, change: float) -> tuple[int, int]:
     return (add, bend) if add * (add + (bend * blocks >> 6)) > 0 else _parabola(mean, ticks, change / 2)
 
 
-def along(
-    start: Sequence[int],
-    end: Sequence[int],
-    law: Profile,
-    *,
-    clock: int = CLOCK,
-    min_interval: int = MIN_INTERVAL,
-    rough: bool = False,
-) -> Move:
-    """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length.
-
-    rough: half as many, with an acceleration that is right to 10 %. A line of very many makes them as asked for.
-    """
-    first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
-    if not (last - first).any():
-        return Move(first, last, (), 0)
-    line = LineSegments(first, last, law, clock, min_interval, rough)
-    if len(line) > _EAGER:
-        return Move(first, last, line, round(law.duration * clock))
-    made = tuple(line)
-    return Move(first, last, made, sum(map(cycles_of, made)))
-
-
-@dataclass(frozen=True)
-class LineSegments:
-    """The segments of a straight line; iterating makes them anew, in bounded memory."""
-
-    start: Counts  # (motors,)
-    end: Counts
-    law: Profile
-    clock: int
-    min_interval: int
-    rough: bool
-
-    def __iter__(self) -> Iterator[Segment]:
-        """The segments in order."""
-        law, span = self.law, self.end - self.start
-        cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
-        bounds = _on_steps(law, _bounds(law, _ROUGH if self.rough else _RATIOS), int(np.abs(span).max()))
-        for times, ending in bounds:
-            done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
-            if ending:
-                done[-1] = 1.0
-            for k, (a, b) in enumerate(pairwise(times.tolist())):
-                change = changing(float(speed[k]), float(speed[k + 1]))
-                yield cutter.piece(b - a, (self.start + span * done[k + 1]).tolist(), change)
-        if [p // STEP for p in cutter.places] != self.end.tolist():
-            raise AssertionError("a line's rates do not lead to its end")
-
-    def __len__(self) -> int:
-        return count(self.law, self.rough)
-
-
-def count(law: Profile, rough: bool = False) -> int:
-    """How many segments a line with this law has."""
-    ratios = _ROUGH if rough else _RATIOS
-    return sum(parts if isinstance(parts, int) else len(parts) for _, _, parts in _phases(law, ratios))
-
-
 def changing(begin: float, end: float) -> float:
     """`Cutter.piece`'s change of speed, from `begin` to `end`; next to rest a piece has one speed."""
     if min(begin, end) <= (begin + end) / 8:
         return 0.0
     return max(-1.0, min(1.0, 2 * (end - begin) / (begin + end)))
-
-
-def line(
-    start: Sequence[int],
-    end: Sequence[int],
-    top: float,
-    accel: float,
-    *,
-    clock: int = CLOCK,
-    min_interval: int = MIN_INTERVAL,
-) -> Move:
-    """A straight line in counts from rest to rest: `top` [1/s] and `accel` [1/s^2] at most, both in lines."""
-    return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
-
-
-def _phases(law: Profile, ratios: Sequence[float]) -> Iterator[tuple[float, float, int | list[float]]]:
-    """A law's phases: begin, end, and into how many segments they are cut evenly, or where else.
-
-    The speed changes by 12 % in each; cruises have long ones.
-    """
-    ramp = law.peak / max(law.accel, 1e-12)
-    for k, (t0, t1) in enumerate(pairwise(law.times.tolist())):
-        accel, jerk = float(law.states[k, 2]), float(law.jerk[k])
-        if t1 - t0 < 1e-9:
-            continue
-        if jerk == 0.0 and accel != 0.0:
-            yield t0, t1, _ramp(law, t0, t1, accel, ratios)
-            continue
-        longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
-        yield t0, t1, math.ceil((t1 - t0) / longest)
-
-
-def _bounds(law: Profile, ratios: Sequence[float]) -> Iterator[float]:
-    """When segments end, from 0 on."""
-    yield 0.0
-    for t0, t1, parts in _phases(law, ratios):
-        yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1)) if isinstance(parts, int) else parts
-
-
-def _ramp(law: Profile, t0: float, t1: float, accel: float, ratios: Sequence[float]) -> list[float]:
-    """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
-    v0, v1 = (float(v) for v in law.at(np.array([t0, t1]), 1))
-    if accel < 0:
-        v1 = max(0.0, v0 + accel * (t1 - t0))
-    low, high = min(v0, v1), max(v0, v1)
-    least, speeds = max(low, abs(accel) * (_FIRST if ratios is _RATIOS else 5 * _FIRST)), [high]
-    for ratio in ratios:
-        if speeds[-1] / ratio < least * 1.05:
-            break
-        speeds.append(speeds[-1] / ratio)
-    speeds = speeds[1:]
-    times = sorted(t0 + (v - v0) / accel for v in speeds)
-    return [t for t in times if t0 + 1e-6 < t < t1 - 1e-6] + [t1]
-
-
-def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tuple[NDArray[np.float64], bool]]:
-    """Bounds moved to where the motor with the most steps has made whole ones, where it makes several between them.
-
-    In blocks, each of which begins with the last bound of the one before; the last one is told.
-    """
-    rest = iter(bounds)
-    known: list[float] = []
-    begin = 0.0
-    while True:
-        more = list(islice(rest, _AT_ONCE))
-        known += more
-        times = np.array(known)
-        if len(times) > 2:
-            at, speed = law.at(times) / law.length * steps, law.at(times, 1) / law.length * steps
-            near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
-            whole = (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9)
-            times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), whole, 0.0)
-        times[0] = begin
-        if len(more) < _AT_ONCE:
-            yield times, True
-            return
-        yield times[:-1], False  # what the last one is moved to depends on the next
-        begin = float(times[-2])
-        known = known[-2:]
