@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import armkin
+from armkin.board.foreign import foreign
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.sim.grbl import Grbl
@@ -224,3 +225,34 @@ def test_values_are_replaced_where_they_stand() -> None:
     text = "a:\n  - {b: 1, c: [2, 3]}  # one\n  - b: 4\n    d: x\ne: 5\n"
     found = replaced(text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14})
     assert found == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
+
+
+def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path: Path) -> None:
+    """What the board cannot reach is refused before anything moves."""
+    path, wide = tmp_path / "path.yaml", tmp_path / "wide.yaml"
+    path.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: closed\n  - joint: [0, 90, -90]\n")
+    wide.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: 999\n")
+    board = fitted(homed)
+    with PtyPort(board) as pty:
+        refused = run("path", homed, wide, "--port", pty.name, "--assume-home")
+        assert (refused.code, board.steps[:3]) == (2, [0, 0, 0])
+        assert "outside of the gripper's 40 to 200" in refused.err
+        done = run("path", homed, path, "--port", pty.name, "--json")
+        assert done.code == 0, done.err
+        assert (board.spindle, done.json["pulses"]) == (200, [0, 0, 0])
+
+
+def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
+    arm, path = armkin.load("so101"), tmp_path / "path.yaml"
+    path.write_text(f"moves:\n  - joint: {{{arm.joint_names[0]}: 5}}\n  - grip: open\n  - joint: home\n")
+    board = foreign(arm)
+    assert board is not None
+    port = board.simulated()
+    assert isinstance(port, ServoBus)
+    assert arm.gripper is not None
+    jaw = port.servos[arm.gripper.id or 0]
+    before = jaw.at
+    with PtyPort(port) as pty:
+        done = run("path", "so101", path, "--port", pty.name, "--json")
+        assert done.code == 0, done.err
+    assert abs(jaw.at - before) > 100

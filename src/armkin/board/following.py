@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.board.firmware import gripping
 from armkin.board.firmware.machine import Machine
-from armkin.errors import UsageError
+from armkin.board.foreign import Foreign, foreign
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from armkin.board.backend import Backend, Planned, Progress
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.foreign import Foreign
     from armkin.motion.path_plan import PathPlan
 
 Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
@@ -39,11 +38,10 @@ def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
 
 def check_gripper(plan: PathPlan, board: Configuration | Foreign) -> None:
     """Raise UsageError if the plan needs a gripper that the board does not move, or a value it cannot reach."""
-    from armkin.board.foreign import Foreign
-
     for marker in plan.markers:
         if isinstance(board, Foreign):
-            raise UsageError(f"a path with grip: needs a board with armkin's firmware, not {board.board.kind}")
+            board.grip_value(marker.value)
+            continue
         gripping.count_of(gripping.gripper_of(plan.arm.name, board), marker.value)
 
 
@@ -56,7 +54,16 @@ def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: 
             machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
             done += one.duration
         if k < len(plan.markers):
-            assert isinstance(machine, Machine)
-            gripper = gripping.gripper_of(plan.arm.name, machine.configuration)
-            gripping.prepare(machine, gripper, None)
-            gripping.grip(machine, gripper, gripping.count_of(gripper, plan.markers[k].value))
+            _grip(machine, plan.arm.name, plan.markers[k].value)
+
+
+def _grip(machine: Backend, name: str, value: str | float) -> None:
+    """Open or close the gripper; a board that measures where it stops may find something between its jaws."""
+    if isinstance(machine, Machine):
+        gripper = gripping.gripper_of(name, machine.configuration)
+        gripping.prepare(machine, gripper, None)
+        gripping.grip(machine, gripper, gripping.count_of(gripper, value))
+        return
+    board = foreign(machine.arm)
+    assert board is not None
+    board.grip(machine, board.grip_value(value))
