@@ -163,7 +163,8 @@ class GrblMachine:
         for job in plans:
             if job is None:
                 if self._stop():
-                    self._hold()
+                    self.hold()
+                    raise StoppedError
                 self.port.read(0.01)
                 continue
             assert self._offset is not None
@@ -177,10 +178,11 @@ class GrblMachine:
             try:
                 # the dwell is answered when all before it has been carried out
                 whole = self.session.stream(chain(gcode.lines(job, self.axes, self._offset), ["G4P0.01"]), tick)
-            except GrblError as error:
+            except LinkError as error:
                 raise self._explain(error) from None
             if not whole:
-                self._hold()
+                self.hold()
+                raise StoppedError
             self._compare(job)
             done = total
             progress(done, total)
@@ -195,7 +197,7 @@ class GrblMachine:
             if self.port.now() > end:
                 raise LinkError(f"GRBL does not come to rest: it says {status.state}; cut the motors' power")
             self.port.read(0.02)
-        self.session.report = status
+        status = self.session.sure_status()
         counts = None if self._offset is None or status.state == "Alarm" else self.counts()
         self._reset()
         self._read()
@@ -213,10 +215,6 @@ class GrblMachine:
         self.session.reset()
         self._spindle.again()
 
-    def _hold(self) -> None:
-        self.hold()
-        raise StoppedError
-
     def _compare(self, job: Job) -> None:
         self._read()
         if self._offset is None or self.counts() != tuple(job.end.tolist()):
@@ -225,9 +223,12 @@ class GrblMachine:
                 f"damaged on its way\n{self.standing()}"
             )
 
-    def _explain(self, error: GrblError) -> LinkError:
-        if error.error:
-            self.hold()
+    def _explain(self, error: LinkError) -> LinkError:
+        if not isinstance(error, GrblError) or error.error:  # what is queued must not go on by itself
+            try:
+                self.hold()
+            except LinkError:
+                return error
             return LinkError(f"{error}; the arm was stopped\n{self.standing()}")
         if error.alarm == 0 or error.alarm in lines.LOSES_POSITION:
             self._forget()
@@ -257,12 +258,12 @@ class GrblMachine:
 
     def _read(self) -> None:
         """Read position and offset: what stands in G92 since the last reset tells where the arm stands."""
-        status = self.session.status()
+        status = self.session.sure_status()
         if status.position is None:
             raise LinkError("GRBL reports no machine position: armkin setup writes $10, which asks for it")
         if max(axis.index for axis in self.axes) >= len(status.position):
             raise LinkError(f"GRBL has {len(status.position)} axes; {self.arm.name} needs {self.axes[-1].letter}, too")
-        found = dict(pair for line in self.session.ask("$#") if (pair := lines.offset(line)) is not None)
+        found = self.session.offsets()
         g92, g54 = found.get("G92", ()), found.get("G54", ())
         if status.state == "Alarm" or not g92 or all(g92[axis.index] == 0.0 for axis in self.axes):
             self._offset = None

@@ -10,7 +10,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from armkin.board.grbl import lines
 from armkin.board.grbl.lines import Report
@@ -23,10 +23,13 @@ BAUD = 115_200
 _BOOT = 4.0  # [s] a board may take to greet after its port was opened
 _ANSWER = 2.0  # [s] a line may take that moves nothing
 _POLL = 0.1  # [s] between status requests in motion
-_SILENCE = 2.0  # [s] without any line from GRBL, which is asked for reports all the time
+_SILENCE = 2.0  # [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
 _SHORT = 0.25  # [s] that an empty line may take
 _REPORT = 0.5  # [s] a status report may take
 _LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
+
+
+T = TypeVar("T")
 
 
 class GrblError(LinkError):
@@ -81,6 +84,7 @@ class Session:
         self._other.clear()
         self._send(line)
         if not self._wait(lambda: not self._sent, patience):
+            self._sent.clear()  # so that the next line's answer is not taken for this one's
             raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
         return list(self._other)
 
@@ -93,6 +97,19 @@ class Session:
                 assert self.report is not None
                 return self.report
         raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
+
+    def sure_status(self) -> Report:
+        """A status report that two in a row agree on: none has a checksum. In motion they cannot: the last one."""
+        return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
+
+    def offsets(self) -> dict[str, tuple[float, ...]]:
+        """Work offsets by name (G54, G92, ...), as two whole readings in a row agree on."""
+
+        def read() -> dict[str, tuple[float, ...]]:
+            found = dict(pair for line in self.ask("$#") if (pair := lines.offset(line)) is not None)
+            return found if found.keys() >= {"G54", "G92"} else {}
+
+        return _agreed(read, self.port.name)
 
     def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
         """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
@@ -119,10 +136,14 @@ class Session:
             self._pump(0.01)
             if self._heard != before:
                 quiet = self.port.now()
-            if self.port.now() > quiet + _SILENCE:
+            if self.port.now() > quiet + _SILENCE + self._dwells():
                 raise LinkError(f"GRBL on {self.port.name} has left {waiting} bytes without an answer")
         self._not_reset()
         return True
+
+    def _dwells(self) -> float:
+        """Seconds that lines without an answer may stand still for."""
+        return sum(float(line[3:]) for _, line in self._sent if line.startswith("G4P"))
 
     def _not_reset(self) -> None:
         if self.was_reset:
@@ -160,11 +181,11 @@ class Session:
         if len(self._text) > _LONGEST:
             raise LinkError(f"{self.port.name} does not answer as GRBL does: {_LONGEST} characters without a line end")
         for line in whole:
-            self._heard += 1
             self._hear(line.strip("\r "))
 
     def _hear(self, line: str) -> None:
         if line == "ok":
+            self._heard += 1
             if self._sent:
                 self._sent.popleft()
         elif match := re.fullmatch(r"error:(\d{1,3})", line):
@@ -180,6 +201,19 @@ class Session:
             self._sent.clear()
         elif (found := lines.report(line)) is not None:
             self.report = found
+            self._heard += found.state not in ("Idle", "Check", "Sleep")  # else it only repeats itself
         elif line:
             self._other.append(line)
             del self._other[:-400]
+
+
+def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool] = lambda found: False) -> T:
+    """What two readings in a row agree on, or one that is enough. Raises LinkError if none do."""
+    last = read()
+    for _ in range(8):
+        before, last = last, read()
+        if (last and last == before) or (enough(before) and enough(last)):
+            return last
+    raise LinkError(
+        f"{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
+    )
