@@ -29,6 +29,7 @@ _GROWTH = 0.12  # of the time since the start, or to the end
 _FINE = 0.005  # [s] between the samples from which the spans are chosen
 _QUEUED = 25  # segments that are surely in the board's queue
 _JUMP = 1.1  # of the greatest acceleration
+_SAMPLES = 20_000  # that are looked at at once
 _BLOCK = 512  # segments that are made at once
 
 
@@ -137,7 +138,7 @@ class CurveSegments:
         """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
         whole = self.stretch.duration
         t = np.linspace(0.0, whole, max(int(whole / _FINE), 16))
-        parts = [self._spans(part) for part in np.array_split(t, max(len(t) // 20_000, 1))]
+        parts = [self._spans(part) for part in np.array_split(t, max(len(t) // _SAMPLES, 1))]
         span, stop = (np.concatenate(x) for x in zip(*parts, strict=True))
         span = np.minimum(span, _GROWTH * np.minimum(t, whole - t))
         span = np.maximum(np.clip(span, _LEAST, _MOST), _reaching(stop, float(t[1])))
@@ -174,4 +175,5 @@ def _reaching(stop: Array, step: float) -> Array:
 def rates(arm: Arm, stretch: Stretch) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
     t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _FINE), 16))
-    return np.asarray(np.abs(stretch.at(t, 1) @ arm.motor_gain.T).max(axis=0))
+    parts = np.array_split(t, max(len(t) // _SAMPLES, 1))
+    return np.asarray(np.max([np.abs(stretch.at(part, 1) @ arm.motor_gain.T).max(axis=0) for part in parts], axis=0))
