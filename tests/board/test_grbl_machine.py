@@ -186,7 +186,7 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_damaged_answers_never_give_a_false_position(seed: int) -> None:
-    """Of what GRBL says one byte in 250 is changed and one in 250 is lost: what is believed was said twice."""
+    """Of what GRBL says one byte in 250 is changed and one in 250 is lost: what is believed was said three times."""
     rng = random.Random(seed)
 
     class Mumbling(Grbl):

@@ -99,11 +99,11 @@ class Session:
         raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
 
     def sure_status(self) -> Report:
-        """A status report that two in a row agree on: none has a checksum. In motion they cannot: the last one."""
+        """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
         return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
 
     def offsets(self) -> dict[str, tuple[float, ...]]:
-        """Work offsets by name (G54, G92, ...), as two whole readings in a row agree on."""
+        """Work offsets by name (G54, G92, ...), as three whole readings in a row agree on."""
 
         def read() -> dict[str, tuple[float, ...]]:
             found = dict(pair for line in self.ask("$#") if (pair := lines.offset(line)) is not None)
@@ -208,11 +208,15 @@ class Session:
 
 
 def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool] = lambda found: False) -> T:
-    """What two readings in a row agree on, or one that is enough. Raises LinkError if none do."""
-    last = read()
-    for _ in range(8):
+    """What three readings in a row agree on, or one that is enough. Raises LinkError if none do.
+
+    Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.
+    """
+    last, same = read(), 1
+    for _ in range(12):
         before, last = last, read()
-        if (last and last == before) or (enough(before) and enough(last)):
+        same = same + 1 if last and last == before else 1
+        if same == 3 or (enough(before) and enough(last)):
             return last
     raise LinkError(
         f"{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
