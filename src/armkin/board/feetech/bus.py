@@ -29,7 +29,7 @@ class Bus:
 
     def ping(self, servo: int) -> bool:
         """Whether a servo answers."""
-        return bool(self._ask(packet.packet(servo, packet.Instruction.PING), [servo], 0, tries=3))
+        return bool(self._ask(packet.packet(servo, packet.Instruction.PING), [servo], 0, tries=_TRIES))
 
     def read(self, servo: int, register: Register) -> int:
         """A register of one servo. Raises LinkError if it does not answer."""
