@@ -172,16 +172,18 @@ ASKED = "| robot or class | asked | targets | wrong | complete | singular | us/p
 RIGHT_ANGLES = "6R right angles"
 
 
-def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None, float]]:
-    """Shipped robots, five arms of every class; and which share of the targets each is asked."""
+def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None, int, int]]:
+    """Shipped robots, an arm of every class, right-angled ones; how many postures and how many targets each is asked.
+
+    only: part of a name, "shipped" or "classes".
+    """
     for name in NAMES:
-        if only in name:
-            yield name, *shipped(name), None, 1.0
+        if only in name or only == "shipped":
+            yield name, *shipped(name), None, 4096, 1000
     for name in CLASSES:
-        for seed in range(5):
-            if only in name:
-                case = random_case(name, seed)
-                yield f"{name} {seed}", case.arm, case.screw, case.task, 0.5
+        if only in name or only == "classes":
+            case = random_case(name, 0)
+            yield name, case.arm, case.screw, case.task, 50, 50
     found: dict[str, int] = {}
     for seed in range(200 if only in RIGHT_ANGLES else 0):
         made = case_of(right_angles(np.random.default_rng(seed)), "pose")
@@ -189,7 +191,7 @@ def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None,
             method = solver(made.arm, "pose")[1].name
             found[method] = found.get(method, 0) + 1
             if found[method] <= 5:
-                yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 0.5
+                yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 500, 500
 
 
 def asked(name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | None, q: Array, target: Array) -> None:
@@ -212,26 +214,26 @@ def asked(name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | Non
 
 def postures(share: float, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, part in asked_arms(only):
+    for name, arm, screw, task, count, _ in asked_arms(only):
         for step in (90, 45):
-            q = truth.round_postures(arm, step, max(int(4096 * share * part), 1))
+            q = truth.round_postures(arm, step, max(int(count * share), 1))
             definition, _ = solver(arm, task)
             asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array())
 
 
 def surfaces(share: float, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, part in asked_arms(only):
+    for name, arm, screw, task, _, count in asked_arms(only):
         definition, _ = solver(arm, task)
-        for label, q in truth.singular_postures(arm, screw, task, max(int(1000 * share * part), 1)).items():
+        for label, q in truth.singular_postures(arm, screw, task, max(int(count * share), 1)).items():
             asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array())
 
 
 def rounded(share: float, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, part in asked_arms(only):
+    for name, arm, screw, task, _, count in asked_arms(only):
         definition, _ = solver(arm, task)
-        q = random_joints(screw, max(int(1000 * share * part), 1), 5)
+        q = random_joints(screw, max(int(count * share), 1), 5)
         target = oracle.goal(definition, screw, q).array()
         for digits in (3, 4, 5, 6, 7, 7.5, 8, 9, 10, 11, 12, 13, 14, 15, 16):
             what = "float32" if digits == 7.5 else f"{digits} digits"

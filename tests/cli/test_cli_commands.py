@@ -254,3 +254,9 @@ def test_out_writes_what_stdout_would_get(tmp_path: Path) -> None:
         assert run("fk", THREE_DOF, 1, 2, 3, *words, "--out", path) == (0, "", "")
         assert path.read_text() == run("fk", THREE_DOF, 1, 2, 3, *words).out
         assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_an_arm_without_lengths_reaches_nowhere(tmp_path: Path) -> None:
+    robot = tmp_path / "point.yaml"
+    robot.write_text("name: point\nconvention: standard\njoints:\n" + "  - {name: q1, dh: {alpha: 90, a: 0, d: 0}}\n")
+    assert run("info", robot, "--json").json["reach_mm"] == 0

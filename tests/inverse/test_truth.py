@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import truth
 from geometries import case, right_angles
-from oracle import goal, screws
+from oracle import Screws, goal, screws
 from test_every_branch import NAMES, shipped
 
 import armkin
@@ -22,45 +22,51 @@ from armkin.inverse.recognise import solver
 from armkin.model.arm import Arm, from_links
 
 ROBOTS = Path(__file__).parents[2] / "robots"
-SLOW = {"jaco_j2n6s300", "moveo", "panda", "fanuc_crx10ia"}  # the elimination: milliseconds for each singular pose
 
 
 def load(name: str) -> Arm:
     return armkin.load(ROBOTS / f"{name}.yaml")
 
 
-def few(name: str, many: int) -> int:
-    return many // 4 if name in SLOW else many
-
-
 # ---- samples of the tables -----------------------------------------------------------------------------------
+
+
+def judged(
+    arm: Arm, screw: Screws, kinds: dict[str, np.ndarray], target: np.ndarray, near: np.ndarray | None = None
+) -> tuple[truth.Verdict, str]:
+    """Postures of several kinds and their targets, all judged in one call; and of which kind the wrong ones are."""
+    q = np.concatenate(list(kinds.values()))
+    verdict = truth.judge(arm, screw, None, q, target, near)
+    kind = np.repeat(list(kinds), [len(each) for each in kinds.values()])
+    wrong = {*verdict.unreachable, *verdict.lost, *verdict.false, *verdict.twice, *verdict.moves}
+    return verdict, f"{sorted({str(kind[k]) for k in wrong})}: {verdict}"
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_round_postures(name: str) -> None:
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
-    for step in (90, 45):
-        q = truth.round_postures(arm, step, few(name, 24), seed=1)
-        target = goal(task, screw, q).array()
-        verdict = truth.judge(arm, screw, None, q, target)
-        assert verdict, f"multiples of {step}: {verdict}"
-        verdict = truth.judge(arm, screw, None, q, target, near=q)
-        assert verdict, f"multiples of {step}, near: {verdict}"
+    kinds = {f"multiples of {step}": truth.round_postures(arm, step, 24, seed=1) for step in (90, 45)}
+    q = np.concatenate(list(kinds.values()))
+    for near in (None, q):
+        verdict, what = judged(arm, screw, kinds, goal(task, screw, q).array(), near)
+        assert verdict, what
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_singular_surfaces(name: str) -> None:
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
-    for label, q in truth.singular_postures(arm, screw, None, few(name, 12), seed=1).items():
-        target = goal(task, screw, q).array()
-        for near in (None, q):
-            verdict = truth.judge(arm, screw, None, q, target, near)
-            assert verdict, f"{label}: {verdict}"
-        verdict = truth.judge(arm, screw, None, q, truth.typed(task, target, 9))
-        verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
-        assert verdict, f"{label}, 9 digits: {verdict}"
+    kinds = truth.singular_postures(arm, screw, None, 12, seed=1)
+    assert kinds, "no singular surface found"
+    q = np.concatenate(list(kinds.values()))
+    target = goal(task, screw, q).array()
+    for near in (None, q):
+        verdict, what = judged(arm, screw, kinds, target, near)
+        assert verdict, what
+    verdict, what = judged(arm, screw, kinds, truth.typed(task, target, 9))
+    verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
+    assert verdict, f"9 digits, {what}"
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -68,15 +74,14 @@ def test_rounded_targets(name: str) -> None:
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
     rng = np.random.default_rng(2)
-    q = rng.uniform(-np.pi, np.pi, (few(name, 24), arm.n))
+    q = rng.uniform(-np.pi, np.pi, (24, arm.n))
     q = np.where(arm.prismatic, q * arm.reach / 10, q)
     target = goal(task, screw, q).array()
-    for digits in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16):
-        verdict = truth.judge(arm, screw, None, q, truth.typed(task, target, digits))
-        assert verdict, f"{digits} digits: {verdict}"
-        if task.orientation == "full" and digits >= 7:
-            verdict = truth.judge(arm, screw, None, q, truth.printed(target, digits))
-            assert verdict, f"matrices of {digits} digits: {verdict}"
+    asked = {f"{n} digits": truth.typed(task, target, n) for n in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16)}
+    if task.orientation == "full":
+        asked |= {f"matrices of {n} digits": truth.printed(target, n) for n in (7, 7.5, 8, 10, 13, 16)}
+    verdict, what = judged(arm, screw, dict.fromkeys(asked, q), np.concatenate(list(asked.values())))
+    assert verdict, what
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,8 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
             qa, qb = q.copy(), q.copy()
             qa[:, joint] += a
             qb[:, joint] += b
-            left = weak(qa) < weak(qb)
+            sizes = weak(np.concatenate([qa, qb]))  # in one call
+            left = sizes[: len(q)] < sizes[len(q) :]
             low, high = np.where(left, low, a), np.where(left, b, high)
         q[:, joint] += 0.5 * (low + high)
         on = weak(q) < 1e-7
@@ -209,7 +210,7 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     for k in np.flatnonzero(reached & ~none & ~known & ~on_curve):
         # one with a branch further away, if the postures between them solve the target, too
         b = int(np.nan_to_num(d[k].max(axis=1), nan=np.inf).argmin())
-        if not _joined(arm, screw, goals.take([k]), asked[k], s.q[k, b], (0.25, 0.5, 0.75)):
+        if not _in_one_valley(arm, screw, goals.take([k]), asked[k], s.q[k, b]):
             verdict.lost.append(int(k))
     B = s.q.shape[1]
     for i in range(B):
@@ -229,11 +230,37 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     return verdict
 
 
-def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array, parts: tuple[float, ...] = (0.5,)) -> bool:
-    """Whether the postures between two solve the target."""
+def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> bool:
+    """Whether the posture between two solves the target."""
+    return bool(miss_of(arm, screw, goals, (a + 0.5 * _way(screw, a, b))[None])[0] < 0.9 * SOLVES)
+
+
+def _way(screw: Screws, a: Array, b: Array) -> Array:
     d = b - a
-    d = np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
-    return all(miss_of(arm, screw, goals, (a + part * d)[None])[0] < 0.9 * SOLVES for part in parts)
+    return np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+
+
+def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> bool:
+    """Whether three postures between two solve the target: on the chord, or beside it where a valley is curved."""
+    d = _way(screw, a, b)
+    for part in (0.25, 0.5, 0.75):
+        q = (a + part * d)[None]
+        there = across(screw, goals, q)
+        if miss_of(arm, screw, goals, q)[0] >= 0.9 * SOLVES and (
+            np.abs(there - q).max() > 0.1 * np.abs(d).max() or miss_of(arm, screw, goals, there)[0] >= 0.9 * SOLVES
+        ):
+            return False
+    return True
+
+
+def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
+    """A posture (1, n) after two Newton steps that go nowhere along directions of singular values below `weak`."""
+    unit = np.where(screw.prismatic, screw.size, 1.0)
+    for _ in range(2):
+        r, J = oracle._residual(screw, goals, q)
+        U, S, Vt = np.linalg.svd(J[0] * unit, full_matrices=False)
+        q = q + unit * (Vt.T @ (np.where(weak < S, 1 / np.maximum(S, weak), 0.0) * (U.T @ r[0])))
+    return q
 
 
 def ask_oracle(

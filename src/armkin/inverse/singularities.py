@@ -264,7 +264,7 @@ def _onto(
     # `near` is taken as it is, or not at all
     some = np.flatnonzero((size < seed) & ~own.ravel())
     if len(some):
-        steps = 10 if seed <= SEED else 25
+        steps = 40  # towards a root of third order each step goes a third of the way
         flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=steps)
     flat[own.ravel() & (size > SOLUTION)] = np.nan
     return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)

@@ -44,7 +44,7 @@ class Arm:
     task: str | None  # as the file says; None: by structure
     motor_gain: Array  # (motors, n) pulses per rad | mm
     motor_bias: Array  # (motors,) pulses at home
-    reach: float  # [mm] no point of the chain is farther from its first joint
+    reach: float  # [mm] no point of the chain is farther from its first joint; 1, a unit, where all lengths are zero
     pose_names: tuple[str, ...]  # of the robot file's poses, besides home
     pose_joints: Array  # (poses, n)
     held: tuple[str, ...] = ()  # names of joints that `lock` has folded into the links

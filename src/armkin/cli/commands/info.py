@@ -51,7 +51,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "zero_pose": None if file.zero_pose is None else file.zero_pose.model_dump(),
         **_task(arm, task),
         "pitch_offset": file.pitch_offset,
-        "reach_mm": arm.reach,
+        "reach_mm": arm.reach if arm.link[1:, :3, 3].any() or arm.prismatic.any() else 0.0,
         "motors": motors,
         "one_to_one": all(list(motor["joints"].values()) == [1.0] for motor in motors),
         "resolution": _resolution(arm),
