@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import brute
@@ -59,3 +60,21 @@ def test_the_tip_stays_within_the_tolerance_between_samples(name: str) -> None:
             p = armkin.fk(arm, a + np.linspace(0, 1, 20)[:, None] * (b - a))[..., :3, 3]
             chord = p[:, :1] + np.linspace(0, 1, 20)[:, None] * (p[:, -1:] - p[:, :1])
             assert np.linalg.norm(p - chord, axis=2).max() <= 0.05
+
+
+@pytest.mark.parametrize("most", [np.inf, 9.0])
+def test_a_calibrated_joint_goes_round_once_in_its_own_degrees(most: float) -> None:
+    """With a ratio of 1.02 a whole turn is 352.9 commanded degrees: the branch does not end where the angle wraps."""
+    arm = armkin.load("three_dof")
+    arm = replace(
+        arm,
+        lower=np.array([-most, *arm.lower[1:]]),
+        upper=np.array([most, *arm.upper[1:]]),
+        ratio=np.array([1.02, 1, 1]),
+    )
+    height = float(armkin.fk(arm, np.deg2rad([0, 60, -60]))[2, 3])
+    moves = {"start": {"joints": [0, 60, -60]}, "moves": [{"circle": {"centre": [0, 0, height]}}]}
+    plan = armkin.path(arm, moves)
+    assert len(plan.runs) == 1
+    turned = np.rad2deg(plan.motion.end - plan.motion.start)
+    assert np.abs(turned) == pytest.approx([360 / 1.02, 0, 0], abs=1e-6)

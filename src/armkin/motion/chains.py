@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.columns import ENDS, TURN, Columns, Int
+from armkin.motion.columns import ENDS, Columns, Int, turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -49,16 +49,17 @@ class Chain:
         """
         out: list[tuple[Array, Int | None]] = []
         least, most = self.extent
+        turns = turns_of(self.arm)
         for j in range(self.arm.n):
             lower, upper, value = self.arm.lower[j] - SLACK, self.arm.upper[j] + SLACK, self.q[:, j]
-            offsets = np.zeros(1)
+            offsets, turn = np.zeros(1), turns[j]
             if not self.arm.prismatic[j] and np.isfinite(lower) and np.isfinite(upper):
-                first = np.ceil((lower - most[j]) / TURN)
-                last = np.floor((upper - least[j]) / TURN)
-                offsets = TURN * np.arange(first, last + 1)
+                first = np.ceil((lower - most[j]) / turn)
+                last = np.floor((upper - least[j]) / turn)
+                offsets = turn * np.arange(first, last + 1)
             elif not self.arm.prismatic[j] and (np.isfinite(lower) or np.isfinite(upper)):
-                middle = np.rint((self.arm.home[j] - value[0]) / TURN)
-                offsets = TURN * (middle + np.arange(-2, 3))
+                middle = np.rint((self.arm.home[j] - value[0]) / turn)
+                offsets = turn * (middle + np.arange(-2, 3))
             legal = (least[j] + offsets >= lower) & (most[j] + offsets <= upper)
             if len(offsets) and legal.all():
                 out.append((offsets, None))
@@ -98,11 +99,11 @@ class Chain:
 
     def run(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
         """Joint values from sample i to e (e - i + 1, n), the legal copies nearest to `near` at i."""
-        offsets = np.zeros(self.arm.n)
+        offsets, turns = np.zeros(self.arm.n), turns_of(self.arm)
         for j, (choices, ends) in enumerate(self._copies):
             here = self.q[i - self.first, j]
             if not self.arm.prismatic[j] and not np.isfinite([self.arm.lower[j], self.arm.upper[j]]).any():
-                offsets[j] = TURN * np.rint((near[j] - here) / TURN)
+                offsets[j] = turns[j] * np.rint((near[j] - here) / turns[j])
                 continue
             legal = choices if ends is None else choices[ends[:, i - self.first] > e - self.first]
             wanted = near[j] if fixed is None else fixed[j]
@@ -142,9 +143,10 @@ def _assembled(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -
     made = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
     least, most = made.extent
     for j in np.flatnonzero(~arm.prismatic & (most - least > np.pi)):  # principal values may jump by a turn
-        turns = np.rint(np.diff(q[:, j]) / TURN)
+        turn = turns_of(arm)[j]
+        turns = np.rint(np.diff(q[:, j]) / turn)
         if turns.any():
-            q[1:, j] -= TURN * np.cumsum(turns)
+            q[1:, j] -= turn * np.cumsum(turns)
             made.__dict__.pop("extent", None)
     return made
 

@@ -71,7 +71,7 @@ def levers(arm: Arm) -> Array:
                 out[j, k] = 0.0
             else:
                 out[j, k] = 1.0 if arm.prismatic[later] else max(beyond[later], LEAST_LEVER)
-    return out
+    return np.asarray(out * np.outer(arm.ratio, arm.ratio))
 
 
 def chord_bound(lever: Array, D: Array) -> Array:
@@ -87,12 +87,18 @@ def largest_form(arm: Arm, lever: Array) -> tuple[Array | None, float]:
     return (np.asarray(scale) if arm.prismatic.any() else None), top
 
 
+def turns_of(arm: Arm) -> Array:
+    """What a whole turn is in commanded values, for every joint: (n,) [rad]. A joint's ratio makes it more or less."""
+    return np.asarray(TURN / arm.ratio)
+
+
 def change(arm: Arm, a: Array, b: Array) -> Array:
     """From joint values to others, the shorter way round: (..., n)."""
     D: Array = b - a
-    turns = D * (~arm.prismatic / TURN)
+    turn = turns_of(arm)
+    turns = D * (~arm.prismatic / turn)
     np.rint(turns, out=turns)
-    turns *= TURN
+    turns *= turn
     D -= turns
     return D
 
@@ -124,6 +130,7 @@ class _Linking:
     ) -> None:
         self.arm, self.targets, self.task, self.tolerance, self.near = arm, targets, task, tolerance, near
         self.lever = levers(arm)
+        self.turn = turns_of(arm)
         self.scale, self.top = largest_form(arm, self.lever)
         self.length = length
         self.added = 0
@@ -132,7 +139,7 @@ class _Linking:
             j
             for j in range(arm.n)
             if not arm.prismatic[j]
-            and arm.upper[j] - arm.lower[j] > TURN - 1e-6
+            and arm.upper[j] - arm.lower[j] > self.turn[j] - 1e-6
             and np.isfinite(arm.upper[j] - arm.lower[j])
         ]
 
@@ -321,7 +328,7 @@ class _Linking:
         for j in self.wide:
             value = q[:, :, j]
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                turn = np.floor((value - limit) / TURN)
+                turn = np.floor((value - limit) / self.turn[j])
                 out |= turn[left] != turn[right]
         k, b = np.nonzero(wrapped)  # these go the other way round
         if len(k):
@@ -330,7 +337,8 @@ class _Linking:
             out[k, b] = False
             for j in self.wide:
                 for limit in (self.arm.lower[j], self.arm.upper[j]):
-                    out[k, b] |= np.floor((start[:, j] - limit) / TURN) != np.floor((there[:, j] - limit) / TURN)
+                    before, after = (np.floor((x[:, j] - limit) / self.turn[j]) for x in (start, there))
+                    out[k, b] |= before != after
         return out
 
 
