@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware.lines import line
-from armkin.errors import GripperKnownError, GripperLostError, UsageError
+from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration, Grip
@@ -69,4 +69,12 @@ def grip(machine: Machine, gripper: Grip, target: int) -> int:
         clock, least = board.clock, board.min_interval
         move = line([at], [target], gripper.top / far, gripper.accel / far, clock=clock, min_interval=least)
         machine.run_axis(move, gripper.axis, board.clock)
+        machine.in_time()
+        if not known(machine, gripper):
+            raise GripperLostError("the board has lost the gripper's position on the way")
+        if machine.status.counts[gripper.axis] != target:
+            raise LinkError(
+                f"the board says that the gripper stands at {machine.status.counts[gripper.axis]}, it was sent to "
+                f"{target}: please report this as a bug"
+            )
     return machine.status.counts[gripper.axis]

@@ -151,6 +151,7 @@ def _found(machine: Machine, search: Search) -> tuple[Status, Status]:
         for _ in session.arrivals(search.time / 10):
             pass
         machine.status = session.status()
+        machine.in_time()
         return machine.status, session.status(page=1)
     except DeviceError as error:
         raise machine.explain(error) from None

@@ -68,3 +68,4 @@ def jog(machine: Machine, rate: dict[int, int], seconds: float, more: Callable[[
     except DeviceError as error:
         raise machine.explain(error) from None
     machine.status = session.status()
+    machine.in_time()

@@ -214,14 +214,18 @@ class Machine:
             raise self.explain(error) from None
         if self.position() == "lost":
             raise self._lost("the board has lost the arm's position on the way")
-        if late := self.status.overruns:
-            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing()}")
+        self.in_time()
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "
                 "a bug in armkin or its firmware, please report it"
             )
         return self.status
+
+    def in_time(self) -> None:
+        """Raise LinkError if the board says that ticks came late."""
+        if late := self.status.overruns:
+            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing()}")
 
     def run_axis(self, move: Move, axis: int, clock: int) -> Status:
         """Carry out the move of a single axis: the gripper."""
