@@ -153,7 +153,9 @@ def _closed(
             q, loose = np.empty((*runner.axes, len(doubtful), arm.n)), np.zeros((*runner.axes, len(doubtful)), bool)
             for i, value in enumerate(values):
                 q[..., i] = value[..., doubtful] if np.shape(value)[-1:] == (N,) else value
-            loose |= free[..., doubtful] if np.shape(free)[-1:] == (N,) else free
+            loose |= np.greater(
+                free[..., doubtful] if np.shape(free)[-1:] == (N,) else free, 0
+            )  # constants are numbers
             q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
             doubts.append((start + doubtful, q, valid[:, doubtful].T, loose.reshape(B, -1).any(axis=0)))
     assert out is not None
