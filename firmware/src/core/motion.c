@@ -4,9 +4,6 @@
 
 #include "hal.h"
 
-struct segment queue[QUEUE_SLOTS];
-volatile uint8_t queue_head, queue_tail;
-struct dda dda;
 struct motion motion;
 
 static uint8_t settled;               // segments before this one are in memory.counts
@@ -23,44 +20,6 @@ static const float TOO_FAST = 30.0F;  // ms: u from which an abrupt stop loses s
 static const float UNIT_MS = 256e3F / CLOCK;
 
 #define SHARED(x) (*(volatile __typeof__(x) *)&(x))  // the interrupt changes it
-
-// Not inlined into the interrupt, which would have to save more registers with every tick.
-__attribute__((noinline, optimize("O2"))) bool dda_load(void) {
-    const uint8_t tail = queue_tail;
-    if (tail == queue_head) {
-        dda.now = 0;
-        return false;
-    }
-    const struct segment *s = queue_slot(tail);
-    HAL_NEAR(s);
-    dda.now = s;
-    dda.left = s->ticks;
-    dda.interval = (uint32_t)s->interval << 16;
-    dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
-    if (dda.back & LAST) {
-        dda_rest();
-    }
-    const axes_t turned = dda.back ^ s->back, fine = s->fine;
-    (void)turned;
-    (void)fine;
-#define LOAD(i, ...)                          \
-    if (fine & 1 << (i)) {                    \
-        dda.rate[i] = s->rate[i];             \
-    } else {                                  \
-        dda.rate[i] = (fine_t)s->rate[i] << 8; \
-    }                                         \
-    if (turned & 1 << (i)) {                  \
-        dda.phase[i] ^= PHASE_TURN;           \
-    }
-    STEPPER_PINS(LOAD)
-    dda.back = s->back;
-    dda_direction(s->back);
-    return true;
-}
-
-__attribute__((noinline)) void dda_bend(void) {
-    dda.add += (int32_t)dda.now->bend * 4;
-}
 
 // Cycles between ticks after `ticks` of them, not rounded from tick to tick.
 int32_t motion_interval(const struct segment *s, uint16_t ticks) {
