@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from armkin.cli import output
 from command_line import ROOT, process, run
 
 
@@ -41,11 +42,12 @@ def test_ik_without_a_target_and_without_an_answer_says_what_it_takes() -> None:
     assert run("ik", "ur5e", stdin=run("fk", "three_dof", "home", "--json").out.encode()).code == 1
 
 
-def test_messages_are_not_cut_in_the_middle() -> None:
-    word = "x" * 400
-    done = run("fk", f"{word}.yaml", "home")
-    assert word in done.err
-    assert " ... " not in done.err
+def test_notes_are_not_cut_in_the_middle(capsys: pytest.CaptureFixture[str]) -> None:
+    output.note("word " * 150)
+    output.error("word " * 150, "usage", 2)
+    note, error = capsys.readouterr().err.splitlines()
+    assert note == "note: " + "word " * 150
+    assert " ... " in error
     assert len(run("fk", "x" * 100_000, "home").err) < 4000
 
 

@@ -42,7 +42,7 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     e = forms(kind, np.random.default_rng(1), 4000)
     grid = np.linspace(-np.pi, np.pi, 1001)[:, None]
     vanishing = np.abs(values(e, grid)).max(axis=0) < 1e-9
-    assert trig_quadratic(list(e[:, vanishing]), 1.0)[1].free.any(axis=(0, 1, 2)).all()
+    assert trig_quadratic(list(e[:, vanishing]), 1.0)[1].edge.any(axis=(0, 1, 2)).all()
     e = e[:, ~vanishing]
     scale = np.abs(e).sum(axis=0)
     pair, told = trig_quadratic(list(e), 1.0)

@@ -12,7 +12,7 @@ from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
-_LONGEST = 1000  # characters of a line: a path or a word from the command line may be longer than people read
+_LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
 
 
@@ -68,7 +68,7 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
     import json
 
     found = {
-        "error": "\n".join(_plain(line) for line in message.splitlines()),
+        "error": "\n".join(_plain(line, _LONGEST["error"]) for line in message.splitlines()),
         "kind": kind,
         "exit_code": exit_code,
         **(fields or {}),
@@ -112,7 +112,7 @@ def _say(word: str, message: str) -> None:
         return
     head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
     # A file's name may hold anything: two lines of printable text, whatever it is.
-    lines = [_plain(line) for line in message.splitlines() if line.strip()]
+    lines = [_plain(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
     _print(text)
 
@@ -122,10 +122,10 @@ def _print(text: str) -> None:
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
 
 
-def _plain(line: str) -> str:
+def _plain(line: str, most: int) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 100]} ... {text[-80:]}"
+    return text if len(text) <= most else f"{text[: most - 90]} ... {text[-80:]}"
 
 
 def _coloured(stream: TextIO) -> bool:
