@@ -29,6 +29,7 @@ _FIRST = 0.003  # [s] a ramp's first segment at least, and twice what any other 
 _BEFORE_STEP = 0.9  # of the time to its first step: until then no motor tells how it got there
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
+_SPLIT = 0.08  # [s] a cruise segment whose end is one of its own
 _SPARE = 0.0005  # of a piece's steps, that are left for the next one to make up for
 _EAGER = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
@@ -166,13 +167,13 @@ def _phases(law: Profile, ratios: Ratios, steps: int) -> Iterator[tuple[float, f
             continue
         longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
         parts = math.ceil((t1 - t0) / longest)
-        last = t1 - (t1 - t0) / parts if jerk == 0.0 else t1
+        each = (t1 - t0) / parts
+        if jerk or each < _SPLIT:
+            yield t0, t1, parts
+            continue
         if parts > 1:
-            yield t0, last, parts - (jerk == 0.0)
-        elif jerk:
-            yield t0, t1, 1
-        if jerk == 0.0:  # the end of a cruise is short: what its rates' rounding leaves is the ramp's to make up for
-            yield last, t1, [t1 - (t1 - last) / 4, t1]
+            yield t0, t1 - each, parts - 1
+        yield t1 - each, t1, [t1 - each / 4, t1]  # a short end: what its rates' rounding leaves, the ramp makes up for
 
 
 def _bounds(law: Profile, ratios: Ratios, steps: int) -> Iterator[float]:

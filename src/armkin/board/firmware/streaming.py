@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     from armkin.board.firmware.segments import Counts, Move
     from armkin.board.firmware.session import Session
 
-# Standing still while the queue fills: 100 ms, or half a second on a bad line.
-_LEAD = (Segment(80, 20_000, 0, ()), Segment(255, 32_000, 0, ()))
+# Standing still while the queue fills: 100 ms, 250 ms on a busy computer, or half a second on a bad line.
+_LEAD, _LEAD_BUSY, _LEAD_BAD = Segment(80, 20_000, 0, ()), Segment(200, 20_000, 0, ()), Segment(255, 32_000, 0, ())
 _BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
 
 
@@ -74,6 +75,11 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
 _DONE = object()
 
 
+def _busy() -> bool:
+    """Whether more programs want to run than there are processors: then this one may have to wait for its turn."""
+    return hasattr(os, "getloadavg") and os.getloadavg()[0] > (os.cpu_count() or 1)
+
+
 def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> Iterator[Batch]:
     """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
     assert session.info is not None
@@ -86,7 +92,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> It
     todo: list[Segment] = []
     resting = session.state == State.IDLE and not session.under_way
     if move.segments and (resting or line.damaged):
-        lead = _LEAD[line.damaged]
+        lead = _LEAD_BAD if line.damaged else _LEAD_BUSY if _busy() and not session.port.simulated else _LEAD
         todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
     while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
         most = _BATCH[0] if line.noisy else _BATCH[1]
