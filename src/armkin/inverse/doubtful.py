@@ -89,16 +89,20 @@ def examined(
     """Examine the doubtful targets and write what is found: branches first, nan behind.
 
     candidates: joint values (K, M, n) for some of the doubtful ones, and which depend on `near` (K, M); others: more
-    of them, for targets and preferred values, and whether branches seem lost; unsettled: (N,), see
-    `singularities.examine`.
+    of them, for targets and preferred values, and whether branches seem lost or an elimination did not settle them;
+    unsettled: (N,), see `singularities.examine`.
     """
     for start in range(0, len(doubtful), AT_ONCE):
         rows = doubtful[start : start + AT_ONCE]
         goal, close, columns = target[rows], near[rows], out.q.shape[1]
         q, loose = candidates(np.arange(start, start + len(rows)))
 
-        def more(some: NDArray[np.int64], lost: Bool, goal: Array = goal, close: Array = close) -> Any:
-            return others(goal[some], close[some], lost)
+        incomplete = np.zeros(len(rows), bool) if unsettled is None else unsettled[rows] & ~out.complete[rows]
+
+        def more(
+            some: NDArray[np.int64], lost: Bool, goal: Array = goal, close: Array = close, incomplete: Bool = incomplete
+        ) -> Any:
+            return others(goal[some], close[some], lost | incomplete[some])
 
         seen = singularities.examine(
             arm, task, q, np.arange(q.shape[1]) % max(columns, 1), loose, goal, close, more,

@@ -6,8 +6,8 @@ between the two arms: where those of the similar arm move too much, appear or va
 target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
 then go to the elimination, which needs no special class; for fewer, the similar arm's branches
 at the targets around give more seeds. There is no proof that nothing is lost in between,
-hence `complete` is False. Where the elimination is healthy on the arm, as the share of poses that its main pass
-settles shows, six joints go straight to it, and the similar arm only names the branches.
+hence `complete` is False. Where the elimination is healthy on the arm, as the share of poses that its first two
+passes settle shows, six joints go straight to it, and the similar arm only names the branches.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 CHUNK = 1024  # poses corrected at once
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 BLURRED = 1e-9  # distance from a class that rounding alone explains
-SICK = 0.08  # share of poses that a healthy elimination leaves open in its main pass
+SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
 

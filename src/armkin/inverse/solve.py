@@ -24,6 +24,7 @@ from armkin.inverse.branches.turns import nearest_copy, nearest_row
 from armkin.inverse.closed.candidates import entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import decided, examined
+from armkin.inverse.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
@@ -231,10 +232,14 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
             return found, np.zeros(found.shape[:2], bool)
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
-            """Branches of targets around these, on both sides: what two roots in one leave is real on one of them."""
+            """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
+
+            And what Newton's method finds from many starts: self-motions that the targets around do not have.
+            """
             there = around(arm, task, target)
             found = solve(there.reshape(-1, *target.shape[1:])).q
             found = found.reshape(len(target), -1, arm.n)
+            found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
             return found, np.arange(found.shape[1]) % max(B, 1)
 
         out = examined(

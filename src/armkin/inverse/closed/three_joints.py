@@ -154,7 +154,8 @@ class Position:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-_six(self.across)).tolist()
         if not self.prismatic[2]:
-            third, doubt = self._roots(_sum(across, *(_product(six, six) for six in g)), size)
+            # pairs of complex roots stay off the unit circle: normalised they may be a real root once more
+            third, doubt = trig_quadratic(_sum(across, *(_product(six, six) for six in g)), size * size)
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
@@ -180,11 +181,6 @@ class Position:
         y = self._tip(third)
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
-
-    def _roots(self, six: list[Entry], size: Entry) -> tuple[Pair, Doubt]:
-        """Joint 3, revolute, from a quadratic equation of its cosine and sine."""
-        pair, doubt = trig_quadratic(six, size * size)
-        return normalised(pair), doubt
 
     def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         alone = self._affine(self.alone, known)
@@ -245,7 +241,7 @@ class Position:
             d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
             third = Pair(d, None)
         else:
-            third, doubt = self._roots(six, size)
+            third, doubt = trig_quadratic(six, size * size)
         return third, Pair(_at(d2, third), None), doubt
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:

@@ -1,0 +1,43 @@
+"""Solutions from many starts, for targets that the elimination could not settle as they stand: a search, no proof."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import SEED
+from armkin.inverse.tasks.task import Task
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+STARTS, FEW = 64, 16
+STEPS = 25
+SLOW = (
+    1e-11  # residual above which a root was not reached: one of high order, to which each step goes a part of the way
+)
+ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes are parallel or at such angles
+
+
+def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
+    """What Newton's method leads to from the same random postures for each target.
+
+    target: (N, m) or (N, 4, 4); lost: (N,) targets that may lack isolated branches: of the others only self-motions
+    are looked for, with `FEW` starts. Returns (N, STARTS, n) postures that miss their target by less than `SEED`, nan
+    elsewhere. Of roots that Newton's method only approaches, the nearest round posture, if that is better.
+    """
+    rng = np.random.default_rng(13)
+    start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
+    row, which = np.nonzero(np.arange(STARTS) < np.where(lost, STARTS, FEW)[:, None])
+    q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS)
+    slow = np.flatnonzero((size > SLOW) & (size < SEED))
+    if len(slow):
+        even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
+        better = newton.missing(arm, task, even, target[row[slow]]) < size[slow]
+        q[slow[better]] = even[better]
+    out = np.full((len(target), STARTS, arm.n), np.nan)
+    out[row, which] = np.where((size < SEED)[:, None], q, np.nan)
+    return out
