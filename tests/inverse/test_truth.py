@@ -5,13 +5,14 @@ These are samples; `python tests/bench/check_ik.py --postures --surfaces --round
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import truth
 from geometries import case, right_angles
-from oracle import Screws, goal, screws
+from oracle import Screws, goal, newton, screws
 from test_every_branch import NAMES, shipped
 
 import armkin
@@ -143,6 +144,42 @@ def test_singular_pencils_of_right_angled_arms(seed: int, q: list[float]) -> Non
         verdict = truth.judge(arm, screw, "pose", joints, target, near)
         truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 60, 1)
         assert verdict, verdict
+
+
+def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, screw = shipped("ur5e")
+    task, _ = solver(arm, None)
+    q = np.random.default_rng(3).uniform(-np.pi, np.pi, (20, 6))
+    q[10:, 4] = 0.0  # its wrist moves by itself
+    target = goal(task, screw, q).array()
+    right = armkin.ik(arm, target, near=q)
+    answers: list[armkin.Solutions] = []
+    monkeypatch.setattr(armkin, "ik", lambda *_, **__: answers[-1])
+
+    def judged_as(**changed: np.ndarray) -> truth.Verdict:
+        answers.append(replace(right, **changed))
+        return truth.judge(arm, screw, None, q, target, near=q)
+
+    assert judged_as()
+    assert (right.status[10:] == Status.SINGULAR).all()
+    rows, first, regular = np.arange(20), right.best, list(range(10))
+    without = right.valid.copy()
+    without[rows, first] = False
+    spoilt = np.where(without[:, :, None], right.q, np.nan)
+    assert judged_as(valid=without, q=spoilt).lost[:10] == regular
+    # a curve that is not reported, and a branch half a radian along it
+    along = right.q.copy()
+    null = np.linalg.svd(armkin.jacobian(arm, q[10:]))[2][:, -1]
+    along[rows[10:], first[10:]], _ = newton(screw, truth.goal_of(task, target[10:]), q[10:] + 0.5 * null, 60)
+    verdict = judged_as(q=along, status=np.zeros_like(right.status))
+    assert verdict.lost == list(range(10, 20)), verdict
+    twice = right.q.copy()
+    twice[rows, (first + 1) % right.q.shape[1]] = right.q[rows, first]
+    assert set(judged_as(q=twice, valid=right.valid | (np.arange(right.valid.shape[1]) == 1)).twice) >= set(regular)
+    false = right.q.copy()
+    false[rows, first, 0] += 1e-6
+    assert judged_as(q=false).false == rows.tolist()
+    assert judged_as(status=np.full_like(right.status, Status.UNREACHABLE)).unreachable == rows.tolist()
 
 
 @pytest.mark.parametrize("q", [[180, 90, -90, -90, -90, 0], [180, 90, 180, -90, -90, 180], [0, -90, 0, -90, -90, 180]])

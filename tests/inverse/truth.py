@@ -210,7 +210,9 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     for k in np.flatnonzero(reached & ~none & ~known & ~on_curve):
         # one with a branch further away, if the postures between them solve the target, too
         b = int(np.nan_to_num(d[k].max(axis=1), nan=np.inf).argmin())
-        if not _in_one_valley(arm, screw, goals.take([k]), asked[k], s.q[k, b]):
+        # a longer valley is a self-motion, which the answer has to report
+        long = d[k, b].max() > CLOSE and s.status[k] != Status.SINGULAR
+        if long or not _in_one_valley(arm, screw, goals.take([k]), asked[k], s.q[k, b]):
             verdict.lost.append(int(k))
     B = s.q.shape[1]
     for i in range(B):
@@ -241,7 +243,11 @@ def _way(screw: Screws, a: Array, b: Array) -> Array:
 
 
 def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> bool:
-    """Whether three postures between two solve the target: on the chord, or beside it where a valley is curved."""
+    """Whether three postures between two solve the target: on the chord, or beside it where a valley is curved.
+
+    Beside it means within a tenth of its length: that reaches neither of the two, so that what is found is a third
+    solution. Isolated branches have none.
+    """
     d = _way(screw, a, b)
     for part in (0.25, 0.5, 0.75):
         q = (a + part * d)[None]

@@ -154,8 +154,7 @@ class Position:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-_six(self.across)).tolist()
         if not self.prismatic[2]:
-            # pairs of complex roots stay off the unit circle: normalised they may be a real root once more
-            third, doubt = trig_quadratic(_sum(across, *(_product(six, six) for six in g)), size * size)
+            third, doubt = _turn(_sum(across, *(_product(six, six) for six in g)), size)
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
@@ -241,7 +240,7 @@ class Position:
             d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
             third = Pair(d, None)
         else:
-            third, doubt = trig_quadratic(six, size * size)
+            third, doubt = _turn(six, size)
         return third, Pair(_at(d2, third), None), doubt
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
@@ -253,6 +252,16 @@ class Position:
             return Pair(arrays.mul(-1.0 / slope, known), None), Doubt(np.zeros(1, bool))
         third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])
         return normalised(third), doubt
+
+
+def _turn(six: list[Entry], size: Entry) -> tuple[Pair, Doubt]:
+    """Joint 3, revolute, from a quadratic equation of its cosine and sine.
+
+    Pairs of complex roots stay off the unit circle, no longer than 2: normalised they may be a real root once more.
+    """
+    pair, doubt = trig_quadratic(six, size * size)
+    shorter = 1.0 / np.maximum(1.0, 0.5 * np.sqrt(pair.c * pair.c + pair.s * pair.s))
+    return Pair(pair.c * shorter, pair.s * shorter), doubt
 
 
 def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
