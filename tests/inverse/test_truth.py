@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,7 +157,7 @@ def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyP
     answers: list[armkin.Solutions] = []
     monkeypatch.setattr(armkin, "ik", lambda *_, **__: answers[-1])
 
-    def judged_as(**changed: np.ndarray) -> truth.Verdict:
+    def judged_as(**changed: Any) -> truth.Verdict:
         answers.append(replace(right, **changed))
         return truth.judge(arm, screw, None, q, target, near=q)
 

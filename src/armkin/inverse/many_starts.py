@@ -14,7 +14,7 @@ from armkin.inverse.tasks.task import Task
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-STARTS, FEW = 64, 16
+STARTS = 64
 STEPS = 25
 SLOW = (
     1e-11  # residual above which a root was not reached: one of high order, to which each step goes a part of the way
@@ -23,21 +23,22 @@ ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes ar
 
 
 def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
-    """What Newton's method leads to from the same random postures for each target.
+    """What Newton's method leads to from the same random postures for each target that may lack branches.
 
-    target: (N, m) or (N, 4, 4); lost: (N,) targets that may lack isolated branches: of the others only self-motions
-    are looked for, with `FEW` starts. Returns (N, STARTS, n) postures that miss their target by less than `SEED`, nan
-    elsewhere. Of roots that Newton's method only approaches, the nearest round posture, if that is better.
+    target: (N, m) or (N, 4, 4); lost: (N,). Returns (N, STARTS, n) postures that miss their target by less than
+    `SEED`, nan elsewhere. Of roots that Newton's method only approaches, the nearest round posture, if that is better.
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
-    row, which = np.nonzero(np.arange(STARTS) < np.where(lost, STARTS, FEW)[:, None])
+    row, which = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
+    out = np.full((len(target), STARTS, arm.n), np.nan)
+    if not len(row):
+        return out
     q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS)
     slow = np.flatnonzero((size > SLOW) & (size < SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
         better = newton.missing(arm, task, even, target[row[slow]]) < size[slow]
         q[slow[better]] = even[better]
-    out = np.full((len(target), STARTS, arm.n), np.nan)
     out[row, which] = np.where((size < SEED)[:, None], q, np.nan)
     return out

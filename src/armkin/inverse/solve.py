@@ -234,7 +234,7 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
 
-            And what Newton's method finds from many starts: self-motions that the targets around do not have.
+            And of targets that may lack branches what Newton's method finds from many starts.
             """
             there = around(arm, task, target)
             found = solve(there.reshape(-1, *target.shape[1:])).q
