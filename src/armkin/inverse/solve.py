@@ -239,7 +239,8 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
             there = around(arm, task, target)
             found = solve(there.reshape(-1, *target.shape[1:])).q
             found = found.reshape(len(target), -1, arm.n)
-            found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
+            if lost.any():  # few columns let clusters of roots be averaged: see `singularities.means`
+                found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
             return found, np.arange(found.shape[1]) % max(B, 1)
 
         out = examined(
