@@ -8,8 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from slow import SLOW
+
+# The same examples in every run: what fails, fails for everybody. `--hypothesis-profile=explore` looks for new ones.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("explore", derandomize=False, deadline=None)
+settings.load_profile("same")
 
 if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
     _NEEDS = ("pty_board", "pty_port", "import pty", "import fcntl", "emulator")

@@ -11,14 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from armkin.board.firmware import lines, segments
 from armkin.board.firmware.cutting import plan as plan_moves
-from armkin.board.firmware.protocol import Segment
-from armkin.board.sim.velocity import times_valid
+from armkin.board.firmware.protocol import AxisImage, Image, Segment
+from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.errors import NoSolutionError, UsageError
+from armkin.hardware import BOARDS
 from armkin.model import build as arms
 from armkin.model.arm import Arm
 from armkin.motion import profile
@@ -67,7 +68,7 @@ def trapezoid(t: np.ndarray, length: float, top: float, accel: float) -> np.ndar
     return np.where(t < rise, up, np.where(t > whole - rise, down, cruise))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.lists(counts, min_size=1, max_size=5), st.data())
 def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], data: st.DataObject) -> None:
     end = [x + data.draw(st.integers(-900, 900)) for x in start]
@@ -105,39 +106,92 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02
 
 
-@settings(max_examples=25, deadline=None)
+def off(s: Segment, axis: int = 0) -> float:
+    """Steps that a motor may be off at a segment's end: its rate rounded, and its ticks to whole cycles.
+
+    A rate has 2^-16 step of rounding a tick, a fine one 2^-24 (PROTOCOL.md, section 6). An interval is cut to whole
+    cycles: less than one a tick. Where `add` makes at most three cycles of difference in all, it is there to make up
+    for that: rounding it to 2^-16 cycle moves its thresholds by T^2 / 2^17 ticks, and a cycle or two are left.
+    """
+    rate, even = abs(s.rates[axis]), abs(s.add) * s.ticks <= 3 << 16
+    cycles = min(s.ticks, s.ticks**2 / 2**17 + 2) if even else s.ticks
+    return float(
+        s.ticks * 2.0 ** (-24 if rate < 2**15 else -16) + rate / 2**23 * s.ticks * cycles / segments.cycles_of(s)
+    )
+
+
+@settings(max_examples=25)
 @given(st.integers(1, 20_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 400_000))
+@example(2825, 7288.0, 387718.0)
+@example(13029, 12402.0, 325045.0)
 def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, accel: float) -> None:
-    move = lines.line([0], [n], rate / n, accel / n)
-    times = np.cumsum([0, *(segments.cycles_of(s) for s in move.segments)]) / CLOCK
-    place = np.cumsum([0, *(s.ticks * s.rates[0] / 2**23 for s in move.segments)])
-    # Over any stretch of time h, twice its distance from a straight run is at most a h^2, but for the
-    # rounding of a step: the definition of an acceleration that whole steps allow.
-    for i in range(len(times) - 2):
-        t0, t1, t2 = times[i : i + 3]
-        p0, p1, p2 = place[i : i + 3]
-        bend = (p2 - p1) / (t2 - t1) - (p1 - p0) / (t1 - t0)
-        assert abs(bend) <= accel * (t2 - t0) / 2 + 0.02 * rate + 1 / (t2 - t0)
+    """The mean speeds of two stretches of h1 and h2 seconds differ by a (h1 + h2) / 2 at most: x'' <= a, twice summed.
+
+    A place that is e off at an end of a stretch of h seconds makes e / h of its mean speed: much behind a long cruise,
+    where a ramp's first piece of 1.5 ms makes up for it.
+    """
+    cut = list(lines.line([0], [n], rate / n, accel / n).segments)
+    h = np.array([segments.cycles_of(s) / CLOCK for s in cut])
+    mean = np.array([s.ticks * s.rates[0] / 2**23 for s in cut]) / h
+    e = np.zeros(len(cut) + 1)
+    for k, s in enumerate(cut):  # at the greatest rate, which is 2^-16 short of a step, nothing is made up for
+        e[k + 1] = off(s) + (e[k] if abs(s.rates[0]) == 2**23 - 128 else 0.0)
+    allowed = (e[:-1] + e[1:]) / h
+    assert np.all(np.abs(np.diff(mean)) <= accel * (h[:-1] + h[1:]) / 2 + allowed[:-1] + allowed[1:])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(1, 5_000), st.floats(500, CLOCK / MIN_INTERVAL), st.floats(0.002, 0.03))
+@example(228, 1028.0, 0.002)
 def test_a_short_ramp_pays_for_no_long_cruise(n: int, rate: float, ramp: float) -> None:
-    """Whole cycles an interval once left a long cruise 0.1 ms too long, and the next piece a quarter too fast."""
+    """Whole cycles an interval once left a long cruise 0.1 ms too long, and the next piece a quarter too fast.
+
+    The cutter lets a segment's ends have 102 % of the rate; its intervals lie between those of its ends, but for the
+    whole cycles of each tick and of their sum so far: two of at least MIN_INTERVAL.
+    """
     move = lines.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
     gaps = np.diff(np.array(tick_times(move.segments)), prepend=0)
     per_tick = np.repeat([abs(s.rates[0]) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
-    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.03  # whole cycles an interval
+    assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02 * MIN_INTERVAL / (MIN_INTERVAL - 2)
 
 
-@settings(max_examples=25, deadline=None)
+shares = st.floats(-1, 1)
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 20_000), st.tuples(shares, shares), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(-3.3, 0.5))
+@example(4797, (-1226 / 4797, -1929 / 4797), 688.19, math.log10(688.19 / 113384.3))
+@example(12622, (-8416 / 12622, -1511 / 12622), 816.0989189348095, math.log10(816.0989189348095 / 169332.38797608978))
+@example(6823, (3456 / 6823, -438 / 6823), 1610.2148218931156, math.log10(1610.2148218931156 / 400_000))
+@example(174, (99 / 174, -23 / 174), 841.6790783948575, math.log10(841.6790783948575 / 49525.12525992744))
+@example(228, (0.0, 0.0), 1028.0, math.log10(0.002))
+@example(2825, (0.0, 0.0), 7288.0, math.log10(7288 / 387718))
+def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float, ramp: float) -> None:
+    """RATE and ACCEL in the board's integers, with no motor's bound above what the line asks of it.
+
+    RATE was refused of 4 in some 1,500 lines of three motors: only the one with the most steps was held to its rate.
+    """
+    accel = min(400_000, rate / 10**ramp)
+    end = [n, *(round(share * n) for share in of)]
+    rates, accels = ([math.ceil(most * abs(x) / n) for x in end] for most in (rate * 1.05, accel))
+    axes = [AxisImage(True, False, -n, n, 0, max(1, v), max(1, a)) for v, a in zip(rates, accels, strict=True)]
+    velocity = Velocity(replace(BOARDS["uno_cnc_shield"], min_interval=MIN_INTERVAL), Image(tuple(axes)))
+    for s in lines.line([0, 0, 0], end, rate / n, accel / n).segments:
+        velocity.begin(s)
+        for axis, made_of in enumerate(s.rates):
+            velocity.check(axis, made_of)
+    for axis in range(3):
+        velocity.check_rest(axis)
+
+
+@settings(max_examples=25)
 @given(st.integers(1, 30_000), st.floats(50, CLOCK / MIN_INTERVAL), st.floats(200, 200_000))
+@example(30_000, 50.0, 200.0)
 def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
-    move = lines.line([0], [n], rate / n, accel / n)
-    length = [segments.cycles_of(s) / CLOCK for s in move.segments]
-    for i in range(len(length) - 30):
-        s = list(move.segments)[i]
+    cut = list(lines.line([0], [n], rate / n, accel / n).segments)  # once: a long line makes them anew each time
+    length = [segments.cycles_of(s) / CLOCK for s in cut]
+    for i, s in enumerate(cut[:-30]):
         u = abs(s.rates[0]) / 2**23 * CLOCK / min(s.interval, s.last_interval) / accel
         assert sum(length[i : i + 30]) > u + u / 32 + 0.002 + 0.02
 

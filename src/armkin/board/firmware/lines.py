@@ -30,6 +30,7 @@ _BEFORE_STEP = 0.9  # of the time to its first step: until then no motor tells h
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
 _SPLIT = 0.08  # [s] a cruise segment whose end is one of its own
+_MOST = (1.02, 1.04)  # of its top rate, that the motor with the most steps makes, and any other; the board takes 1.05
 _SPARE = 0.0005  # of a piece's steps, that are left for the next one to make up for
 _EAGER = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
@@ -73,7 +74,8 @@ class LineSegments:
         """The segments in order."""
         law, span, steps = self.law, self.end - self.start, self._steps
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
-        most = 1.02 * law.peak * steps / law.length  # [counts/s]
+        shares = np.where(np.abs(span) == steps, *_MOST) * np.abs(span)
+        most = [float(m) for m in shares * law.peak / law.length]  # [counts/s] of every motor
         for times, ending in _on_steps(law, _bounds(law, _ratios(law, steps, self.rough), steps), steps):
             done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
             if ending:
@@ -101,20 +103,21 @@ def count(law: Profile, steps: int, rough: bool = False) -> int:
 
 
 def _slow_enough(
-    cutter: Cutter, seconds: float, counts: Sequence[float], change: float, drift: float, most: float
+    cutter: Cutter, seconds: float, counts: Sequence[float], change: float, drift: float, most: Sequence[float]
 ) -> Segment:
-    """A piece in which no motor exceeds `most` [counts/s]: where rounding asks for it, it lasts longer.
+    """A piece in which no motor exceeds its `most` [counts/s]: where rounding asks for it, it lasts longer.
 
-    A piece of a third of a step has a hundredth of one to make up for.
+    A piece of a third of a step has a hundredth of one to make up for; the board checks every motor by itself.
     """
     places = list(cutter.places)
     for _ in range(4):
         one = cutter.piece(seconds, counts, change, drift)
-        top = max(map(abs, one.rates)) / STEP * cutter.clock / min(one.interval, one.last_interval)
-        if top <= most:
+        ticks = cutter.clock / min(one.interval, one.last_interval) / STEP  # a second, over a step
+        over = max((abs(r) * ticks / m for r, m in zip(one.rates, most, strict=True) if r), default=0.0)
+        if over <= 1.0:
             break
         cutter.places, cutter.late = list(places), 0.0
-        seconds *= 1.001 * top / most
+        seconds *= 1.001 * over
     return one
 
 
