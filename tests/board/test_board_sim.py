@@ -86,7 +86,7 @@ class Host:
         return status
 
     def move(self, axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], at_rest: bool) -> Error:
-        plan = [self.board.motors.plan[axis] for axis in axes]  # 2^-23 step
+        plan = [self.board.motors.queue.plan[axis] for axis in axes]  # 2^-23 step
         ends = [(p + sum(s.ticks * s.rates[i] for s in segments)) >> 23 for i, p in enumerate(plan)]
         return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest))
 
@@ -145,7 +145,7 @@ def test_a_queue_that_runs_dry_stops_in_time() -> None:
 def test_a_queue_that_ends_abruptly_is_lost() -> None:
     host = ready()
     assert host.move([0, 1], [0, 0], CRUISE[:1], at_rest=False) == Error.OK
-    host.board.motors._dry = lambda: False  # type: ignore[method-assign]  # a board too busy to notice in time
+    host.board.motors.queue.dry = lambda: False  # type: ignore[method-assign]  # a board too busy to notice in time
     host.board.advance(0.2)
     status = host.status()
     assert (status.error, status.state, status.known) == (Error.DRY, State.IDLE, 4)
@@ -190,7 +190,7 @@ def test_the_abort_input_stops_and_blocks() -> None:
     host = ready()
     assert host.move([0, 1], [0, 0], CRUISE, at_rest=True) == Error.OK
     host.board.advance(0.05)
-    host.board.abort_level = False
+    host.board.inputs.abort_level = False
     host.board.advance(0.4)
     assert host.status().error == Error.ABORT
     assert host.status().state == State.IDLE
@@ -270,7 +270,7 @@ def test_a_planned_line_runs_to_its_count() -> None:
         for s in list(segments)[done : done + free]:
             done += 1
             assert host.move([0, 1, 2], at, [s], at_rest=done == len(segments)) == Error.OK
-            at = host.board.motors.plan_counts()[:3]
+            at = host.board.motors.queue.plan_counts()[:3]
         host.board.advance(0.01)
     while host.status().state == State.MOVING:
         host.board.advance(0.1)

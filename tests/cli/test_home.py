@@ -125,13 +125,13 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
     again = run("home", path, "--port", "COM3", "--json")
     assert all(abs(one["steps"]) <= 1 for one in again.json["lost_steps"]), again.json["lost_steps"]
     assert "lost" not in again.err
-    board.motors.net[0] -= 40
+    board.motors.axes.net[0] -= 40
     pushed = run("home", path, "--port", "COM3", "--json")
     x, y, z = pushed.json["lost_steps"]
     assert x["steps"] == pytest.approx(40, abs=1)
     assert x["difference"] == pytest.approx(x["steps"] / arm.motor_gain[0, 0] * 180 / np.pi)
     assert max(abs(y["steps"]), abs(z["steps"])) <= 1
-    board.motors.net[0] -= 40
+    board.motors.axes.net[0] -= 40
     told = run("home", path, "--port", "COM3")
     assert f"q1: {x['steps']} steps were lost since its position was last set ({x['difference']:.3f} deg)" in told.err
     assert "q2" not in told.err.replace("homing q2", "")

@@ -33,7 +33,7 @@ def test_status_tells_the_power_that_an_input_senses(tmp_path: Path, monkeypatch
     monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
     assert run("send", path, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
     assert run("status", path, "--port", "COM3", "--json").json["motor_power"] is True
-    board.power_level = False
+    board.inputs.power_level = False
     cut = run("status", path, "--port", "COM3")
     assert "off: the position is lost" in cut.out
     assert "position lost" in cut.out or "position is lost" in cut.out

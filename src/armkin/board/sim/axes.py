@@ -1,0 +1,44 @@
+"""Counts of the simulated board's axes, and the limit rule that holds for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armkin.board.firmware.protocol import Image, RowImage
+from armkin.board.sim.setup import Setup
+
+
+def within(lower: int, upper: int, before: int, after: int) -> bool:
+    """The limit rule: inside, or not farther outside than before."""
+    if after < lower:
+        return after >= before
+    return after <= upper or after <= before
+
+
+def row_value(row: RowImage, counts: list[int]) -> int:
+    """Sum of weight x count."""
+    return sum(w * c for w, c in zip(row.weight, counts, strict=True))
+
+
+class Axes:
+    """Where the axes stand, and of which of them the board knows it."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self.known = 0
+        self.base = [0] * len(setup.board.axes)  # counts at the running segment's start
+        self.net = [0] * len(setup.board.axes)  # steps since power-on: what the arm feels
+
+    @property
+    def image(self) -> Image:
+        """The configuration in force."""
+        return self._setup.image
+
+    def settle(self, steps: list[int]) -> None:
+        """Add steps that were made."""
+        self.base = [b + m for b, m in zip(self.base, steps, strict=True)]
+        self.net = [b + m for b, m in zip(self.net, steps, strict=True)]
+
+    def lose(self, rates: Sequence[int]) -> None:
+        """Forget the counts of the axes that move at these rates."""
+        self.known &= ~sum(1 << i for i, r in enumerate(rates) if r)

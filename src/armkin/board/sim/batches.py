@@ -1,0 +1,59 @@
+"""What the simulated board checks of a MOTION frame before it queues a segment of it (firmware/PROTOCOL.md, 6)."""
+
+from __future__ import annotations
+
+from armkin.board.firmware.protocol import STEP, Error, Segment
+from armkin.board.sim.axes import within
+from armkin.board.sim.frames import Batch, RefusedError
+from armkin.board.sim.queue import Queue
+from armkin.board.sim.rows import Rows
+from armkin.board.sim.setup import Setup
+from armkin.board.sim.velocity import Velocity, times_valid
+
+
+class Batches:
+    """The batches of one motion: speeds at the plan's end, and the nearest that coupled joints were to their limits."""
+
+    def __init__(self, setup: Setup, queue: Queue) -> None:
+        self._setup, self._queue = setup, queue
+        self.begin()
+
+    def begin(self) -> None:
+        """A motion begins, at rest where the queue ends."""
+        self._velocity = Velocity(self._setup.board, self._setup.image)
+        self._rows = Rows(self._setup.image, self._queue.plan_counts())
+
+    def check(self, batch: Batch, known: int) -> list[Segment]:
+        """The batch's segments with a rate for every axis; RefusedError if one of them must not run."""
+        plan, speed = list(self._queue.plan), self._velocity.copy()
+        segments = [self._segment(i, s, batch.axes, plan, speed, known) for i, s in enumerate(batch.segments)]
+        ends = dict(zip(batch.axes, batch.end, strict=True))
+        for axis in range(len(plan)):
+            if batch.at_rest:
+                speed.check_rest(axis)
+            if axis in ends and plan[axis] >> 23 != ends[axis]:
+                raise RefusedError(Error.END, axis)
+        self._velocity = Velocity(self._setup.board, self._setup.image) if batch.at_rest else speed
+        return segments
+
+    def _segment(
+        self, number: int, s: Segment, axes: list[int], plan: list[int], speed: Velocity, known: int
+    ) -> Segment:
+        """A batch's segment with a rate for every axis; moves `plan` to its end."""
+        if not times_valid(s, self._setup.board.min_interval):
+            raise RefusedError(Error.INTERVAL, number)
+        rates, before = [0] * len(plan), [p >> 23 for p in plan]
+        given = dict(zip(axes, s.rates, strict=True))
+        speed.begin(s)
+        for axis in range(len(plan)):
+            rate = given.get(axis, 0)
+            if rate == -STEP:
+                raise RefusedError(Error.STEPS, axis)
+            speed.check(axis, rate)
+            rates[axis] = rate
+            plan[axis] += s.ticks * rate
+            image, after = self._setup.image.axes[axis], plan[axis] >> 23
+            if axis in given and not within(image.lower, image.upper, before[axis], after):
+                raise RefusedError(Error.LIMIT, axis)
+        self._rows.check([p >> 23 for p in plan], known)
+        return Segment(s.ticks, s.interval, s.add, tuple(rates), s.bend)

@@ -1,0 +1,64 @@
+"""Homing and jogging move along a vector of rates, of which a share between 0 and 1 is run."""
+
+from __future__ import annotations
+
+from armkin.board.sim.axes import Axes, row_value, within
+
+_TICK = 0.001  # [s]
+
+
+class Cruise:
+    """A vector and its share, a step every millisecond; standing when made."""
+
+    def __init__(self, axes: Axes) -> None:
+        self.axes = axes
+        self.now = 0.0  # [s] simulated time
+        self.stopped = False  # the motion is to end
+        self.aim([0] * len(axes.base))
+
+    def aim(self, rate: list[int]) -> None:
+        """Begin a vector, at rest."""
+        self.rate, self.share = rate, 0.0
+        self.far = 0.0  # counts made along the vector by its fastest axis
+        self._done = [0.0] * len(rate)
+
+    @property
+    def slope(self) -> float:
+        """Change of the share in a second that no axis is overtaxed by."""
+        return min((self.axes.image.axes[i].max_accel / abs(r) for i, r in enumerate(self.rate) if r), default=1e9)
+
+    @property
+    def braking(self) -> float:
+        """Counts that the fastest axis needs to stop."""
+        return self.share**2 / (2 * self.slope) * max(abs(r) for r in self.rate)
+
+    def velocity(self) -> list[float]:
+        """Every axis's velocity just now."""
+        return [r * self.share for r in self.rate]
+
+    def glide(self, target: float) -> None:
+        """One millisecond with the share on its way to `target`."""
+        before, step = self.share, self.slope * _TICK
+        self.share = min(before + step, target) if target > before else max(before - step, target)
+        moved = (before + self.share) / 2 * _TICK
+        self.far += moved * max(abs(r) for r in self.rate)
+        total = [d + r * moved for d, r in zip(self._done, self.rate, strict=True)]
+        steps = [int(t) - int(d) for t, d in zip(total, self._done, strict=True)]
+        self._done = total
+        self.axes.settle(steps)
+
+    def clear(self) -> bool:
+        """Whether the arm, were it to brake after the next millisecond, would stay within its limits."""
+        image, base, known = self.axes.image, self.axes.base, self.axes.known
+        share = min(self.share + self.slope * _TICK, 1.0)
+        ahead = share * _TICK + share * share / (2 * self.slope) + share * _TICK
+        there = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
+        for i, axis in enumerate(image.axes):
+            if self.rate[i] and known >> i & 1 and not within(axis.lower, axis.upper, base[i], there[i]):
+                return False
+        for row in image.rows:
+            if all(known >> i & 1 for i, w in enumerate(row.weight) if w) and not within(
+                row.lower, row.upper, row_value(row, base), row_value(row, there)
+            ):
+                return False
+        return True

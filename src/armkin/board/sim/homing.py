@@ -1,0 +1,106 @@
+"""The simulated board's homing: HOME of firmware/PROTOCOL.md, section 8, in simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+
+from armkin.board.firmware.protocol import Error
+from armkin.board.sim.cruise import Cruise
+
+_DEBOUNCE = 0.004  # [s]
+
+
+@dataclass(frozen=True)
+class Search:
+    """A HOME frame's fields."""
+
+    switch: int
+    closed: bool  # level of the pressed switch
+    slow: float  # share of the rates
+    backoff: int  # counts of the fastest axis
+    travel: int  # counts of the fastest axis
+    time: float  # [s]
+    rate: list[int]
+
+
+class Homing:
+    """One search at a time, and the counts that the last one has latched."""
+
+    def __init__(self, cruise: Cruise, level: Callable[[int], bool], fault: Callable[[Error], None]) -> None:
+        self._cruise, self._level, self._fault = cruise, level, fault
+        self.latch = [0] * len(cruise.axes.base)  # counts at the edge
+        self.latched = False  # a search has finished
+        self._since = -1.0  # [s] when the switch took the level waited for; -1: it has not
+        self._at: list[int] = []  # counts at that time
+        self._beyond = 0  # counts past the edge that the first approach came to rest at
+
+    def run(self, search: Search) -> Iterator[None]:
+        """Look for a switch, a step a millisecond."""
+        self.latched = False
+        self._until = self._cruise.now + search.time
+        return self._phases(search)
+
+    def _phases(self, s: Search) -> Iterator[None]:
+        """Off the switch, fast to its edge, back, slowly to its edge."""
+        back = [-r for r in s.rate]
+        if self._pressed(s) and not (yield from self._edge(s, back, s.slow, False, 2 * s.backoff, Error.SWITCH)):
+            return
+        if not (yield from self._edge(s, s.rate, 1.0, True, s.travel, Error.TRAVEL)):
+            return
+        if not (yield from self._slide(back, 1.0, lambda: self._backed(s), 2**31, Error.SWITCH)):
+            return
+        if self._pressed(s):
+            self._fault(Error.SWITCH)
+        elif (yield from self._edge(s, s.rate, s.slow, True, 2 * s.backoff, Error.SWITCH)):
+            self.latched = True
+
+    def _edge(
+        self, s: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
+    ) -> Generator[None, None, bool]:
+        """Slide until the switch is steadily pressed, or released."""
+        self._since = -1.0
+        return self._slide(vector, share, lambda: self._steady(s, pressed), limit, error)
+
+    def _slide(
+        self, vector: list[int], share: float, done: Callable[[], bool], limit: int, error: Error
+    ) -> Generator[None, None, bool]:
+        """Move until `done`, then to rest; its value: whether it went well."""
+        cruise, fine = self._cruise, True
+        cruise.aim(vector)
+        while not cruise.stopped and not done():
+            if cruise.far > limit or cruise.now > self._until:
+                self._fault(Error.TIME if cruise.now > self._until else error)
+                fine = False
+                break
+            cruise.glide(share)
+            yield
+        while cruise.share > 0:
+            cruise.glide(0.0)
+            yield
+        if not fine or cruise.stopped:
+            return False
+        yield  # a millisecond at rest between two motions
+        return True
+
+    def _pressed(self, s: Search) -> bool:
+        return self._level(s.switch) == s.closed
+
+    def _steady(self, s: Search, pressed: bool) -> bool:
+        """Whether the switch has had a level for long enough; latches the counts at which it took it."""
+        now = self._cruise.now
+        if self._pressed(s) != pressed:
+            self._since = -1.0
+        elif self._since < 0:
+            self._since, self._at = now, list(self._cruise.axes.base)
+        steady = self._since >= 0 and now - self._since >= _DEBOUNCE
+        if steady:
+            self.latch = self._at
+        return steady
+
+    def _backed(self, s: Search) -> bool:
+        """Whether braking now ends at the back-off before the edge."""
+        leader = max(range(len(s.rate)), key=lambda i: abs(s.rate[i]))
+        if self._cruise.far == 0:
+            self._beyond = abs(self._cruise.axes.base[leader] - self.latch[leader])
+        return self._cruise.far + self._cruise.braking >= s.backoff + self._beyond

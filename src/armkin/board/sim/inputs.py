@@ -1,0 +1,44 @@
+"""The simulated board's inputs: limit switches, the abort input, the motors' supply."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from armkin.board.sim.rows import toward
+from armkin.board.sim.setup import Setup
+
+
+class Inputs:
+    """Levels of the inputs, and what they mean with the configuration in force."""
+
+    def __init__(self, setup: Setup, switch: Callable[[int], bool] | None = None) -> None:
+        self._setup = setup
+        self._switch = switch or self._released
+        self.abort_level = True  # pulled up
+        self.power_level = True
+
+    def level(self, number: int) -> bool:
+        """Level of a limit input."""
+        return self._switch(number)
+
+    def aborted(self) -> bool:
+        """Whether the abort input is active."""
+        return bool(self._setup.crc) and self.abort_level == self._setup.image.abort_closed
+
+    def power_cut(self) -> bool:
+        """Whether the motors' supply is sensed and off."""
+        return bool(self._setup.crc) and self._setup.image.power_sensed and not self.power_level
+
+    def ahead(self, rates: Sequence[float]) -> int | None:
+        """The first switch that guards, is pressed, and that these rates lead on into."""
+        if not self._setup.crc:
+            return None
+        for n, guard in enumerate(self._setup.image.guards):
+            if any(guard.weight) and self.level(n) == guard.closed and toward(guard, rates):
+                return n
+        return None
+
+    def _released(self, number: int) -> bool:
+        """Level of a switch that nobody presses: low if it is configured as normally closed."""
+        guards = self._setup.image.guards
+        return not (self._setup.crc and number < len(guards) and guards[number].closed)

@@ -1,0 +1,44 @@
+"""The simulated board's jogging: a vector that the host repeats, or the arm stops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armkin.board.sim.cruise import Cruise
+
+_DEAD_MAN = 0.250  # [s]
+
+
+class Jogging:
+    """The vector wanted, and until when."""
+
+    def __init__(self, cruise: Cruise) -> None:
+        self._cruise = cruise
+        self._wanted: list[int] = []
+        self._until = 0.0
+
+    def want(self, rate: list[int]) -> None:
+        """Move with this vector for another 250 ms."""
+        self._wanted, self._until = rate, self._cruise.now + _DEAD_MAN
+
+    def run(self) -> Iterator[None]:
+        """The motion, a step a millisecond."""
+        cruise = self._cruise
+        while True:
+            cruise.aim(self._wanted)
+            if not any(cruise.rate):
+                return
+            while not self._over() and self._wanted == cruise.rate:
+                if not cruise.clear():
+                    self._until = 0.0
+                    break
+                cruise.glide(1.0)
+                yield
+            while cruise.share > 0:
+                cruise.glide(0.0)
+                yield
+            if self._over():
+                return
+
+    def _over(self) -> bool:
+        return self._cruise.stopped or self._cruise.now >= self._until

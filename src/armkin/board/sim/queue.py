@@ -1,0 +1,132 @@
+"""The simulated board's queue of segments, run in simulated time; its counts are exact to the tick."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import accumulate
+
+from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment
+from armkin.board.sim.axes import Axes
+
+_TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
+
+
+def intervals(s: Segment) -> Iterator[int]:
+    """Cycles before every tick, as the device adds them up."""
+    interval, add = s.interval << 16, s.add * 256
+    for tick in range(1, s.ticks + 1):
+        yield interval >> 16
+        interval += add >> 8
+        if (s.ticks - tick) % BLOCK == 0:
+            add += s.bend * 4
+
+
+@dataclass
+class Queued:
+    """A segment with a step for every axis of the board."""
+
+    segment: Segment
+    end: bool
+    times: list[int] = field(default_factory=list)  # cycles from its start to each tick, made when it runs
+
+    def start(self) -> None:
+        """Get ready to run."""
+        s = self.segment
+        self.times = list(accumulate(intervals(s)))
+
+
+class Queue:
+    """Segments that run one after the other, and how far the first has come."""
+
+    def __init__(self, axes: Axes, clock: int, slots: int) -> None:
+        self.axes, self.clock, self.slots = axes, clock, slots
+        self.plan = [HALF] * len(axes.base)  # places where the queue ends, 2^-23 step
+        self._fraction = [HALF] * len(axes.base)  # how far the axes are beyond their base, 2^-23 step
+        self._queue: deque[Queued] = deque()
+        self._at = 0.0  # cycles since the running segment's start
+
+    @property
+    def free(self) -> int:
+        """Free slots."""
+        return self.slots - len(self._queue)
+
+    def milliseconds(self) -> int:
+        """Milliseconds of motion in the queue, the running segment counted whole."""
+        units = sum(q.segment.units() for q in self._queue)
+        return min(units * 256 * 1000 // self.clock, 65535)
+
+    def plan_counts(self) -> list[int]:
+        """Counts where the queue ends."""
+        return [p >> 23 for p in self.plan]
+
+    def append(self, segments: list[Segment], at_rest: bool) -> None:
+        """Queue segments (a step for every axis), the last one ending at rest or not."""
+        for i, segment in enumerate(segments):
+            self._queue.append(Queued(segment, at_rest and i + 1 == len(segments)))
+            self.plan = [p + segment.ticks * r for p, r in zip(self.plan, segment.rates, strict=True)]
+        if at_rest:
+            self.plan = [p // STEP * STEP + HALF for p in self.plan]
+
+    def begin(self) -> None:
+        """Run from the first segment's start."""
+        self._at = 0.0
+        if self._queue:
+            self._queue[0].start()
+
+    def rest(self) -> None:
+        """Be empty, with the axes at rest on their counts."""
+        self._queue.clear()
+        self._at = 0.0
+        self._fraction = [HALF] * len(self.axes.base)
+        self.plan = [count * STEP + HALF for count in self.axes.base]
+
+    def made(self) -> list[int]:
+        """Steps of every axis in the running segment so far."""
+        if not self._queue or not self._queue[0].times:
+            return [0] * len(self.axes.base)
+        s, ticks = self._queue[0].segment, bisect_right(self._queue[0].times, self._at)
+        return [(f + ticks * r) >> 23 for f, r in zip(self._fraction, s.rates, strict=True)]
+
+    def velocity(self) -> list[float]:
+        """Every axis's velocity just now, in any unit."""
+        return [float(r) for r in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.axes.base)
+
+    def run(self, seconds: float) -> Queued | None:
+        """Let time pass; the last segment, if its end has been passed. Axes stopped too abruptly are lost."""
+        self._at += seconds * self.clock
+        while self._queue and self._at >= self._queue[0].times[-1]:
+            speed = self.stop_time()
+            done = self._queue.popleft()
+            places = [f + done.segment.ticks * r for f, r in zip(self._fraction, done.segment.rates, strict=True)]
+            self.axes.settle([p >> 23 for p in places])
+            self._fraction = [HALF if done.end else p % STEP for p in places]
+            rest = self._at - done.times[-1]
+            self.begin()
+            self._at = rest
+            if not self._queue:
+                if not done.end and speed > _TOO_FAST:
+                    self.axes.lose(done.segment.rates)
+                return done
+        return None
+
+    def stop_time(self) -> float:
+        """u of PROTOCOL.md, section 7: the time that the arm needs to stop from its present speed."""
+        if not self._queue or not self._queue[0].times:
+            return 0.0
+        now = self._queue[0]
+        tick = min(bisect_right(now.times, self._at), len(now.times) - 1)
+        interval = now.times[tick] - (now.times[tick - 1] if tick else 0)
+        rate = self.clock / (STEP * interval)
+        limits = zip(now.segment.rates, self.axes.image.axes, strict=True)
+        return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
+
+    def dry(self) -> bool:
+        """Whether what is left is just enough to stop in, and does not end at rest."""
+        if not self._queue or self._queue[-1].end:
+            return False
+        rest = sum(q.segment.units() * 256 for q in self._queue) - self._at
+        u = self.stop_time()
+        return rest / self.clock < u + u / 32 + 0.002

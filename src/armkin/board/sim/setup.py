@@ -1,0 +1,66 @@
+"""What the host has set up on the simulated board: its configuration, and what is switched on."""
+
+from __future__ import annotations
+
+import zlib
+
+from armkin.board.firmware.protocol import AxisImage, Error, Image
+from armkin.board.sim.frames import RefusedError, image_valid
+from armkin.hardware import Board
+
+
+class Setup:
+    """The configuration in force, the bytes of the next one, drivers and servo pulses."""
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        board, n = self.board, len(self.board.axes)
+        self._bytes = bytearray(12 + 21 * n + (1 + n) * len(board.switches) + (8 + 2 * n) * board.rows)
+        self.image = Image(tuple(AxisImage() for _ in board.axes))
+        self.crc = 0  # of the configuration; 0: not configured
+        self.drivers = self.pulses = False
+        self.retained = False  # over a reset
+
+    def retain(self, image: bytes, drivers: bool) -> None:
+        """Take over what stood before a reset; `image` is empty if there was no configuration."""
+        if image:
+            self._bytes[: len(image)] = image
+            self.image = Image.unpack(image, len(self.board.switches)) or self.image
+            self.crc = zlib.crc32(image)
+        self.drivers, self.retained = drivers, True
+
+    def packed(self) -> bytes:
+        """The configuration's bytes, none if there is no configuration."""
+        return self.image.pack() if self.crc else b""
+
+    def write(self, offset: int, data: bytes) -> None:
+        """Write bytes of the next configuration: from now on there is none, and everything is off."""
+        if offset + len(data) > len(self._bytes):
+            raise RefusedError(Error.VALUE)
+        self._bytes[offset : offset + len(data)] = data
+        self.crc = 0
+        self.drivers = self.pulses = self.retained = False
+
+    def commit(self, length: int, crc: int) -> None:
+        """Put the bytes in force, if every field of theirs is in its range."""
+        data = bytes(self._bytes[:length])
+        image = Image.unpack(data, len(self.board.switches))
+        if image is None or len(data) != length or zlib.crc32(data) != crc or not image_valid(image, self.board):
+            raise RefusedError(Error.CONFIG_BAD)
+        self.image, self.crc = image, crc
+
+    def servo(self, axis: int) -> bool:
+        """Whether an axis is a servo."""
+        return bool(self.board.servo_mask >> axis & 1)
+
+    def used(self, axis: int) -> bool:
+        """Whether the configuration uses an axis."""
+        return axis < len(self.image.axes) and self.image.axes[axis].used
+
+    def powered(self, axis: int) -> bool:
+        """Whether an axis has its drivers, or its pulses, on."""
+        return self.pulses if self.servo(axis) else self.drivers
