@@ -16,15 +16,18 @@ _APPEND = {"w": "a", "wb": "ab"}
 
 _ROBOT = re.compile(rb"^convention[ \t]*:", re.MULTILINE), re.compile(rb"^joints[ \t]*:", re.MULTILINE)
 _HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are shorter
-_kept: dict[tuple[int, int], str] = {}  # files that the running command reads
+_kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
 
-def keep(path: str | os.PathLike[str]) -> None:
-    """Remember a file that is read: `whole` does not replace it, however it is spelled or linked."""
+def keep(path: str | os.PathLike[str] | int) -> None:
+    """Remember a file that is read: `whole` does not replace it, however it is spelled or linked.
+
+    A number is a descriptor: 0 is what standard input comes from.
+    """
     with suppress(OSError, ValueError):
         found = os.stat(path)
         if stat.S_ISREG(found.st_mode):
-            _kept[found.st_dev, found.st_ino] = os.fspath(path)
+            _kept.add((found.st_dev, found.st_ino))
 
 
 def forget() -> None:

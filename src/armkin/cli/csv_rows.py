@@ -143,7 +143,7 @@ def batch_rows(
     names, what, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
-    files.keep(source)  # before an output of that name is opened
+    files.keep(0 if source == "-" else source)  # before an output of that name is opened
     return _batch_rows(source, names, what, named)
 
 

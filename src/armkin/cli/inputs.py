@@ -42,6 +42,7 @@ def standard_input(most: int, instead: str = "") -> bytes:
     """
     if sys.stdin is None:
         raise FileError("standard input is closed")
+    files.keep(0)
     try:
         data = sys.stdin.buffer.read(most + 1)
     except (OSError, ValueError) as error:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armkin import files
 from armkin.cli import holding, inputs, linking, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.linking import SIM, Assume, Baud, NoReset, Resume
@@ -212,6 +213,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
     assert file is not None
     if file == "-":
         return path_file.parse(inputs.standard_input(path_file.LARGEST), "standard input")
+    files.keep(file)
     return path_file.read(file)
 
 
