@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -70,8 +71,11 @@ def path(
     >>> armkin.fk(arm, plan.q(plan.duration))[:3, 3].round(6).tolist()
     [390.0, -80.0, 300.0]
     """
+    from armkin.path_file import check_robot
+
     check_rates(arm)
     file = read_moves(arm, moves, task)
+    check_robot(file, arm.name, arm.path)
     for name, value, top in (("speed", speed, 1.0), ("accel", accel, 1.0)):
         if not 0 < value <= top:
             raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from above 0 to 100 percent")
@@ -125,6 +129,7 @@ class _Walk:
     split = False
     branch: str | None = None
     samples: int | None = None
+    at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
     def __init__(
         self,
@@ -137,7 +142,8 @@ class _Walk:
         near: Array | None,
     ) -> None:
         self.arm, self.file, self.pace = arm, file, pace
-        self.task = task_for(arm, task or file.task)
+        with _told(file, "task"):
+            self.task = task_for(arm, task or file.task)
         self.blend = file.blend if blend is None else blend
         self.q = here  # where the joints are when all so far is done
         self.near = near
@@ -148,7 +154,7 @@ class _Walk:
 
     def _clear(self, goal: Spot | None, branch: str | None = None) -> None:
         """Begin a group: at a target whose branch is free, or where the joints are."""
-        self.goal, self.goal_branch = goal, branch
+        self.goal, self.goal_branch, self.group = goal, branch, self.at
         self.spot = goal or geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
         self.pieces: list[Piece] = []
         self.blends: list[float] = []
@@ -156,17 +162,18 @@ class _Walk:
 
     def walked(self) -> PathPlan:
         """The plan of all moves."""
-        start = self._start()
+        with _told(self.file, "start"):
+            start = self._start()
         if start is not None:
             self.q = start
             self._clear(None)
         self.begun = self.q
-        for number, move in enumerate(self.file.moves, 1):
-            try:
+        for number, move in enumerate(self.file.moves):
+            self.at = number, number
+            with _told(self.file, self):
                 getattr(self, f"_{move.kind}")(move, getattr(move, move.kind))
-            except (UsageError, NoSolutionError) as error:
-                raise error.within(f"move {number}", move=number) if len(self.file.moves) > 1 else error from None
-        self._close()
+        with _told(self.file, self):
+            self._close()
         return self.plan.finished(self.begun, self.made, self.markers)
 
     def _start(self) -> Array | None:
@@ -249,6 +256,7 @@ class _Walk:
         self._between("wait", value)
 
     def _grip(self, move: Move, value: Any) -> None:
+        readings.check_grip(self.arm, value)
         self._between("grip", value)
 
     def _between(self, kind: str, value: Any) -> None:
@@ -265,6 +273,7 @@ class _Walk:
 
     def _add(self, move: Move, piece: Piece) -> None:
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
+        self.group = (self.group if self.goal is not None or self.pieces else self.at)[0], self.at[1]
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
         self.blends.append(self.blend if move.blend is None else move.blend)
         self.spot = piece.last
@@ -275,7 +284,12 @@ class _Walk:
     # Groups
 
     def _close(self) -> None:
-        """Plan the group of tool moves that has gathered."""
+        """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
+        now, self.at = self.at, self.group
+        self._plan_group()
+        self.at = now
+
+    def _plan_group(self) -> None:
         if not self.pieces:
             if self.goal is not None:
                 self._go(self._reached(self.goal, self.goal_branch), self.approach)
@@ -353,3 +367,21 @@ class _Walk:
                 return np.asarray(found.q[b])
         what = f" on branch '{wanted}'" if wanted else ""
         raise NoSolutionError(f"a point has no solution within the limits{what}: nothing was moved")
+
+
+@contextmanager
+def _told(file: PathFile, about: str | _Walk) -> Iterator[None]:
+    """Errors inside are said of a key of the file, or of the moves that a walk does now."""
+    try:
+        yield
+    except (UsageError, NoSolutionError) as error:
+        if isinstance(about, str):
+            place, fields = file.place(about) if getattr(file, about) is not None else "", {}
+        else:
+            place, fields = file.place_of(*about.at), {"move": about.at[0] + 1}
+        if not place:
+            raise
+        told = error.within(place, **fields)
+        if (plan := getattr(error, "plan", None)) is not None:
+            told.plan = plan  # type: ignore[union-attr]
+        raise told from None

@@ -54,3 +54,12 @@ def place(task: Task, value: Sequence[float]) -> Array:
     if len(value) < task.position:
         raise UsageError(f"x y z are needed; got {len(value)} numbers")
     return np.asarray(value[: task.position], dtype=float)
+
+
+def check_grip(arm: Arm, value: str | float) -> None:
+    """Raise UsageError for a value of the gripper's drive that is beyond open and closed of the robot file."""
+    if arm.gripper is None or isinstance(value, str):
+        return
+    low, high = sorted((arm.gripper.open, arm.gripper.closed))
+    if not low <= value <= high:
+        raise UsageError(f"grip: {value:g} is outside of the gripper's {low:g} to {high:g}")

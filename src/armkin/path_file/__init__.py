@@ -8,17 +8,19 @@ This package imports pydantic and yaml, and is itself imported only when a path 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from pydantic import ValidationError
 
 from armkin.errors import FileError, PathFileError
-from armkin.path_file.model import Move, PathFile
+from armkin.path_file.model import Move, PathFile, Source
 from armkin.robot_file import strict_yaml
 
 LARGEST = 32_000_000  # [bytes]
-__all__ = ["LARGEST", "Move", "PathFile", "json_schema", "parse", "read", "validated"]
+__all__ = ["LARGEST", "Move", "PathFile", "check_robot", "json_schema", "parse", "read", "validated"]
 
 
 def read(name: str) -> PathFile:
@@ -49,7 +51,7 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     except strict_yaml.StrictYamlError as error:
         raise _invalid(name, [(error.line, error.problem)]) from None
     try:
-        return PathFile.model_validate(_lists(document.data))
+        return PathFile.model_validate(_lists(document.data)).read_from(Source(name, document.lines))
     except ValidationError as error:
         from armkin.path_file import words
 
@@ -64,6 +66,29 @@ def validated(data: dict[str, Any], name: str = "path") -> PathFile:
         from armkin.path_file import words
 
         raise _invalid(name, [(0, text) for _, text in words.told(error)]) from None
+
+
+def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
+    """Raise PathFileError if a path says that it is of another robot than this, by its name or its file."""
+    said = file.robot
+    if said is None or said in (name, robot_file) or (robot_file is not None and _same(said, robot_file, file.folder)):
+        return
+    raise PathFileError(
+        f"{file.place('robot')}: this is a path of {said}, and the arm is {name}; plan it for {said}, "
+        f"or write robot: {name} if it is meant for this arm",
+        robot=name,
+    )
+
+
+def _same(said: str, robot_file: str, folder: str) -> bool:
+    """Whether a shipped robot's name, or a file's as seen from here or from the path's folder, is the robot file."""
+    from armkin.robot_file import catalogue
+
+    for one in (said, os.path.join(folder, said)):
+        with suppress(OSError, ValueError, FileError):
+            if os.path.samefile(catalogue.locate(one), catalogue.locate(robot_file)):
+                return True
+    return False
 
 
 def json_schema() -> dict[str, Any]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 Number = Annotated[float, Field(ge=-1e7, le=1e7)]
@@ -109,8 +112,19 @@ class Move(_Model):
         return self
 
 
+@dataclass(frozen=True)
+class Source:
+    """Where a path was read: the text's name, and the lines of its keys and moves, ("moves", 0) for the first."""
+
+    name: str
+    lines: Mapping[tuple[str | int, ...], int]
+    rows: bool = False  # of CSV
+
+
 class PathFile(_Model):
     """A path: moves one after another."""
+
+    _source: Source | None = PrivateAttr(None)
 
     robot: str | None = Field(None, description="Name or file of the robot.")
     task: str | None = Field(None, description="What targets prescribe; by default the arm's task.")
@@ -122,3 +136,30 @@ class PathFile(_Model):
     blend: Annotated[float, Field(ge=0, le=1e6)] = Field(0.0, description="mm, for all corners; 0 = stop.")
     start: str | Start | None = Field(None, description="A pose's name, joints: or point:. Absent: where the arm is.")
     moves: Annotated[list[Move], Field(min_length=1, max_length=1_000_000)] = Field(description="The moves, in order.")
+
+    def read_from(self, source: Source) -> PathFile:
+        """The same path, which knows where its moves stand."""
+        self._source = source
+        return self
+
+    @property
+    def folder(self) -> str:
+        """The folder of the file; "" for a path that is none."""
+        return "" if self._source is None else os.path.dirname(self._source.name)
+
+    def place(self, key: str) -> str:
+        """Where a key stands, to begin a message with: ``g.yaml:1: robot``; of a path that is no file the key."""
+        line = None if self._source is None else self._source.lines.get((key,))
+        return key if self._source is None or line is None else f"{self._source.name}:{line}: {key}"
+
+    def place_of(self, first: int, last: int) -> str:
+        """Where moves stand (numbers from 0): ``g.yaml:5: move 2``, ``q.csv: row 3``; "" if there is no more to say."""
+        source = self._source
+        if source is not None and source.rows:
+            a, b = (source.lines["moves", k] for k in (first, last))
+            return f"{source.name}: row {a}" if a == b else f"{source.name}: rows {a} to {b}"
+        which = f"move {first + 1}" if first == last else f"moves {first + 1} to {last + 1}"
+        if source is None:
+            return "" if (first, last) == (0, len(self.moves) - 1) else which
+        where = f"{source.name}:{source.lines['moves', first]}"
+        return where if len(self.moves) == 1 else f"{where}: {which}"

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import Move, PathFile
+from armkin.path_file.model import Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
@@ -60,7 +60,8 @@ def parse(raw: bytes, name: str) -> PathFile:
         moves.append(_move(header, [float(v) for v in values if v is not None], first=not moves, where=(name, number)))
     if not moves:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
-    return PathFile.model_construct(moves=moves)
+    lines: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
+    return PathFile.model_construct(moves=moves).read_from(Source(name, lines, rows=True))
 
 
 def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:

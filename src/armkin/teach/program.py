@@ -120,8 +120,7 @@ class Program:
         from armkin import path_file
 
         file = path_file.parse(text, name)
-        if file.robot is not None and file.robot != self.arm.name and file.robot != self.arm.path:
-            raise UsageError(f"{name} is a path of {file.robot}, this is {self.arm.name}")
+        path_file.check_robot(file, self.arm.name, self.arm.path)
         data = file.model_dump(exclude_unset=True, exclude_none=True)
         data.pop("robot", None)
         moves = data.pop("moves")

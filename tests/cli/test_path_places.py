@@ -1,0 +1,101 @@
+"""What is wrong with a path is told with its file and line, against the robot it is planned for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import armkin
+from armkin.errors import NoSolutionError, PathFileError
+from armkin.teach.program import Program
+from command_line import ROOT, THREE_DOF, run
+
+START = "moves:\n  - point: [390, 80, 300]\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("g.yaml", START + "  - line: [390, 140]\n", "g.yaml:3: move 2: a target of task xyz is x y z; got 2 numbers"),
+        ("g.yaml", "moves:\n  - line: [390, 140]\n", "g.yaml:2: a target of task xyz is x y z; got 2 numbers"),
+        (
+            "g.yaml",
+            START + "\n  - circle: {centre: [390, 120, 300], normal: [0, 0, 0]}\n",
+            "g.yaml:4: move 2: circle: its normal has no length",
+        ),
+        (
+            "g.yaml",
+            START + "  - spline: [[390, 100, 300], [390, 100, 300]]\n",
+            "g.yaml:3: move 2: a spline passes the same point twice",
+        ),
+        (
+            "g.yaml",
+            START + "  - arc: {via: [390, 100, 300], to: [390, 120, 300]}\n",
+            "g.yaml:3: move 2: the arc's start, via and to lie on one line",
+        ),
+        ("g.yaml", "task: xyzzy\n" + START, "g.yaml:1: task: "),
+        ("g.yaml", "blend: 0\nstart: nowhere\n" + START, "g.yaml:2: start: there is no pose 'nowhere'"),
+        ("q.csv", "x,y\n390,80\n390,140\n", "q.csv: row 2: a target of task xyz is x y z; got 2 numbers"),
+        ("q.csv", "q1,q2,q3\n0,90,-90\n\n0,130,0\n", "q.csv: row 4: q2 = 130 deg is outside"),
+    ],
+)
+def test_a_move_that_makes_no_sense_is_told_with_its_line(tmp_path: Path, name: str, text: str, says: str) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    done = run("path", THREE_DOF, file)
+    assert done.code in (2, 3), done.err
+    assert f"{tmp_path}/{says}" in done.err
+
+
+def test_a_way_that_is_not_carried_names_its_own_moves_and_keeps_the_verdict(tmp_path: Path) -> None:
+    """The group of moves 2 and 3 is planned when move 4 ends it, which is not at fault."""
+    file = tmp_path / "g.yaml"
+    file.write_text("moves:\n  - joint: home\n  - point: [390, 80, 300]\n  - line: [390, -400, 300]\n  - joint: home\n")
+    done = run("path", THREE_DOF, file, "--json")
+    assert done.code == 3
+    assert f"{file}:3: moves 2 to 3: no branch carries" in done.err
+    assert done.json["reconfigurations"][0]["why"] == "reach"
+    with pytest.raises(NoSolutionError) as refused:
+        armkin.path(armkin.load("three_dof"), str(file))
+    assert refused.value.plan.branches  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "nonsense"])
+def test_a_path_of_another_robot_is_refused(tmp_path: Path, robot: str) -> None:
+    file = tmp_path / "rb.yaml"
+    file.write_text(f"# of another arm\nrobot: {robot}\n{START}")
+    for words in (("path", "three_dof", file), ("send", "three_dof", "--path", file, "--dry-run")):
+        done = run(*words)
+        assert done.code == 2, done.err
+        assert f"{file}:2: robot: this is a path of {robot}, and the arm is three_dof" in done.err
+        assert "or write robot: three_dof" in done.err
+    with pytest.raises(PathFileError, match=r"rb\.yaml:2: robot"):
+        Program(armkin.load("three_dof")).load(file.read_text(), str(file))
+
+
+def test_a_path_of_this_robot_is_planned_by_its_name_and_by_its_file(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text((ROOT / THREE_DOF).read_text().replace("name: three_dof", "name: my_arm", 1))
+    file = tmp_path / "g.yaml"
+    for robot, arm in (("three_dof", THREE_DOF), (THREE_DOF, "three_dof"), ("mine.yaml", mine), ("my_arm", mine)):
+        file.write_text(f"robot: {robot}\n{START}")
+        done = run("path", arm, file)
+        assert done.code == 0, (robot, done.err)
+    program = Program(armkin.load(mine))
+    program.load(file.read_text(), "g.yaml")
+    program.load(program.text(), "saved.yaml")
+    file.write_text(program.text())
+    assert run("path", mine, file).code == 0
+
+
+def test_a_value_beyond_the_gripper_is_refused_while_planning(tmp_path: Path) -> None:
+    file = tmp_path / "g.yaml"
+    file.write_text(START + "  - grip: 99999\n")
+    for words in (("path", THREE_DOF, file), ("send", THREE_DOF, "--path", file, "--dry-run")):
+        done = run(*words)
+        assert done.code == 2, done.err
+        assert f"{file}:3: move 2: grip: 99999 is outside of the gripper's 30 to 120" in done.err
+    for value in ("30", "120", "75.5", "open", "closed"):
+        file.write_text(START + f"  - grip: {value}\n")
+        assert run("path", THREE_DOF, file).code == 0, value
