@@ -8,7 +8,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoSolutionError, PathFileError
-from armkin.teach.program import Program
+from armkin.teach.program import MOST, Program
 from command_line import ROOT, THREE_DOF, run
 
 START = "moves:\n  - point: [390, 80, 300]\n"
@@ -61,6 +61,24 @@ def test_a_way_that_is_not_carried_names_its_own_moves_and_keeps_the_verdict(tmp
     assert refused.value.plan.branches  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[" * 40 + "]" * 40 + "\n", "deep.yaml:1: nested more than 12 deep; a path file never is"),
+        ("x,y,z\n390,80,300\n", "; a path file is a mapping: moves: and a list; rows of CSV belong into a .csv file"),
+        ("# nothing\n", "the file is empty; a path file has at least moves"),
+        ("moves: [" + "1, " * 100_100 + "1]\n", "more than 100000 values; no path file has so many"),
+    ],
+)
+def test_a_path_file_is_not_called_a_robot_file(tmp_path: Path, text: str, says: str) -> None:
+    file = tmp_path / "deep.yaml"
+    file.write_text(text)
+    done = run("path", THREE_DOF, file)
+    assert done.code == 2, done.err
+    assert says in done.err
+    assert "robot file" not in done.err
+
+
 @pytest.mark.parametrize("robot", ["ur5e", "nonsense"])
 def test_a_path_of_another_robot_is_refused(tmp_path: Path, robot: str) -> None:
     file = tmp_path / "rb.yaml"
@@ -83,6 +101,10 @@ def test_a_path_of_this_robot_is_planned_by_its_name_and_by_its_file(tmp_path: P
         done = run("path", arm, file)
         assert done.code == 0, (robot, done.err)
     program = Program(armkin.load(mine))
+    program.moves = [{"line": [390.123456, 80.123456, 300.123456]}] * MOST
+    program.names = ["a name of a move"] * MOST
+    program.load(program.text(), "long.yaml")
+    assert len(program.moves) == MOST
     program.load(file.read_text(), "g.yaml")
     program.load(program.text(), "saved.yaml")
     file.write_text(program.text())

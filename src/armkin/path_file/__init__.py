@@ -20,6 +20,9 @@ from armkin.path_file.model import Move, PathFile, Source
 from armkin.robot_file import strict_yaml
 
 LARGEST = 32_000_000  # [bytes]
+_KIND = strict_yaml.Kind(
+    "path file", "moves", "moves: and a list; rows of CSV belong into a .csv file", 4 * 1024 * 1024, 100_000
+)
 __all__ = ["LARGEST", "Move", "PathFile", "check_robot", "json_schema", "parse", "read", "validated"]
 
 
@@ -47,7 +50,7 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
 
         return table.parse(data, name)
     try:
-        document = strict_yaml.loads(data)
+        document = strict_yaml.loads(data, _KIND)
     except strict_yaml.StrictYamlError as error:
         raise _invalid(name, [(error.line, error.problem)]) from None
     try:

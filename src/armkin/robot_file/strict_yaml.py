@@ -29,7 +29,24 @@ MAX_DIGITS = 15  # an integer of 15 digits is still exact as a float
 
 Path = tuple[str | int, ...]
 
-_EMPTY = "the file is empty; a robot file has at least name, convention and joints"
+
+@dataclass(frozen=True)
+class Kind:
+    """What a file is: its name, what it has at the least, what its top level looks like, and how long it may be."""
+
+    name: str
+    least: str
+    mapping: str
+    size: int = MAX_BYTES
+    values: int = MAX_VALUES
+
+    @property
+    def empty(self) -> str:
+        """What is said of a file without a value."""
+        return f"the file is empty; a {self.name} has at least {self.least}"
+
+
+ROBOT_FILE = Kind("robot file", "name, convention and joints", "name, convention, joints, ...")
 
 _LOADER: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
@@ -71,16 +88,16 @@ class Document:
         return self.lines[path]
 
 
-def loads(text: bytes | str) -> Document:
+def loads(text: bytes | str, kind: Kind = ROBOT_FILE) -> Document:
     """Read one YAML document whose top level is a mapping.
 
-    text: bytes in UTF-8 (a byte order mark is accepted) or text
+    text: bytes in UTF-8 (a byte order mark is accepted) or text; kind: what messages call it
     returns: mappings as dict, sequences as tuple, scalars as str, int, float and bool
     """
-    return _build(_parse(_decode(text)))
+    return _build(_parse(_decode(text, kind)), kind)
 
 
-def _decode(raw: bytes | str) -> str:
+def _decode(raw: bytes | str, kind: Kind) -> str:
     if isinstance(raw, str):
         text = raw
     else:
@@ -92,13 +109,13 @@ def _decode(raw: bytes | str) -> str:
             line = raw.count(b"\n", 0, error.start) + 1
             what = f"byte 0x{raw[error.start]:02x} is not UTF-8"
             raise StrictYamlError(line, f"{what}; save the file as UTF-8 text") from None
-    if len(text) > MAX_BYTES:
-        raise StrictYamlError(0, f"larger than {MAX_BYTES // 1024} kB; no robot file is that long")
+    if len(text) > kind.size:
+        raise StrictYamlError(0, f"larger than {kind.size // 1024} kB; no {kind.name} is that long")
     text = text.removeprefix("\ufeff")
     for character in set(text):
         if not _is_text(ord(character)):
             line = text.count("\n", 0, text.index(character)) + 1
-            what = f"U+{ord(character):04X} has no place in a robot file, which is YAML text"
+            what = f"U+{ord(character):04X} has no place in a {kind.name}, which is YAML text"
             raise StrictYamlError(line, f"character {what}")
     return text
 
@@ -155,7 +172,7 @@ class _Node:
         return (*self.path, self.key if self.mapping and self.key is not None else len(self.items))
 
 
-def _build(events: Iterator[Any]) -> Document:
+def _build(events: Iterator[Any], kind: Kind) -> Document:
     lines: dict[Path, int] = {}
     stack: list[_Node] = []
     root: Any = None
@@ -165,7 +182,7 @@ def _build(events: Iterator[Any]) -> Document:
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
-                raise StrictYamlError(line, "a second document begins here; a robot file is one document")
+                raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
             continue
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
             mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
@@ -182,7 +199,7 @@ def _build(events: Iterator[Any]) -> Document:
             if awaits_key:
                 raise StrictYamlError(line, "a key must be a word, not a list or mapping")
             if len(stack) >= MAX_DEPTH:
-                raise StrictYamlError(line, f"nested more than {MAX_DEPTH} deep; a robot file never is")
+                raise StrictYamlError(line, f"nested more than {MAX_DEPTH} deep; a {kind.name} never is")
             path = parent.value_path() if parent else ()
             lines.setdefault(path, line)
             stack.append(_Node(path, isinstance(event, yaml.MappingStartEvent)))
@@ -194,18 +211,18 @@ def _build(events: Iterator[Any]) -> Document:
             if awaits_key and parent is not None:
                 parent.key = _key(event, parent, lines, line)
                 continue
-            value = _scalar(event, parent, line)
+            value = _scalar(event, parent, line, kind)
             lines.setdefault(parent.value_path() if parent else (), line)
         else:
             continue  # stream and document marks
 
-        if len(lines) > MAX_VALUES:
-            raise StrictYamlError(line, f"more than {MAX_VALUES} values; no robot file has so many")
+        if len(lines) > kind.values:
+            raise StrictYamlError(line, f"more than {kind.values} values; no {kind.name} has so many")
         if not stack:
             root = value
             if not isinstance(root, dict):
                 found = "a list" if isinstance(root, tuple) else f"only the text {shown(str(root))}"
-                what = f"{found}; a robot file is a mapping: name, convention, joints, ..."
+                what = f"{found}; a {kind.name} is a mapping: {kind.mapping}"
                 raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
         elif stack[-1].mapping:
             stack[-1].items[stack[-1].key] = value
@@ -213,7 +230,7 @@ def _build(events: Iterator[Any]) -> Document:
         else:
             stack[-1].items.append(value)
     if root is None:
-        raise StrictYamlError(0, _EMPTY)
+        raise StrictYamlError(0, kind.empty)
     return Document(root, lines)
 
 
@@ -235,14 +252,14 @@ def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
     return text
 
 
-def _scalar(event: Any, parent: _Node | None, line: int) -> Any:
+def _scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
     text = str(event.value)
     if not event.implicit[0]:  # in quotes, or a block of text
         _check_text(text, line)
         return text
     if text in ("", "~", "null", "Null", "NULL"):
         if parent is None:
-            raise StrictYamlError(0, _EMPTY)
+            raise StrictYamlError(0, kind.empty)
         if parent.mapping:
             raise StrictYamlError(line, f"{shown(parent.key or '')} has no value; give one, or leave the key out")
         raise StrictYamlError(line, f"item {len(parent.items) + 1} of a list has no value; give one")
