@@ -177,7 +177,7 @@ def test_nothing_to_send_and_a_terminal_as_input() -> None:
         ((THREE_DOF, *POSE, "--port", "/dev/null"), 5, "/dev/null is no serial port; armkin ports lists them"),
         ((THREE_DOF, *POSE, "--port", "robots"), 5, "robots is no serial port"),
         ((THREE_DOF, *POSE, "--port", "socket://127.0.0.1:1"), 5, "nobody listens there"),
-        ((THREE_DOF, *POSE, "--port", "sim", "--speed", "0"), 2, "above 0 and at most 100"),
+        ((THREE_DOF, *POSE, "--port", "sim", "--speed", "0"), 2, "from 0.01 to 100"),
         ((THREE_DOF, *POSE, "--port", "sim", "--speed", "fast"), 2, "--speed: 'fast' is not a number"),
         ((THREE_DOF, *POSE, "--port", "sim", "--target", "1,2,3"), 2, "give one of them"),
         ((THREE_DOF, *POSE, "--port", "sim", "--branch", "left"), 2, "belong to --target"),

@@ -13,12 +13,14 @@ from armkin.model import units
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+_RANGE = "JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16"
+
 
 def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
     """`--lock J=V`: joint name -> value [deg | mm]."""
     found: dict[str, float] = {}
     for text in words or ():
-        name, value = _named(arm, text, "--lock", "J3=20", found)
+        name, value = _named(arm, text, "--lock", "JOINT=VALUE, for example J3=20", found)
         found[name] = number(value, f"--lock {name}")
         low, high = units.limits_out(arm)[arm.joint_names.index(name)]
         if not low <= found[name] <= high:
@@ -32,10 +34,10 @@ def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> 
 
     found: dict[str, list[float]] = {}
     for text in words or ():
-        name, value = _named(arm, text, "--sweep", "J3=-90:90:16", {**held, **found})
+        name, value = _named(arm, text, "--sweep", _RANGE, {**held, **found})
         parts = value.split(":")
         if len(parts) != 3:
-            raise UsageError(f"--sweep {text}: write JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16")
+            raise UsageError(f"--sweep {text}: write {_RANGE}")
         low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
         count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
         found[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
@@ -47,7 +49,7 @@ def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]
 
     name, equals, value = text.partition("=")
     if not equals:
-        raise UsageError(f"{option} {text}: write JOINT=VALUE, for example {example}")
+        raise UsageError(f"{option} {text}: write {example}")
     joint_index(arm, name)
     if name in taken:
         raise UsageError(f"{option} {text}: {name} is held already")

@@ -10,8 +10,8 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from armkin import files
-from armkin.cli import unit_notes
-from armkin.cli.numbers import NOT_FINITE, is_number, listed, numbers
+from armkin.cli import output, unit_notes
+from armkin.cli.numbers import NOT_FINITE, is_number, listed, number, numbers
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 
@@ -33,6 +33,16 @@ def load(robot: str) -> Arm:
     arm = load(robot)
     unit_notes.robot_file(arm)
     return arm
+
+
+def percent(text: str, option: str) -> float:
+    """A share of the joints' limits, given in percent: 0.0001 to 1. A value below 1 may be meant as a share: said."""
+    value = number(text, option)
+    if not 0.01 <= value <= 100:
+        raise UsageError(f"{option}: '{text}' must be from 0.01 to 100 percent", argument=option, least=0.01, most=100)
+    if value < 1:
+        output.note(f"{option} {text}: {value:g} percent; half is {option} 50")
+    return value / 100
 
 
 def standard_input(most: int, instead: str = "") -> bytes:

@@ -72,9 +72,10 @@ def listed(text: str, names: Sequence[str], what: str) -> list[float]:
 
 def whole(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
-    value = number(text, name, max(high, LARGEST))
-    if value != int(value) or not low <= value <= high:
-        message = f"{name}: '{text}' must be a whole number from {low} to {high}"
+    value = number(text, name, float("inf"))
+    if not low <= value <= high or value != int(value):
+        shown = text if len(text) <= 40 else text[:37] + "..."
+        message = f"{name}: '{shown}' must be a whole number from {low} to {high}"
         raise UsageError(message, argument=name, value=text, least=low, most=high)
     return int(value)
 

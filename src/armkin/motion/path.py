@@ -24,7 +24,7 @@ from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.plan import check_rates, straight
+from armkin.motion.plan import check_rates, check_share, straight
 from armkin.motion.profile import at_rest
 from armkin.motion.route import joined
 from armkin.motion.trajectory import Straight, Stretch
@@ -72,13 +72,18 @@ def path(
     [390.0, -80.0, 300.0]
     """
     from armkin.path_file import check_robot
+    from armkin.path_file.model import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
     check_rates(arm)
     file = read_moves(arm, moves, task)
     check_robot(file, arm.name, arm.path)
-    for name, value, top in (("speed", speed, 1.0), ("accel", accel, 1.0)):
-        if not 0 < value <= top:
-            raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from above 0 to 100 percent")
+    for name, value in (("speed", speed), ("accel", accel)):
+        check_share(name, value)
+    for name, least, given in (("tool_speed", LEAST_TOOL_SPEED, tool_speed), ("tolerance", LEAST_TOLERANCE, tolerance)):
+        if given is not None and not least <= given < np.inf:
+            raise UsageError(
+                f"{name} {given:g} is not possible; it is at least {least:g} mm{'/s' * (name == 'tool_speed')}"
+            )
     limit = None if jerk is None else np.broadcast_to(np.asarray(jerk, dtype=float), (arm.n,))
     if limit is None and np.isfinite(arm.max_jerk).all():
         limit = arm.max_jerk

@@ -141,7 +141,7 @@ class PathPlan:
         jerk = np.zeros(self.arm.n)
         for stretch in self.motion.stretches:
             if isinstance(stretch, Smoothed):
-                t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / 0.001), 2))
+                t = np.linspace(0.0, stretch.duration, min(max(int(stretch.duration / 0.001), 2), 1_000_000))
             elif isinstance(stretch, Curve):
                 t = np.concatenate([stretch.times, stretch.times[1:] * (1 - 1e-12)])
             else:

@@ -20,6 +20,8 @@ from armkin.motors import motor_accel
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+LEAST_SHARE = 1e-4  # of a joint's max_speed or max_accel
+
 
 def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
     """Moves from joint values through joint targets, stopping at each, all joints together.
@@ -34,8 +36,7 @@ def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) 
     (1.9167, [21.0, 60.0, 60.0])
     """
     check_rates(arm)
-    if not 0 < speed <= 1:
-        raise UsageError(f"speed {100 * speed:g} % is not possible; it goes from above 0 to 100 percent")
+    check_share("speed", speed)
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
     at = np.asarray(start, dtype=float)
@@ -44,6 +45,13 @@ def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) 
         stretches.append(straight(arm, at, goal, speed))
         at = goal
     return Trajectory(arm, np.asarray(start, dtype=float), tuple(stretches))
+
+
+def check_share(name: str, value: float) -> None:
+    """Raise UsageError for a fraction of a limit that is no plan's: below LEAST_SHARE, or above 1."""
+    if not LEAST_SHARE <= value <= 1:
+        low = 100 * LEAST_SHARE
+        raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from {low:g} to 100 percent")
 
 
 def straight(

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import frames
 from armkin.motion.profile import Profile
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+LONGEST = 86_400  # [s]
 
 
 class Stretch(Protocol):
@@ -84,6 +87,13 @@ class Trajectory:
     arm: Arm
     start: Array  # (n,) [rad | mm]
     stretches: tuple[Stretch, ...]
+
+    def __post_init__(self) -> None:
+        if not self.duration <= LONGEST:
+            raise UsageError(
+                f"the motion takes {self.duration:.6g} s; one plan lasts a day ({LONGEST} s) at most: "
+                "go faster, or in parts"
+            )
 
     @property
     def end(self) -> Array:

@@ -13,8 +13,11 @@ from pydantic_core import PydanticCustomError
 Number = Annotated[float, Field(ge=-1e7, le=1e7)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
-Percent = Annotated[float, Field(gt=0, le=100)]
-Speed = Annotated[float, Field(gt=0, le=1e6)]
+LEAST_PERCENT = 0.01
+LEAST_TOOL_SPEED = 1e-3  # [mm/s]
+LEAST_TOLERANCE = 1e-6  # [mm]
+Percent = Annotated[float, Field(ge=LEAST_PERCENT, le=100)]
+Speed = Annotated[float, Field(ge=LEAST_TOOL_SPEED, le=1e6)]
 Joints = Values | dict[str, Number] | str
 
 KINDS = ("joint", "point", "line", "polyline", "arc", "circle", "spline", "offset", "wait", "grip")
@@ -128,7 +131,7 @@ class PathFile(_Model):
 
     robot: str | None = Field(None, description="Name or file of the robot.")
     task: str | None = Field(None, description="What targets prescribe; by default the arm's task.")
-    tolerance: Annotated[float, Field(gt=0, le=1000)] | None = Field(
+    tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=1000)] | None = Field(
         None, description="mm between plan and path; 0.05 by default."
     )
     tool_speed: Speed | None = Field(None, description="mm/s, for all moves.")

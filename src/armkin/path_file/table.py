@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import Move, PathFile, Source
+from armkin.path_file.model import LEAST_TOOL_SPEED, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
@@ -67,8 +67,10 @@ def parse(raw: bytes, name: str) -> PathFile:
 def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:
     named = dict(zip(header, values, strict=True)) if header else {}
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
-    if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) <= 0:
-        raise PathFileError(f"{where[0]}:{where[1]}: blend is at least 0 and tool_speed above 0", file=where[0])
+    if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
+        raise PathFileError(
+            f"{where[0]}:{where[1]}: blend is at least 0, tool_speed at least {LEAST_TOOL_SPEED:g} mm/s", file=where[0]
+        )
     if header and not set(named) & set(_TARGETS):
         return Move.model_construct(None, joint=named, **extra)
     # The header's order is kept; the planner puts a target's labels in place.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 1 << 16  # samples in memory at once
-_MOST = 10**15  # more cannot end within a lifetime
+MOST = 10**10  # about an hour on a desktop computer
 
 
 def span(arm: Arm) -> tuple[Array, Array]:
@@ -49,8 +49,8 @@ class Random:
         for what, value in (("samples", self.count), ("seed", self.seed)):
             if isinstance(value, bool) or not isinstance(value, int | np.integer):
                 raise UsageError(f"{what}: {value!r} is no whole number")
-        if not 1 <= self.count <= _MOST:
-            raise UsageError(f"{self.count} samples: give 1 to 1e15")
+        if not 1 <= self.count <= MOST:
+            raise UsageError(f"{self.count} samples: give 1 to {MOST:,}")
         if self.seed < 0:
             raise UsageError(f"seed {self.seed}: give 0 or more")
         span(self.arm)
@@ -82,8 +82,8 @@ class Grid:
             )
         if min(self.points) < 1:
             raise UsageError(f"a grid needs at least 1 point on every joint, not {min(self.points)}")
-        if self.count > _MOST:
-            raise UsageError(f"the grid has {self.count:.3g} points; 1e15 at most")
+        if self.count > MOST:
+            raise UsageError(f"the grid has {self.count:,} points; {MOST:,} at most")
         span(self.arm)
 
     @property

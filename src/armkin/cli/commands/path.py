@@ -101,12 +101,12 @@ def path(
     options: dict[str, Any] = {
         "branch": branch,
         "task": task,
-        "tolerance": _positive(tolerance, "--tolerance"),
-        "blend": None if blend is None else _positive(blend, "--blend", zero=True),
-        "speed": (_positive(speed, "--speed") or 100.0) / 100,
-        "accel": (_positive(accel, "--accel") or 100.0) / 100,
-        "tool_speed": _positive(tool_speed, "--tool-speed"),
-        "jerk": None if jerk is None else units.joints_in(arm, np.full(arm.n, _positive(jerk, "--jerk"))),
+        "tolerance": _positive(tolerance, "--tolerance", 1e-6),
+        "blend": None if blend is None else _positive(blend, "--blend", 0),
+        "speed": inputs.percent(speed, "--speed"),
+        "accel": inputs.percent(accel, "--accel"),
+        "tool_speed": _positive(tool_speed, "--tool-speed", 1e-3),
+        "jerk": None if jerk is None else units.joints_in(arm, np.full(arm.n, _positive(jerk, "--jerk", 1e-3))),
         "near": None if near is None else units.joints_in(arm, inputs.joint_list(arm, near, "--near")),
         "split": split,
         "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
@@ -148,7 +148,7 @@ def sent(
         raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
     arm = inputs.load(robot)
     moves = _moves(arm, file, None, None)
-    options: dict[str, Any] = {"speed": (_positive(speed, "--speed") or 100.0) / 100}
+    options: dict[str, Any] = {"speed": inputs.percent(speed, "--speed")}
     if not dry_run:
         _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json, resume=resume)
         return
@@ -223,12 +223,12 @@ def _corner(text: str, labels: tuple[str, ...]) -> list[float]:
     return listed(text, short if text.count(",") + 1 == len(short) else labels, "--via")
 
 
-def _positive(text: str | None, option: str, *, zero: bool = False) -> float | None:
+def _positive(text: str | None, option: str, least: float) -> float | None:
     if text is None:
         return None
     value = number(text, option)
-    if value < 0 or (value == 0 and not zero):
-        raise UsageError(f"{option}: '{text}' must be {'at least' if zero else 'above'} 0")
+    if value < least:
+        raise UsageError(f"{option}: '{text}' must be at least {least:g}")
     return value
 
 

@@ -91,9 +91,7 @@ def send(
     from armkin.board.moving import Planner, Stream, Total, where
     from armkin.board.stopping import planning
 
-    fraction = number(speed, "--speed") / 100
-    if not 0 < fraction <= 1:
-        raise UsageError(f"--speed: '{speed}' must be above 0 and at most 100 percent")
+    fraction = inputs.percent(speed, "--speed")
     if start is not None and not dry_run:
         raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
     rehearsal = dry_run or port == SIM

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from armkin.cli.answers import Workspace as Answer
     from armkin.reach import Workspace
 
-_MOST = 10**15
-
 
 def workspace(
     robot: Robot,
@@ -65,6 +63,7 @@ def workspace(
     """
     import armkin
     from armkin.reach import cloud
+    from armkin.reach.sampling import MOST
 
     arm = inputs.load(robot)
     measures = list(dict.fromkeys(measure or ()))
@@ -79,7 +78,7 @@ def workspace(
         canvas.check(plot)
         canvas.require()
         measures += [shade] if shade in ("manipulability", "step_error") and shade not in measures else []
-    count = None if samples is None else whole(samples, "--samples", 1, _MOST)
+    count = None if samples is None else whole(samples, "--samples", 1, MOST)
     points = None if grid is None else _points(grid)
     each = points * arm.n if points and len(points) == 1 else points
     total = math.prod(each) if each else count or 100_000
@@ -106,10 +105,12 @@ def workspace(
 
 def _points(grid: str) -> list[int]:
     """`--grid 10` or `--grid 10,20,30`."""
+    from armkin.reach.sampling import MOST
+
     words = grid.split(",")
     if len(words) == 1 and (parts := grid.lower().replace("*", "x").split("x"))[1:] and all(map(is_number, parts)):
         raise UsageError(f"--grid {grid}: separate the counts with commas: {','.join(part.strip() for part in parts)}")
-    return [whole(word, "--grid", 1, _MOST) for word in words]
+    return [whole(word, "--grid", 1, MOST) for word in words]
 
 
 def _answer(found: Workspace) -> Answer:
