@@ -144,7 +144,7 @@ def run(arguments: list[str]) -> int:
     before = {number: signal.signal(number, _terminate) for number in _ending()}
     if arguments[:1] in ([], ["help"]):  # armkin help fk
         arguments = [*arguments[1:2], "--help"]
-    output.for_programs("--json" in arguments)
+    output.for_programs("--json" in arguments, [*arguments, os.environ.get("ARMKIN_PORT", "")])
     try:
         code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
         # What a failed command has printed stays printed: the rows of a batch before the malformed one.
@@ -261,6 +261,8 @@ def _unexpected(error: Exception) -> int:
                 map(is_number, message.rstrip(")").split("(")[-1].split())
             ):
                 message += "; an option's numbers have commas and no spaces, as 390,80,300"
+            if "unexpected extra argument" in message and context.command.name == "stop":
+                message = "stop takes no robot: it stops what moves behind a port, armkin stop --port PORT"
             message = f"{message}\nsee {context.command_path} --help"
         code = int(getattr(error, "exit_code", USAGE))
         output.error(message[:1].lower() + message[1:], "usage", code)

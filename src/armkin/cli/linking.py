@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import completion, inputs, output, render
+from armkin.cli.numbers import whole
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -34,8 +35,22 @@ PortName = Annotated[
         "[default: ARMKIN_PORT, else the only board that answers]",
     ),
 ]
+_FASTEST = 4_000_000  # what USB adapters make; a bus has 1,000,000
+
+
+def _rate(text: str | None) -> int | None:
+    return None if text is None else whole(text, "--baud", 1, _FASTEST)
+
+
 Baud = Annotated[
-    int | None, typer.Option("--baud", metavar="N", help="The port's rate. [default: what the kind of board uses]")
+    int | None,
+    typer.Option(
+        "--baud",
+        metavar="N",
+        parser=str,
+        callback=_rate,
+        help="The port's rate. [default: what the kind of board uses]",
+    ),
 ]
 NoReset = Annotated[
     bool,

@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
@@ -13,6 +13,7 @@ from armkin.errors import FileError, UsageError
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
 _LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
+_broken: list[str] = []  # words of the command line that have line breaks in them
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
 
 
@@ -40,10 +41,15 @@ def beside(path: str | None) -> Iterator[Write]:
         yield write
 
 
-def for_programs(wanted: bool) -> None:
-    """Begin a command. Under --json an error is one JSON object: notes and warnings wait, and go into it."""
-    global _waiting
+def for_programs(wanted: bool, words: Iterable[str] = ()) -> None:
+    """Begin a command. Under --json an error is one JSON object: notes and warnings wait, and go into it.
+
+    words: the command line's; where a message quotes one that has line breaks in it, it stays one line.
+    """
+    global _waiting, _broken
     _waiting = [] if wanted else None
+    parts = {part for word in words for part in (word, word.partition("=")[2])}
+    _broken = sorted((part for part in parts if part.strip() and len(f"{part}.".splitlines()) > 1), key=len)[::-1]
     files.forget()
 
 
@@ -62,6 +68,7 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
 
     message: as people read it, with the advice in it; fields: what it is about.
     """
+    message = _whole(message)
     if _waiting is None:
         _say("error", message)
         return
@@ -89,7 +96,15 @@ def flush() -> None:
     for_programs(False)
 
 
+def _whole(message: str) -> str:
+    """A message whose quoted words have no line breaks of their own."""
+    for word in _broken:
+        message = message.replace(word, _plain(word, len(word) * 10))
+    return message
+
+
 def _later(word: str, message: str) -> None:
+    message = _whole(message)
     if _waiting is None:
         _say(word, message)
     else:

@@ -22,6 +22,7 @@ _GIVE_UP = 1.5  # [s] without any answer
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
+_KEPT = 1000  # bytes of what is no board's
 _PROBES = 8
 
 
@@ -52,7 +53,7 @@ class Session:
 
         Raises LinkError if nothing answers, or something else than this protocol.
         """
-        begin, quiet = self.port.now(), True
+        begin, heard = self.port.now(), bytearray()
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
@@ -61,15 +62,22 @@ class Session:
                 if info is not None:
                     return info
             else:
-                quiet = not self.port.read(0.05) and quiet
+                heard += self.port.read(0.05)[: _KEPT - len(heard)]
             if self._stop():
                 raise StoppedError
             if since > _BOOT:
-                heard = "nothing" if quiet and not self.line.splitter.bad else "but not in this protocol"
                 raise LinkError(
-                    f"no board answers on {self.port.name} ({heard}; {self.port.baud} baud): is armkin's "
-                    "firmware flashed?\n(make -C firmware flash PORT=...); armkin ports lists the other ports"
+                    f"{self._no_board(bytes(heard))}\n(make -C firmware flash PORT=...); armkin ports lists the other ports"
                 )
+
+    def _no_board(self, heard: bytes) -> str:
+        """What to say of a port where this protocol is not spoken; heard: what came between two tries."""
+        where = f"{self.port.name} ({self.port.baud} baud)"
+        if b"grbl" in heard.lower():
+            return f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
+        if heard or self.line.splitter.bad:
+            return f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
+        return f"no board answers on {where}: is armkin's firmware flashed?"
 
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from armkin.board.ports.port import BAUD, SIM
 from armkin.errors import LinkError, PortInUseError
@@ -95,6 +96,7 @@ def check(name: str) -> None:
     """Raise LinkError if there is no port of that name; one that is there is not opened, and not reset."""
     import serial
 
+    _check_address(name)
     try:
         if "://" in name:
             serial.serial_for_url(name, do_not_open=True)
@@ -111,9 +113,30 @@ def check(name: str) -> None:
         raise LinkError(_no_url(name, error)) from None
 
 
+def _check_address(name: str) -> None:
+    """Raise LinkError for no name at all, and for an address in a network without a host or a port number."""
+    if not name.strip():
+        raise LinkError(
+            "the port's name is empty: name a device, socket://HOST:NUMBER, or sim (armkin ports lists them)"
+        )
+    scheme = name.partition("://")[0].lower()
+    if scheme not in ("socket", "rfc2217") or "://" not in name:
+        return
+    try:
+        url = urlsplit(name)
+        number = url.port
+    except ValueError:  # a number beyond 65535, or none
+        number = None
+    if not number or not url.hostname:
+        raise LinkError(
+            f"port {name}: write {scheme}://HOST:NUMBER, for example {scheme}://localhost:4000 (1 to 65535)"
+        )
+
+
 def _open_serial(name: str, baud: int, reset: bool) -> Any:
     import serial
 
+    _check_address(name)
     settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ, "write_timeout": 2.0, "do_not_open": True}
     if "://" not in name:
         settings["exclusive"] = True if os.name == "posix" else None
