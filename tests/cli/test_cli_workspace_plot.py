@@ -210,6 +210,6 @@ def test_without_matplotlib(tmp_path: Path, words: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("error: pictures need matplotlib, which cannot be imported (")
-    assert done.stderr.endswith("pip install 'armkin[plot]'\n")
+    assert done.stderr.endswith("pip install matplotlib (armkin's extra: plot)\n")
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

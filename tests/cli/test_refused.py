@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import armkin
-from armkin.errors import PathFileError, UsageError
+from armkin.board.firmware.session import Session
+from armkin.errors import LinkError, PathFileError, UsageError
+from armkin.motion.plan import check_rates
 from command_line import THREE_DOF, run
 
 DOF = THREE_DOF
@@ -87,3 +91,106 @@ def test_a_speed_below_one_percent_is_noted_and_taken() -> None:
     assert done.code == 0
     assert "note: --speed 0.5: 0.5 percent; half is --speed 50" in done.err
     assert run("send", DOF, 0, 89, -90, "--dry-run", "--speed", 1).err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (("stop", "three_dof", "--port", "sim"), 2, "stop takes no robot"),
+        (("status", DOF, "--port", "sim", "--baud", "0"), 2, "--baud: '0' must be a whole number from 1 to 4000000"),
+        (("status", DOF, "--port", "sim", "--baud", "-5"), 2, "--baud: '-5' must be"),
+        (("stop", "--port", "/no", "--baud", "4000001"), 2, "from 1 to 4000000"),
+        (("status", DOF, "--port", "sim", "--baud", "abc"), 2, "--baud: 'abc' is not a number"),
+        (("status", DOF, "--port", "socket://"), 5, "write socket://HOST:NUMBER, for example"),
+        (("status", DOF, "--port", "socket://host:99999"), 5, "(1 to 65535)"),
+        (("status", DOF, "--port", "rfc2217://host"), 5, "write rfc2217://HOST:NUMBER"),
+        (("status", DOF, "--port", ""), 5, "the port's name is empty"),
+        (("info", "a\nb"), 1, "a\\nb"),
+        (("fk", "a\r\nb", "1"), 1, "a\\r\\nb"),
+        (("new", "x\ny", "--dh", "0,1,2", "--convention", "standard"), 2, "x\\ny"),
+        (("status", DOF, "--port", "/no/a\nb"), 5, "/no/a\\nb"),
+        (("status", DOF, "--port=/no/a\nb"), 5, "/no/a\\nb"),
+        (("f\nk",), 2, "there is no command 'f\\nk'"),
+    ],
+)
+def test_a_word_without_sense_is_told_in_its_own_words(words: tuple[str, ...], code: int, says: str) -> None:
+    done = run(*words)
+    assert (done.code, done.out) == (code, "")
+    assert says in done.err
+    assert done.err.count("\n") <= 1 + done.err.count("--help")
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ('"1,2,3\n', "leave quotes out"),
+        ('"1,2,3"\n', "leave quotes out"),
+        ("q1,q1,q3\n1,2,3\n", "the heading has two columns q1"),
+        ("x,y,z\n390,80,300\n", "armkin ik ROBOT --batch FILE"),
+    ],
+)
+def test_a_row_without_sense_has_the_right_hint(rows: str, says: str) -> None:
+    done = run("send", DOF, "--batch", "-", "--dry-run", stdin=rows.encode())
+    assert done.code == 2
+    assert says in done.err
+
+
+def test_targets_in_a_file_are_solved_and_sent() -> None:
+    solved = run("ik", DOF, "--batch", "-", "--continuous", stdin=b"x,y,z\n390,80,300\n390,-80,300\n")
+    sent = run("send", DOF, "--batch", "-", "--dry-run", stdin=solved.out.encode())
+    assert sent.code == 0, sent.err
+    assert "2 waypoints" in sent.out
+
+
+@pytest.mark.parametrize("name", ["true", "123", "null"])
+def test_any_name_of_an_arm_is_text(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "arm.yaml"
+    done = run("new", name, "--dh", "90,0,170", "--convention", "standard", "-o", file)
+    assert done.code == 0, done.err
+    assert armkin.load(str(file)).name == name
+
+
+def test_rates_that_are_missing_are_them() -> None:
+    arm = armkin.load("ur5e")
+    bare = replace(arm, max_speed=np.full(arm.n, np.nan), max_accel=np.full(arm.n, np.nan))
+    with pytest.raises(UsageError, match="motion needs them; add"):
+        check_rates(bare)
+
+
+class Talker:
+    """A port where something else talks."""
+
+    name, baud, simulated = "COM9", 250_000, True
+
+    def __init__(self, said: bytes) -> None:
+        self.said, self.time = said, 0.0
+
+    def now(self) -> float:
+        return self.time
+
+    def read(self, timeout: float) -> bytes:
+        self.time += timeout
+        return self.said
+
+    def write(self, data: bytes) -> None:
+        del data
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        (b"", "no board answers on COM9 (250000 baud): is"),
+        (b"junk\0\1\2", "something answers on COM9 (250000 baud), but not in this protocol: is"),
+        (
+            b"\r\nGrbl 1.1h ['$' for help]\r\n",
+            "GRBL answers on COM9 (250000 baud): its robot file says board: {kind: grbl}",
+        ),
+    ],
+)
+def test_what_does_not_speak_the_protocol_is_told_apart(said: bytes, says: str) -> None:
+    with pytest.raises(LinkError) as caught:
+        Session(Talker(said)).open()
+    assert says in str(caught.value)

@@ -323,7 +323,7 @@ def test_without_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(MissingExtraError) as caught:
         plot_poses(THREE_DOF, POSE, str(tmp_path / "arm.png"))
     assert str(caught.value).startswith("pictures need matplotlib, which cannot be imported (")
-    assert str(caught.value).endswith("); pip install 'armkin[plot]'")
+    assert str(caught.value).endswith("); pip install matplotlib (armkin's extra: plot)")
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 

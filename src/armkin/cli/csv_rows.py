@@ -22,6 +22,8 @@ LONGEST = 100_000  # characters of a line: what is longer is no CSV file
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
+_TARGETS = "; targets are solved first: armkin ik ROBOT --batch FILE --continuous | this command with --batch -"
+
 
 class Chunk(NamedTuple):
     """Some rows: their numbers in the file, from 1, and their values (N, m)."""
@@ -88,6 +90,8 @@ class Columns:
                 self.skipped += 1
                 return None
         elif len(cells) == 1 and len(self.names) > 1:
+            if '"' in text:
+                raise UsageError("the numbers of a row stand in one pair of quotes, or behind one: leave quotes out")
             for separator in (";", "\t", " "):
                 if len(text.split(separator)) == len(self.names):
                     raise UsageError(f"separate the numbers with commas, not with {separator!r}")
@@ -121,15 +125,16 @@ class Columns:
         found = {name: _places(lower, name.lower()) for name in self.names}
         if not any(found.values()):
             if len(cells) > 1 and all(_WORD.fullmatch(cell) for cell in cells):
-                raise UsageError(f"a heading without the columns {', '.join(self.names)}")
+                hint = _TARGETS if {"x", "y"} <= set(lower) and "x" not in self.names else ""
+                raise UsageError(f"a heading without the columns {', '.join(self.names)}{hint}")
             return False
+        double = [name for name, places in found.items() if len(places) > 1]
+        if double:
+            raise UsageError(f"the heading has two columns {double[0]}")
         missing = [name for name, places in found.items() if not places]
         if missing:
             names = ", ".join(missing)
             raise UsageError(f"the heading has no column{'s' * (len(missing) > 1)} {names}; it has {', '.join(cells)}")
-        double = [name for name, places in found.items() if len(places) > 1]
-        if double:
-            raise UsageError(f"the heading has two columns {double[0]}")
         self.heading = cells
         self.places = [places[0] for places in found.values()]
         return True

@@ -114,7 +114,9 @@ def check_rates(arm: Arm) -> None:
                    for key, n in absent.items()]  # fmt: skip
         lines = rate_lines(arm)
         raise UsageError(
-            f"{', '.join(said_of)}: motion needs one{_add(arm, lines)}", robot_file=arm.path, lines_to_add=lines
+            f"{', '.join(said_of)}: motion needs {'them' if len(lines) > 1 else 'one'}{_add(arm, lines)}",
+            robot_file=arm.path,
+            lines_to_add=lines,
         )
 
 

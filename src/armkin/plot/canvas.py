@@ -58,7 +58,8 @@ def require() -> None:
         import_module("mpl_toolkits.mplot3d")
     except ImportError as error:
         raise MissingExtraError(
-            f"pictures need matplotlib, which cannot be imported ({error}); pip install 'armkin[plot]'"
+            f"pictures need matplotlib, which cannot be imported ({error}); "
+            "pip install matplotlib (armkin's extra: plot)"
         ) from None
 
 

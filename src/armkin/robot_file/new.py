@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from armkin.robot_file.writing import scalar
+
 
 @dataclass(frozen=True)
 class Row:
@@ -49,7 +51,7 @@ def text(name: str, convention: str, rows: Sequence[Row], source: str = "") -> s
     """The file of a table; name, source: as the file shall say; convention: standard or modified."""
     lines = [
         "# Millimetres and degrees throughout. `armkin info` prints the table as papers do: compare it line by line.",
-        f"name: {name}",
+        f"name: {scalar(name)}",
         f"source: {_quoted(source)}" if source else "# source: where the numbers come from",
         f"convention: {convention}   # {_HEAD[convention]}",
         "joints:",

@@ -83,7 +83,9 @@ def document(raw: bytes, name: str) -> tuple[str, list[str], list[Joint]]:
         from defusedxml.common import DefusedXmlException
         from defusedxml.ElementTree import DefusedXMLParser, ParseError
     except ImportError:
-        raise MissingExtraError("reading a URDF needs defusedxml: pip install 'armkin[urdf]'") from None
+        raise MissingExtraError(
+            "reading a URDF needs defusedxml: pip install defusedxml (armkin's extra: urdf)"
+        ) from None
     reader = _Reader(name)
     parser = DefusedXMLParser(target=reader, forbid_dtd=True)
     try:

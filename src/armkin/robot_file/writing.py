@@ -96,5 +96,9 @@ def _flow(value: Any) -> str:
         return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_flow, value)) + "]"
-    word = str(value)
+    return scalar(str(value))
+
+
+def scalar(word: str) -> str:
+    """Text as YAML reads it back as text: in quotes if it looks like a number or a truth value."""
     return word if _PLAIN.fullmatch(word) and word.lower() not in _WORDS else json.dumps(word, ensure_ascii=False)
