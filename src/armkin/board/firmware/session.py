@@ -67,7 +67,8 @@ class Session:
                 raise StoppedError
             if since > _BOOT:
                 raise LinkError(
-                    f"{self._no_board(bytes(heard))}\n(make -C firmware flash PORT=...); armkin ports lists the other ports"
+                    f"{self._no_board(bytes(heard))}\n"
+                    "(make -C firmware flash PORT=...); armkin ports lists the other ports"
                 )
 
     def _no_board(self, heard: bytes) -> str:
