@@ -67,18 +67,9 @@ class Session:
                 raise StoppedError
             if since > _BOOT:
                 raise LinkError(
-                    f"{self._no_board(bytes(heard))}\n"
+                    f"{_no_board(self.port, bytes(heard), self.line.splitter.bad > 0)}\n"
                     "(make -C firmware flash PORT=...); armkin ports lists the other ports"
                 )
-
-    def _no_board(self, heard: bytes) -> str:
-        """What to say of a port where this protocol is not spoken; heard: what came between two tries."""
-        where = f"{self.port.name} ({self.port.baud} baud)"
-        if b"grbl" in heard.lower():
-            return f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
-        if heard or self.line.splitter.bad:
-            return f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
-        return f"no board answers on {where}: is armkin's firmware flashed?"
 
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""
@@ -282,3 +273,16 @@ class Session:
             f"the board on {self.port.name} does not answer any more: is the cable plugged in?\n"
             "a moving arm has stopped on its path by itself; armkin status tells where it stands"
         )
+
+
+def _no_board(port: Port, heard: bytes, damaged: bool) -> str:
+    """What to say of a port where this protocol is not spoken.
+
+    heard: what came between two tries; damaged: whether something came that is no frame of the protocol.
+    """
+    where = f"{port.name} ({port.baud} baud)"
+    if b"grbl" in heard.lower():
+        return f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
+    if heard or damaged:
+        return f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
+    return f"no board answers on {where}: is armkin's firmware flashed?"
