@@ -259,7 +259,7 @@ def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 def test_without_defusedxml_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "defusedxml.common", None)
-    with pytest.raises(ArmkinError, match=r"pip install 'armkin\[urdf\]'"):
+    with pytest.raises(ArmkinError, match=r"pip install defusedxml"):
         urdf.parse(document())
 
 
