@@ -29,6 +29,7 @@ _TICK = 1.12  # shortest intervals that a tick lasts at a segment's fast end
 _TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no edge is farther off than that
 _COARSEST = 55e-6  # [s] of a tick, where a finer one would not fit the rates as well
 _STEADY = 0.004  # change of speed that is none
+_EVEN = 0.02  # [s] of a piece of one speed whose intervals are lengthened bit by bit: in less that is too great a change
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
 _DRIFT = 0.02  # steps
 _SLOW = 40  # ticks a step, from where the ticks need not fit the steps
@@ -99,7 +100,7 @@ class Cutter:
             ticks = _exact_ticks(ticks, left)
         add, bend = _parabola(exact / ticks, ticks, change)
         interval = round((exact - _added(ticks, add, bend)) / ticks)
-        if add == 0 and ticks > 1:
+        if add == 0 and ticks > 1 and exact > _EVEN * self.clock:
             interval, add = _even(exact, ticks)
         elif rest := exact - ticks * interval - _added(ticks, add, bend):  # what whole cycles an interval leave
             more = add + round(rest * 2 * 65536 / ticks**2)
