@@ -586,3 +586,11 @@ def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -
     alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
     assert (alone.code, alone.out) == (2, "")
     assert "--branch, --task, --near and --lock belong to --target" in alone.err
+
+
+def test_a_ramp_of_many_segments_does_not_run_dry(tmp_path: Path) -> None:
+    """27 segments of a ramp and frames of 6 left 26 in a queue of 32: DRY where the ramp began."""
+    path = tmp_path / "path.csv"
+    path.write_text("q1,q2,q3\n0.0258,24.2795,-38.6976\n43.2443,77.0574,-19.3756\n42.6755,76.9006,-18.9291\n")
+    done = run("send", THREE_DOF, "--batch", path, "--port", "sim", "--speed", "70", "--json")
+    assert done.code == 0, done.err

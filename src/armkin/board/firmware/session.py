@@ -127,6 +127,11 @@ class Session:
         self._window.submit(make, segments, seconds)
 
     @property
+    def credit(self) -> int:
+        """Segments that the board's queue takes beyond those that are on their way."""
+        return self._window.credit
+
+    @property
     def backlog(self) -> int:
         """Frames that wait to be sent."""
         return self._window.backlog

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 # Standing still while the queue fills: 100 ms, 250 ms on a busy computer, or half a second on a bad line.
 _LEAD, _LEAD_BUSY, _LEAD_BAD = Segment(80, 20_000, 0, ()), Segment(200, 20_000, 0, ()), Segment(255, 32_000, 0, ())
-_BATCH = (2, 6)  # segments in a frame, on a bad line and on a good one
+_BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
+_FULL = 12  # segments of room: a frame of 6 would wait for as many, and leave the queue short of a ramp's end
 
 
 def carry_out(
@@ -95,7 +96,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> It
         lead = _LEAD_BAD if line.damaged else _LEAD_BUSY if _busy() and not session.port.simulated else _LEAD
         todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
     while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-        most = _BATCH[0] if line.noisy else _BATCH[1]
+        most = _BATCH[0] if line.noisy or session.credit < _FULL else _BATCH[1]
         n = 1
         while (
             n < min(most, len(todo))

@@ -91,8 +91,17 @@ class Window:
         """
         return min(self._bytes, first + self._receive - _QUESTION) - size
 
+    @property
+    def credit(self) -> int:
+        """Segments that the queue takes beyond those that are sent or wait here."""
+        return self._credit - sum(frame.segments for frame in self._waiting)
+
+    @property
+    def _credit(self) -> int:
+        return self._free - sum(frame.segments for frame, _ in self._sent)
+
     def _fill(self) -> None:
-        credit = self._free - sum(frame.segments for frame, _ in self._sent)
+        credit = self._credit
         size = sum(len(data) for _, data in self._sent)
         while self._waiting and len(self._sent) < _UNDER_WAY:
             if self._waiting[0].segments > credit:
