@@ -127,14 +127,9 @@ class Session:
         self._window.submit(make, segments, seconds)
 
     @property
-    def credit(self) -> int:
-        """Segments that the board's queue takes beyond those that are on their way."""
-        return self._window.credit
-
-    @property
-    def backlog(self) -> int:
-        """Frames that wait to be sent."""
-        return self._window.backlog
+    def pending(self) -> tuple[int, int]:
+        """Frames that wait to be sent, and segments that the board's queue takes beyond all that were submitted."""
+        return self._window.backlog, self._window.credit
 
     @property
     def under_way(self) -> float:

@@ -57,8 +57,8 @@ def carry_out(
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
     """Send frames until there are no more and the arm stands; left: told the seconds of motion to come."""
     more = True
-    while more or session.backlog:
-        while more and session.backlog < 2:
+    while more or session.pending[0]:
+        while more and session.pending[0] < 2:
             batch = next(frames, _DONE)
             if batch is _DONE:
                 more = False
@@ -96,7 +96,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> It
         lead = _LEAD_BAD if line.damaged else _LEAD_BUSY if _busy() and not session.port.simulated else _LEAD
         todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
     while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-        most = _BATCH[0] if line.noisy or session.credit < _FULL else _BATCH[1]
+        most = _BATCH[0] if line.noisy or session.pending[1] < _FULL else _BATCH[1]
         n = 1
         while (
             n < min(most, len(todo))
