@@ -32,8 +32,9 @@ def browser() -> Iterator[Browser]:
         yield one
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def server() -> Iterator[Server]:
+    """One of its own for each test: a page that has just been closed still holds control for a moment."""
     with served() as one:
         yield one
 
