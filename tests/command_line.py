@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent
 THREE_DOF = "robots/three_dof.yaml"
+POSE = (-30, 5, -5)  # its published pose [deg] (tests/test_published.py)
+COUNTS = [-1067, -10144, 5667]  # of its motors there, from home
 
 
 class Result(NamedTuple):

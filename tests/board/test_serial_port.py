@@ -97,3 +97,23 @@ def test_a_holder_is_known_by_its_birth_too(tmp_path: Path) -> None:
         assert holder(name) is None
     finally:
         lock.release()
+
+
+def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One read gives back what it has; the clock and Ctrl-C are looked at between reads."""
+
+    class Flood:
+        in_waiting, given = 1000, 0
+
+        def read(self, size: int) -> bytes:
+            self.given += size
+            assert self.given < 100_000, "one read does not come to an end"
+            return b"A" * size
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr("armkin.board.ports.serial_port._open_serial", lambda *given: Flood())
+    port = SerialPort("flood")
+    assert len(port.read(0.1)) >= 1000
+    port.close()

@@ -73,3 +73,8 @@ def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pyt
 def test_a_dry_run_asks_for_no_port(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMKIN_PORT", "/dev/ttyNOWHERE")
     assert run("send", THREE_DOF, -30, 5, -5, "--dry-run").code == 0
+
+
+def test_ports_and_stop() -> None:
+    assert run("ports", "--json").json["ports"] is not None
+    assert run("stop", "--port", "sim").code == 2

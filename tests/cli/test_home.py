@@ -135,3 +135,9 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
     told = run("home", path, "--port", "COM3")
     assert f"q1: {x['steps']} steps were lost since its position was last set ({x['difference']:.3f} deg)" in told.err
     assert "q2" not in told.err.replace("homing q2", "")
+
+
+def test_home_without_switches_is_refused_by_name() -> None:
+    done = run("home", THREE_DOF, "--port", "sim")
+    assert done.code == 2
+    assert "no homing: for q1, q2, q3" in done.err

@@ -1,4 +1,4 @@
-"""`armkin status`: what it says of the motors' power."""
+"""`armkin status`: what it says of the position and of the motors' power."""
 
 from __future__ import annotations
 
@@ -37,3 +37,10 @@ def test_status_tells_the_power_that_an_input_senses(tmp_path: Path, monkeypatch
     cut = run("status", path, "--port", "COM3")
     assert "off: the position is lost" in cut.out
     assert "position lost" in cut.out or "position is lost" in cut.out
+
+
+def test_status_of_a_board_that_knows_nothing() -> None:
+    answer = run("status", THREE_DOF, "--port", "sim", "--json").json
+    assert (answer["position"], answer["joints"], answer["configured"]) == ("lost", None, False)
+    assert answer["state"] == "idle"
+    assert "its position is lost" in run("status", THREE_DOF, "--port", "sim").out

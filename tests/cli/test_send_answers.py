@@ -1,0 +1,105 @@
+"""What other commands answer is piped into `armkin send`."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from command_line import POSE, ROOT, THREE_DOF, process, run
+
+
+@pytest.mark.parametrize("words", [("fk", *POSE), ("pulses", *POSE), ("ik", 390, 80, 300)])
+def test_answers_can_be_piped_in(words: Sequence[object]) -> None:
+    command, *numbers = words
+    answer = run(command, THREE_DOF, *numbers, "--json")
+    done = run("send", "--port", "sim", "--json", stdin=answer.out.encode())
+    assert done.code == 0, done.err
+    sent = answer.json if command != "ik" else answer.json["branches"][answer.json["best"]]
+    assert done.json["joints"] == pytest.approx(sent["joints"], abs=0.02)
+
+
+def test_many_answers_can_be_piped_in(tmp_path: Path) -> None:
+    rows = tmp_path / "targets.csv"
+    rows.write_text("390,80,300\n380,60,280\n")
+    answers = run("ik", THREE_DOF, "--batch", rows, "--json")
+    done = run("send", "--port", "sim", "--json", stdin=answers.out.encode())
+    assert done.json["waypoints"] == 2
+    assert done.json["position_mm"] == pytest.approx([380, 60, 280], abs=0.06)
+
+
+def test_an_answer_without_a_best_branch_is_refused() -> None:
+    answer = run("ik", THREE_DOF, 3900, 80, 300, "--json")
+    done = run("send", "--port", "sim", stdin=answer.out.encode())
+    assert (done.code, done.out) == (3, "")
+    assert "no branch within limits" in done.err
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("best", False, "damaged"),
+        ("branches", [1], "no joints to send"),
+        ("branches", [None], "no joints to send"),
+        ("pulses", [1, 2, 3.5], "damaged"),
+        ("pulses", ["1", "2", "3"], "damaged"),
+        ("pulses", [True, False, True], "damaged"),
+        ("joints", [10**400, 0, 0], "finite"),
+        ("joints", [float("nan"), 0, 0], "finite"),
+    ],
+)
+def test_a_damaged_answer_is_refused(key: str, value: object, message: str) -> None:
+    words = ("ik", THREE_DOF, 390, 80, 300) if key in ("best", "branches") else ("pulses", THREE_DOF, *POSE)
+    answer = {**run(*words, "--json").json, key: value}
+    if key == "joints":
+        del answer["pulses"]
+    done = run("send", "--port", "sim", stdin=json.dumps(answer).encode())
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+
+
+def test_an_answer_may_begin_with_a_byte_order_mark() -> None:
+    answer = run("fk", THREE_DOF, *POSE, "--json")
+    assert run("send", "--dry-run", stdin=b"\xef\xbb\xbf" + answer.out.encode()).code == 0
+
+
+def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    shutil.copy(ROOT / THREE_DOF, mine)
+    answer = run("fk", mine, *POSE, "--json")
+    mine.write_text(mine.read_text() + "# a comment\n")
+    done = run("send", "--port", "sim", stdin=answer.out.encode())
+    assert (done.code, done.out) == (1, "")
+    assert "has changed" in done.err
+
+
+@pytest.mark.parametrize(
+    ("stdin", "message"),
+    [
+        (b"", "standard input is empty"),
+        (b"q1 = 5\n", "no JSON"),
+        (b"[1, 2]", "names no robot_file"),
+        (b'{"robot_file": "robots/three_dof.yaml", "robot_sha256": 5, "joints": [1, 2, 3]}', "names no robot_file"),
+        (b"\xff\xfe{\x00}\x00", "no JSON"),
+    ],
+)
+def test_what_is_no_answer_is_refused(stdin: bytes, message: str) -> None:
+    done = run("send", "--port", "sim", stdin=stdin)
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+
+
+def test_nothing_to_send_and_a_terminal_as_input() -> None:
+    master, slave = pty.openpty()
+    try:
+        done = process("send", "--port", "sim", stdin=slave)
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert done.code == 2
+    assert "nothing to send" in done.err

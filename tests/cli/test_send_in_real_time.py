@@ -1,0 +1,214 @@
+"""`armkin send` and `stop` against the simulated board behind a terminal or a socket, in real time."""
+
+from __future__ import annotations
+
+import json
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from armkin.board.firmware.protocol import State
+from armkin.board.sim.board import SimBoard
+from armkin.hardware import BOARDS
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
+from pty_board import PtyBoard
+
+
+@pytest.fixture
+def board() -> Iterator[PtyBoard]:
+    with PtyBoard() as one:
+        yield one
+
+
+def started(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "armkin", *map(str, words)]
+    return subprocess.Popen(command, cwd=ROOT, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def moving(board: PtyBoard, *words: object) -> subprocess.Popen[bytes]:
+    """A send that is well under way."""
+    sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", 40, *words)
+    board.wait(State.MOVING, 20)
+    time.sleep(0.7)
+    return sender
+
+
+def on_the_path(net: Sequence[int]) -> None:
+    """Between home and the pose, on the straight line."""
+    share = net[1] / COUNTS[1]
+    assert 0.02 < share < 0.98
+    for count, end in zip(net, COUNTS, strict=False):
+        assert abs(count - share * end) <= 2
+
+
+def finish(board: PtyBoard) -> None:
+    """The next command plans from where the arm stands."""
+    done = process("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+    assert done.code == 0, done.err
+    assert done.json["pulses"] == COUNTS
+    assert board.net[:3] == COUNTS
+
+
+def test_lost_then_assumed_then_known(board: PtyBoard) -> None:
+    lost = process("send", THREE_DOF, *POSE, "--port", board.port)
+    assert lost.code == 5
+    assert "position is lost" in lost.err
+    assert "--assume-home" in lost.err
+    assert board.net[:3] == [0, 0, 0]
+    first = process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home", "--json")
+    assert first.code == 0, first.err
+    again = process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
+    assert again.code == 5
+    assert "position is known" in again.err
+    # From where it stands, and near to it: the other branch would be nearer to home.
+    finish(board)
+    status = process("status", THREE_DOF, "--port", board.port, "--json").json
+    assert (status["position"], status["pulses"], status["drivers_on"]) == ("known", COUNTS, True)
+
+
+def test_a_changed_file_means_a_lost_position(board: PtyBoard, tmp_path: Path) -> None:
+    assert process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    mine = tmp_path / "mine.yaml"
+    mine.write_text((ROOT / THREE_DOF).read_text().replace("limits: [-20, 120]", "limits: [-10, 120]"))
+    done = process("send", mine, *POSE, "--port", board.port)
+    assert done.code == 5
+    assert "has changed" in done.err
+    assert process("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, code: int) -> None:
+    sender = moving(board, "--assume-home")
+    sender.send_signal(number)
+    out, err = sender.communicate(timeout=20)
+    assert sender.returncode == code
+    assert out == b""
+    assert b"stopped: the arm stands at" in err
+    assert board.state == State.IDLE
+    on_the_path(board.net)
+    finish(board)
+
+
+def test_a_killed_sender(board: PtyBoard) -> None:
+    sender = moving(board, "--assume-home")
+    sender.kill()
+    sender.communicate()
+    board.wait(State.IDLE)
+    net = board.net
+    on_the_path(net)
+    time.sleep(0.5)
+    assert board.net == net
+    finish(board)
+
+
+def test_a_cut_line(board: PtyBoard) -> None:
+    sender = moving(board, "--assume-home")
+    board.cut = True
+    board.wait(State.IDLE)
+    net = board.net
+    on_the_path(net)
+    board.cut = False  # nothing resumes by itself
+    _, err = sender.communicate(timeout=20)
+    assert sender.returncode == 5
+    assert b"the arm stands at" in err or b"does not answer any more" in err
+    assert board.net == net
+    finish(board)
+
+
+def test_stop_from_another_terminal(board: PtyBoard) -> None:
+    sender = moving(board, "--assume-home", "--speed", 5)
+    busy = process("send", THREE_DOF, *POSE, "--port", board.port)
+    assert busy.code == 5
+    assert f"process {sender.pid}" in busy.err
+    stop = process("stop", "--port", board.port)
+    assert stop.code == 0, stop.err
+    sender.communicate(timeout=20)
+    assert sender.returncode == 143
+    assert board.state == State.IDLE
+    assert "the arm stands" in stop.err  # the board itself was asked
+    finish(board)
+
+
+def test_stop_beside_a_suspended_sender(board: PtyBoard) -> None:
+    sender = moving(board, "--assume-home", "--speed", 5)
+    sender.send_signal(signal.SIGSTOP)
+    began = time.monotonic()
+    stop = process("stop", "--port", board.port)
+    assert stop.code == 0, stop.err
+    assert time.monotonic() - began < 6  # with both programs' start on a busy computer
+    assert "the arm stands" in stop.err
+    sender.communicate(timeout=20)
+    assert sender.returncode == 143
+    finish(board)
+
+
+def test_stop_without_a_sender(board: PtyBoard) -> None:
+    assert process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    assert process("stop", "--port", board.port).code == 0
+    finish(board)
+
+
+def test_rows_that_trickle_in(board: PtyBoard) -> None:
+    words = ("send", THREE_DOF, "--batch", "-", "--port", board.port, "--assume-home", "--json")
+    sender = started(*words, stdin=subprocess.PIPE)
+    assert sender.stdin is not None
+    sender.stdin.write(b"1,89,-89\n")
+    sender.stdin.flush()
+    board.wait(State.MOVING, 20)  # the first row moves before the second one is written
+    board.wait(State.IDLE)
+    time.sleep(0.7)
+    assert board.net[:3] == [36, -119, 67]
+    out, _ = sender.communicate(b"2,88,-88\n", timeout=20)
+    assert sender.returncode == 0
+    assert json.loads(out)["waypoints"] == 2
+    assert board.net[:3] == [71, -239, 133]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_noisy_line(seed: int) -> None:
+    """1 % of the bytes flipped and 1 % dropped, both ways: exact counts, or the arm stands on its path."""
+    with PtyBoard(noise=0.01, seed=seed) as board:
+        done = process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home", "--json")
+        if done.code == 0:
+            assert board.net[:3] == COUNTS
+        else:  # a machine too busy to keep the queue filled: held, known, and it ends
+            assert done.code == 5
+            assert "position is known" in done.err
+            on_the_path(board.net)
+
+
+def test_a_board_behind_a_socket() -> None:
+    board = SimBoard(BOARDS["uno_cnc_shield"])
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+
+        def serve() -> None:
+            line, _ = server.accept()
+            with line, suppress(ConnectionError):  # the host hangs up when it has heard enough
+                last = time.monotonic()
+                while True:
+                    ready, _, _ = select.select([line], [], [], 0.002)
+                    data = line.recv(4096) if ready else b""
+                    if ready and not data:
+                        return
+                    now = time.monotonic()
+                    board.advance(min(now - last, 0.2))
+                    last = now
+                    board.receive(data)
+                    line.sendall(board.take())
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        done = run("send", THREE_DOF, 10, 80, -80, "--port", port, "--assume-home", "--json")
+        thread.join()
+    assert done.code == 0, done.err
+    assert board.net[:3] == done.json["pulses"] == [356, -1193, 667]

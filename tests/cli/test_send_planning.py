@@ -1,0 +1,108 @@
+"""`armkin send --dry-run`: planning needs no board."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, run
+
+
+def test_a_dry_run_moves_nothing_and_needs_no_port() -> None:
+    done = run("send", THREE_DOF, *POSE, "--dry-run", "--json")
+    assert done.code == 0
+    assert done.json["dry_run"] is True
+    assert done.json["moves"] == COUNTS
+    text = run("send", THREE_DOF, *POSE, "--dry-run")
+    assert "nothing moves" in text.out
+    assert "-10144" in text.out
+    back = run("send", THREE_DOF, 0, 90, -90, "--dry-run", "--from", "-30,5,-5", "--json")
+    assert back.json["moves"] == [-count for count in COUNTS]
+
+
+def test_half_the_speed() -> None:
+    slow = run("send", THREE_DOF, *POSE, "--dry-run", "--speed", "50", "--json").json
+    assert slow["top_speed"] == pytest.approx([10.59, 30, 30], abs=0.01)
+    assert slow["duration_s"] > 3
+
+
+def test_a_trace_is_the_path_as_csv(tmp_path: Path) -> None:
+    path = tmp_path / "trace.csv"
+    assert run("send", THREE_DOF, *POSE, "--dry-run", "--trace", path).code == 0
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert list(rows[0])[:5] == ["time_s", "q1", "q2", "q3", "q1_x_mm"]
+    assert list(rows[0])[-1] == "tool_z_mm"
+    times = [float(row["time_s"]) for row in rows]
+    assert times == sorted(times)
+    assert float(rows[0]["q2"]) == pytest.approx(90)
+    assert float(rows[-1]["q2"]) == pytest.approx(4.99837, abs=1e-4)
+    assert float(rows[-1]["tool_x_mm"]) == pytest.approx(398.357, abs=1e-3)
+    assert float(rows[0]["q1_z_mm"]) == 170
+
+
+def _movable() -> list[Path]:
+    """Shipped and test robots with drives and rates, whatever their board."""
+    found = []
+    for path in sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests" / "robots").glob("*.yaml")):
+        text = path.read_text("utf-8")
+        if "full_steps" in text or "kind: servo" in text:
+            found.append(path)
+    return found
+
+
+@pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
+def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
+    import armkin
+    from armkin.board.firmware.needs import missing
+
+    arm = armkin.load(path)
+    home = ",".join(str(x) for x in armkin.pulses(arm, arm.home))
+    assert home
+    values = [float(x) for x in (arm.home / [1.0 if slides else 0.0174532925199433 for slides in arm.prismatic])]
+    goal = [value + 1 if value < 50 else value - 1 for value in values]
+    for words in (("--dry-run",), ("--port", "sim")):
+        done = run("send", path, *goal, "--json", *words)
+        lacks = missing(arm, board=False)
+        if lacks:
+            assert done.code == 2
+            assert all(lack in done.err for lack in lacks)
+            assert "max_accel: 60 " in done.err
+        else:
+            assert done.code == 0, done.err
+            assert done.json["joints"] == pytest.approx(goal, abs=0.2)
+
+
+def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    text = (ROOT / THREE_DOF).read_text()
+    mine.write_text(text[: text.index("board: {kind")].replace("    max_accel: 120\n", "", 1))
+    done = run("send", mine, *POSE, "--port", tmp_path / "none")
+    assert done.code == 2
+    for words in (
+        "joint q1 has no max_accel",
+        "it has no board",
+        "max_accel: 60 ",
+        "board: {kind: uno_cnc_shield, driver: A4988}",
+    ):
+        assert words in done.err
+
+
+def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -> None:
+    lines = []
+    for line in (ROOT / "robots/panda.yaml").read_text().splitlines():
+        lines.append(line)
+        if line.startswith("    max_speed:"):
+            lines += ["    max_accel: 100", "    drive: {full_steps: 200, microsteps: 16, gear: 50}"]
+    path = tmp_path / "panda.yaml"
+    path.write_text("\n".join(lines))
+    words = ("send", path, "--target", "400,0,400,180,0,0", "--dry-run", "--json")
+    assert "--lock JOINT=VALUE" in run(*words).err
+    done = run(*words, "--lock", "J3=20")
+    assert done.code == 0, done.err
+    assert done.json["joints"][2] == pytest.approx(20, abs=0.01)
+    assert done.json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
+    alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
+    assert (alone.code, alone.out) == (2, "")
+    assert "--branch, --task, --near and --lock belong to --target" in alone.err
