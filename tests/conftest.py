@@ -21,6 +21,7 @@ if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
     _NEEDS = ("pty_board", "pty_port", "import pty", "import fcntl", "emulator")
     _FILES = Path(__file__).parent.rglob("test_*.py")
     collect_ignore = [str(path) for path in _FILES if any(word in path.read_text("utf-8") for word in _NEEDS)]
+    collect_ignore.append("firmware")  # its conftest.py needs the emulator, too
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
