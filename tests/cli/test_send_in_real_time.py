@@ -34,9 +34,9 @@ def started(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]
     return subprocess.Popen(command, cwd=ROOT, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def moving(board: PtyBoard, *words: object) -> subprocess.Popen[bytes]:
+def moving(board: PtyBoard, speed: int = 40) -> subprocess.Popen[bytes]:
     """A send that is well under way."""
-    sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", 40, *words)
+    sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", speed, "--assume-home")
     board.wait(State.MOVING, 20)
     time.sleep(0.7)
     return sender
@@ -87,7 +87,7 @@ def test_a_changed_file_means_a_lost_position(board: PtyBoard, tmp_path: Path) -
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, code: int) -> None:
-    sender = moving(board, "--assume-home")
+    sender = moving(board)
     sender.send_signal(number)
     out, err = sender.communicate(timeout=20)
     assert sender.returncode == code
@@ -99,7 +99,7 @@ def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, c
 
 
 def test_a_killed_sender(board: PtyBoard) -> None:
-    sender = moving(board, "--assume-home")
+    sender = moving(board)
     sender.kill()
     sender.communicate()
     board.wait(State.IDLE)
@@ -111,7 +111,7 @@ def test_a_killed_sender(board: PtyBoard) -> None:
 
 
 def test_a_cut_line(board: PtyBoard) -> None:
-    sender = moving(board, "--assume-home")
+    sender = moving(board)
     board.cut = True
     board.wait(State.IDLE)
     net = board.net
@@ -125,7 +125,7 @@ def test_a_cut_line(board: PtyBoard) -> None:
 
 
 def test_stop_from_another_terminal(board: PtyBoard) -> None:
-    sender = moving(board, "--assume-home", "--speed", 5)
+    sender = moving(board, speed=5)
     busy = process("send", THREE_DOF, *POSE, "--port", board.port)
     assert busy.code == 5
     assert f"process {sender.pid}" in busy.err
@@ -139,7 +139,7 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
 
 
 def test_stop_beside_a_suspended_sender(board: PtyBoard) -> None:
-    sender = moving(board, "--assume-home", "--speed", 5)
+    sender = moving(board, speed=5)
     sender.send_signal(signal.SIGSTOP)
     began = time.monotonic()
     stop = process("stop", "--port", board.port)

@@ -1,12 +1,19 @@
-"""What is compiled once for all tests of the emulated board itself."""
+"""The emulated board in real time; and what is compiled once for all tests of that board itself."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from emulator import compile_program
+from emulator import EmulatedBoard, compile_program
 from probing import PROBE
+
+
+@pytest.fixture
+def board() -> Iterator[EmulatedBoard]:
+    with EmulatedBoard() as one:
+        yield one
 
 
 @pytest.fixture(scope="session")

@@ -6,30 +6,19 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import curve_on_pins
 import numpy as np
 import pytest
 from emulator import EmulatedBoard
+from pins import net
 
 import armkin
 from command_line import ROOT, THREE_DOF, run
 
 HALF_A_STEP = 0.14  # [mm] of all motors, at the tip
 CIRCLE = "moves:\n  - point: [350, 0, 300]\n  - circle: {centre: [300, 0, 300]}\n"
-
-
-@pytest.fixture
-def board() -> Iterator[EmulatedBoard]:
-    with EmulatedBoard() as one:
-        yield one
-
-
-def net(board: EmulatedBoard) -> list[int]:
-    found = board.net()
-    return [found[axis] for axis in "XYZ"]
 
 
 def off_the_circle(arm: armkin.Arm, counts: list[int]) -> float:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
+COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
 _OPTIONS = (
     "--no-sandbox",
     "--disable-dev-shm-usage",

@@ -13,10 +13,8 @@ from served import Page, served
 
 import armkin
 from armkin.model import units
-from command_line import ROOT, run
+from command_line import COUNTS, POSE, ROOT, run
 
-POSE = [-30, 5, -5]
-COUNTS = [-1067, -10144, 5667]
 HOME = [0, 90, -90]
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import aim, chromium, idle, opened, settled, until, value, values
+from browsing import COUNTS, aim, chromium, idle, opened, settled, until, value, values
 from matplotlib import image
 from playwright.sync_api import Browser, Page
 from served import served
@@ -22,8 +22,6 @@ from armkin.model import units
 from armkin.teach.scene import scene
 from armkin.teach.server import Server
 from command_line import ROOT, run
-
-COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,13 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from browsing import aim, chromium, idle, opened, settled, until, values
+from browsing import COUNTS, aim, chromium, idle, opened, settled, until, values
 from emulator import EmulatedBoard
 from pins import net
 from playwright.sync_api import Browser, Page
 from served import teaching
 
 from command_line import run
-
-COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
 
 
 @pytest.fixture(scope="module")

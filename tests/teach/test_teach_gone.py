@@ -9,12 +9,10 @@ import uuid
 from pathlib import Path
 
 import pytest
-from browsing import aim, chromium, idle, until
+from browsing import COUNTS, aim, chromium, idle, until
 from emulator import EmulatedBoard
 from pins import net, rests_within
 from served import Elsewhere, teaching
-
-COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
 
 
 @pytest.mark.parametrize("how", ["its tab is closed", "its browser is killed"])

@@ -15,13 +15,11 @@ import pytest
 from emulator import EmulatedBoard
 from pins import net, rests_within
 from served import MOVES, Elsewhere, Page, served
-from test_send import with_switches
+from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.session import Session
-from command_line import ROOT, run
+from command_line import COUNTS, POSE, ROOT, run
 
-POSE = [-30, 5, -5]
-COUNTS = [-1067, -10144, 5667]
 HOME = [0, 90, -90]
 
 
@@ -167,15 +165,11 @@ def test_switches_are_found_from_the_page(tmp_path: Path) -> None:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         assert page.idle()["position"] == "lost"
-        edges = {"X": -900, "Y": 1500, "Z": -1200}  # in steps from where the arm was left
-        for axis, edge in edges.items():
-            board.control(f"set-switch {axis} at {edge} {'above' if edge > 0 else 'below'} bounce 2ms")
+        fit_switches(board)
         assert page.act("home") == (200, {})
         state = page.idle()
         assert (state["position"], state["error"]) == ("known", "")
-        at = {"X": -4302, "Y": 3700, "Z": -2333}  # -121, 121 and -125 deg in steps from home
-        for axis, pulses, pins in zip("XYZ", state["pulses"], net(board), strict=True):
-            assert pulses - at[axis] == pytest.approx(pins - edges[axis], abs=1)
+        assert_found(state["pulses"], net(board))
         page.act("send", q=POSE, speed=100)
         assert page.idle()["pulses"] == COUNTS
         page.close()

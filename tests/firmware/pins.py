@@ -6,8 +6,9 @@ from emulator import CLOCK_HZ, EmulatedBoard
 
 
 def net(board: EmulatedBoard) -> list[int]:
-    """Net steps of the three joints' motors."""
-    return [board.net()[axis] for axis in "XYZ"]
+    """Net steps on the pins of X, Y, Z."""
+    found = board.net()
+    return [found[axis] for axis in "XYZ"]
 
 
 def rests_within(board: EmulatedBoard, seconds: float) -> None:

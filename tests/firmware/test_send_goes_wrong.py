@@ -1,0 +1,242 @@
+"""`armkin send` against the compiled firmware in the emulator: resets, signals, cables, noise, power."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from emulator import EmulatedBoard
+from pins import net
+
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import plan as plan_moves
+from armkin.board.firmware.machine import Machine
+from armkin.board.ports import SerialPort
+from armkin.model import build as arms
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, run
+
+KILLS = 50
+
+
+def at_rest(board: EmulatedBoard) -> list[int]:
+    """Net steps once they have not changed for 0.15 s."""
+    end = time.monotonic() + 10
+    before = net(board)
+    while time.monotonic() < end:
+        board.wait(0.15)
+        now = net(board)
+        if now == before:
+            return now
+        before = now
+    raise AssertionError("the arm does not come to rest")
+
+
+def on_the_line(now: Sequence[int], start: Sequence[int], end: Sequence[int]) -> bool:
+    """Within two steps of the straight line between two counts."""
+    far = int(np.argmax(np.abs(np.subtract(end, start))))
+    share = (now[far] - start[far]) / (end[far] - start[far])
+    return 0 <= share <= 1 and all(abs(n - a - share * (b - a)) <= 2 for n, a, b in zip(now, start, end, strict=True))
+
+
+def moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
+    """A send to the pose that is at its full speed, half of the joints'."""
+    send = ("send", THREE_DOF, *POSE, "--port", board.port, "--speed", 50, "--assume-home")
+    command = [sys.executable, "-m", "armkin", *map(str, send)]
+    sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    end = time.monotonic() + 30
+    while net(board)[1] > -3000:
+        assert time.monotonic() < end, sender.communicate(timeout=5)
+        time.sleep(0.01)
+    return sender
+
+
+def finish(board: EmulatedBoard) -> None:
+    """The next command plans from where the arm stands, to exact counts on the pins."""
+    done = run("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+    assert done.code == 0, done.err
+    assert done.json["pulses"] == net(board) == COUNTS
+
+
+def test_a_position_is_kept_through_a_reset_at_rest_and_no_other(board: EmulatedBoard) -> None:
+    assert run("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    board.control("reset external")
+    status = run("status", THREE_DOF, "--port", board.port, "--json").json
+    assert status["position"] == "retained"
+    assert status["pulses"] == net(board)
+    finish(board)
+    board.control("reset power")
+    lost = run("send", THREE_DOF, 10, 80, -80, "--port", board.port)
+    assert lost.code == 5
+    assert "position is lost" in lost.err
+    assert net(board) == COUNTS
+
+
+def test_a_reset_in_motion_is_a_lost_position(board: EmulatedBoard) -> None:
+    sender = moving(board)
+    board.control("reset external")
+    _, err = sender.communicate(timeout=30)
+    assert sender.returncode == 5
+    assert b"the board was reset" in err
+    assert b"position is lost" in err
+    stopped = at_rest(board)
+    again = run("send", THREE_DOF, *POSE, "--port", board.port)
+    assert again.code == 5
+    assert "position is lost" in again.err
+    assert net(board) == stopped
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_on_the_path(board: EmulatedBoard, number: signal.Signals, code: int) -> None:
+    sender = moving(board)
+    sender.send_signal(number)
+    _, err = sender.communicate(timeout=30)
+    assert sender.returncode == code, err
+    stopped = net(board)
+    assert on_the_line(stopped, [0, 0, 0], COUNTS)
+    assert at_rest(board) == stopped
+    finish(board)
+
+
+def test_a_killed_process(board: EmulatedBoard) -> None:
+    sender = moving(board)
+    sender.kill()
+    sender.communicate()
+    stopped = at_rest(board)
+    assert on_the_line(stopped, [0, 0, 0], COUNTS)
+    finish(board)
+
+
+def test_a_boot_loader_hides_the_cause_and_the_position_is_retained() -> None:
+    """The stock Uno: it swallows what comes in its first second and a half, and clears MCUSR."""
+    with EmulatedBoard(bootloader=1500) as board:
+        assert run("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+        status = run("status", THREE_DOF, "--port", board.port, "--json").json
+        assert (status["position"], status["reset_cause"]) == ("retained", 0)
+        assert status["boots"] >= 2
+        finish(board)
+
+
+class _KilledError(Exception):
+    pass
+
+
+@contextmanager
+def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[Machine]:
+    """The three-joint arm on this board; a sender that dies falls silent in the middle of whatever it does."""
+    arm = arms.load(ROOT / THREE_DOF)
+    port = SerialPort(board.port)
+    born = time.monotonic()
+
+    def dead() -> bool:
+        if dies_after is not None and time.monotonic() - born > dies_after:
+            raise _KilledError
+        return False
+
+    try:
+        yield Machine(port, arm, configure(arm), dead)
+    finally:
+        port.close()
+
+
+def _killed_often(seed: int, times: int) -> list[str]:
+    """Send back and forth, die at random moments; what went wrong."""
+    rng = random.Random(seed)
+    wrong: list[Any] = []
+    goals = np.deg2rad([[-30, 5, -5], [25, 85, -60]])
+    with EmulatedBoard(seed=seed) as board:
+        with machine(board) as first:
+            first.prepare(assume=first.arm.home)
+        for i in range(times):
+            start = at_rest(board)
+            try:
+                with machine(board, rng.uniform(0.15, 1.6)) as one:
+                    if one.position() == "lost" or list(one.counts()) != start:
+                        return [*wrong, f"kill {i}: the board says {one.position()} {one.counts()}, pins {start}"]
+                    one.prepare()
+                    plan = plan_moves(one.arm, start, goals[rng.randrange(2)])
+                    end = plan.end.tolist()
+                    one.run([plan])
+            except _KilledError:
+                board.wait(0.6)  # the board notices after half a second, at rest or not
+            stopped = at_rest(board)
+            if end != start and not on_the_line(stopped, start, end):
+                wrong.append(f"kill {i}: {start} to {end} stopped at {stopped}")
+            board.wait(0.3)
+            if net(board) != stopped:
+                wrong.append(f"kill {i}: moved again")
+    return wrong
+
+
+def test_a_sender_killed_at_fifty_random_moments() -> None:
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(lambda seed: _killed_often(seed, KILLS // 2), (1, 2))) == [[], []]
+
+
+def test_a_cut_cable(board: EmulatedBoard) -> None:
+    sender = moving(board)
+    board.control("cut both")
+    stopped = at_rest(board)
+    assert on_the_line(stopped, [0, 0, 0], COUNTS)
+    _, err = sender.communicate(timeout=30)
+    assert sender.returncode == 5
+    assert b"does not answer any more" in err
+    board.control("restore")
+    board.wait(0.3)
+    assert net(board) == stopped
+    finish(board)
+
+
+def test_the_abort_input(board: EmulatedBoard) -> None:
+    sender = moving(board)
+    board.control("pin A0 0")
+    _, err = sender.communicate(timeout=30)
+    assert sender.returncode == 5
+    assert b"the abort input is active" in err
+    stopped = net(board)
+    assert on_the_line(stopped, [0, 0, 0], COUNTS)
+    blocked = run("send", THREE_DOF, *POSE, "--port", board.port)
+    assert blocked.code == 5
+    assert "abort input" in blocked.err
+    assert net(board) == stopped
+    board.control("pin A0 z")
+    finish(board)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_noisy_line_ends_at_exact_counts(seed: int) -> None:
+    """1 % of the bytes flipped and 1 % dropped, in both directions."""
+    with EmulatedBoard(seed=seed) as board:
+        assert run("send", THREE_DOF, 1, 89, -89, "--port", board.port, "--assume-home").code == 0
+        start = net(board)
+        board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
+        done = run("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+        now = at_rest(board)
+        if done.code == 0:
+            assert now == COUNTS
+        else:  # too busy a machine to keep the queue filled: it must end, on the path, and know where
+            assert "its position is known" in done.err
+            assert on_the_line(now, start, COUNTS)
+        board.control("restore")
+        finish(board)
+
+
+def test_after_a_cut_of_the_power_the_position_is_declared_lost() -> None:
+    with EmulatedBoard(reset_on_open=False) as board:
+        assert run("send", THREE_DOF, 1, 89, -89, "--port", board.port, "--assume-home").code == 0
+        assert run("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
+        done = run("stop", "--power-cut", "--port", board.port)
+        assert (done.code, done.err) == (
+            0,
+            "note: the arm stands; its position is lost: home it, or say --assume-home\n",
+        )
+        assert run("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "lost"
+        assert run("send", THREE_DOF, 0, 90, -90, "--port", board.port).code == 5
