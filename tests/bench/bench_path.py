@@ -23,14 +23,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 
 import brute
+from lines import random_line
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import targets_of
 from armkin.motion.chains import chains, fewest
 from armkin.motion.columns import linked
 from armkin.motion.curve import Curve
-from armkin.motion.geometry import Piece, Spot, line, spot
 from armkin.motion.profile import seven_phases
 from armkin.motion.time_optimal import Bounds, Knots, optimal
 
@@ -43,17 +41,6 @@ def moving(name: str) -> armkin.Arm:
     unit = np.where(arm.prismatic, 5.0, np.pi / 180)
     speed = np.where(np.isnan(arm.max_speed), 90 * unit, arm.max_speed)
     return replace(arm, max_speed=speed, max_accel=np.where(np.isnan(arm.max_accel), 3 * speed, arm.max_accel))
-
-
-def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:
-    """300 mm in a random direction from where random legal joint values put the tool."""
-    task = task_for(arm)
-    low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
-    high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
-    q = rng.uniform(low, high)
-    a = spot(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
-    d = rng.normal(size=len(a.p))
-    return line(task, a, Spot(a.p + 300 * d / np.linalg.norm(d), a.sums, a.turned))
 
 
 def branches(lines: int) -> None:

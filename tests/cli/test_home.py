@@ -9,10 +9,10 @@ import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.homing import switches
 from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
 from armkin.hardware import BOARDS
 from command_line import ROOT, THREE_DOF, run
 from pty_board import PtyBoard
+from sim_wire import plug_in
 
 LOWER, UPPER = (-20, 75, -105), (20, 105, -75)  # where the switches are, not far from home
 WRIST = """  - name: q4
@@ -36,6 +36,14 @@ def arm_with_switches(folder: Path, *, four: bool, normally: str = "closed", upp
     path = folder / "switched.yaml"
     path.write_text(head + (WRIST if four else "") + joints + tail)
     return str(path)
+
+
+def behind_a_port(path: str, monkeypatch: pytest.MonkeyPatch) -> SimBoard:
+    """A board whose switches are where the robot file says."""
+    arm = armkin.load(path)
+    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
+    plug_in(board, monkeypatch)
+    return board
 
 
 @pytest.mark.parametrize(("normally", "upper"), [("closed", False), ("open", True)])
@@ -74,18 +82,9 @@ def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: 
 
 
 def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The shield's fourth axis has no input: three switches, and a word for the rest.
-
-    The board outlives each command, as a real one does, and its time is not the clock's.
-    """
+    """The shield's fourth axis has no input: three switches, and a word for the rest."""
     path = arm_with_switches(tmp_path, four=True)
-    arm = armkin.load(path)
-    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
-
-    class Wire(SimPort):
-        simulated = False
-
-    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    behind_a_port(path, monkeypatch)
     assert run("send", path, 10, 80, -80, 0, "--port", "COM3").code == 5
     assert run("home", path, "--port", "COM3", "--rest-at-home").code == 0
     done = run("send", path, 10, 80, -80, 0, "--port", "COM3", "--json")
@@ -113,13 +112,7 @@ def test_a_wrong_board_is_called_by_its_name() -> None:
 def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The arm is pushed 40 steps while its count goes on; the switch, met again, tells."""
     path = arm_with_switches(tmp_path, four=False)
-    arm = armkin.load(path)
-    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
-
-    class Wire(SimPort):
-        simulated = False
-
-    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    board = behind_a_port(path, monkeypatch)
     first = run("home", path, "--port", "COM3", "--json")
     assert [one["steps"] for one in first.json["lost_steps"]] == [None, None, None]  # nothing was known before
     again = run("home", path, "--port", "COM3", "--json")
@@ -129,7 +122,7 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
     pushed = run("home", path, "--port", "COM3", "--json")
     x, y, z = pushed.json["lost_steps"]
     assert x["steps"] == pytest.approx(40, abs=1)
-    assert x["difference"] == pytest.approx(x["steps"] / arm.motor_gain[0, 0] * 180 / np.pi)
+    assert x["difference"] == pytest.approx(x["steps"] / armkin.load(path).motor_gain[0, 0] * 180 / np.pi)
     assert max(abs(y["steps"]), abs(z["steps"])) <= 1
     board.motors.axes.net[0] -= 40
     told = run("home", path, "--port", "COM3")

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
 from armkin.hardware import BOARDS
 from command_line import ROOT, THREE_DOF, run
+from sim_wire import plug_in
 
 
 def test_status_says_that_a_power_cut_cannot_be_seen() -> None:
@@ -26,11 +26,7 @@ def test_status_tells_the_power_that_an_input_senses(tmp_path: Path, monkeypatch
     path = tmp_path / "sensed.yaml"
     path.write_text(text.replace("driver: A4988", "driver: A4988, power: A1"))
     board = SimBoard(BOARDS["uno_cnc_shield"])
-
-    class Wire(SimPort):
-        simulated = False
-
-    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    plug_in(board, monkeypatch)
     assert run("send", path, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
     assert run("status", path, "--port", "COM3", "--json").json["motor_power"] is True
     board.inputs.power_level = False

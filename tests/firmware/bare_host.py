@@ -125,16 +125,19 @@ class BareHost:
         self.sequence = answer.next
         return answer
 
-    def setup(self, image: protocol.Image, counts: dict[int, int] | None, nonce: int = 1) -> None:
-        """Session, configuration, position (unless None), drivers and pulses on."""
+    def configure(self, image: protocol.Image, counts: dict[int, int], nonce: int = 1) -> None:
+        """Session, configuration, position."""
         info = self.hello(nonce)
         data = image.pack()
         room = info.frame - 8
         for at in range(0, len(data), room):
             self.order(protocol.config(0, at, data[at : at + room]))
         self.order(protocol.commit(0, len(data), image.crc()))
-        if counts is not None:
-            self.order(protocol.set_position(0, counts))
+        self.order(protocol.set_position(0, counts))
+
+    def setup(self, image: protocol.Image, counts: dict[int, int], nonce: int = 1) -> None:
+        """As `configure`, then drivers and pulses on."""
+        self.configure(image, counts, nonce)
         self.order(protocol.enable(0, 3))
         self.run(0.01)
 

@@ -175,12 +175,7 @@ def test_a_servo_is_silent_until_consent_then_ramps() -> None:
     with EmulatedBoard("uno_servos", speed="step", trace=True) as board:
         board.run(0.02)
         host = BareHost(board)
-        host.hello(1)
-        image = image_for("uno_servos").pack()
-        host.order(protocol.config(0, 0, image[:120]))
-        host.order(protocol.config(0, 120, image[120:]))
-        host.order(protocol.commit(0, len(image), image_for("uno_servos").crc()))
-        host.order(protocol.set_position(0, dict.fromkeys(range(6), 1500)))
+        host.configure(image_for("uno_servos"), dict.fromkeys(range(6), 1500))
         host.run(0.3)
         assert all(s["pulses"] == 0 for s in board.stats()["servos"].values())
         host.order(protocol.enable(0, 2))

@@ -34,6 +34,22 @@ def move(host: BareHost, start: int, steps: int) -> None:
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
 
 
+def under_way(board: EmulatedBoard, *, power_sensed: bool = False) -> BareHost:
+    """X has gone 0.2 of 2.5 s at 8,000 steps/s."""
+    host = ready(board, MODERATE, power_sensed=power_sensed)
+    move(host, 0, 20_000)
+    host.run(0.2)
+    return host
+
+
+def ended(host: BareHost, error: Error, known: int) -> protocol.Status:
+    """The motion was ended by an error; the board's count of X is that of the pins."""
+    status = host.rest()
+    assert (status.error, status.known) == (error, known)
+    assert status.counts[0] == net(host.board)[0]
+    return status
+
+
 # The build
 
 
@@ -119,15 +135,11 @@ def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: Emula
 
 
 def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
-    host = ready(board, MODERATE)
-    move(host, 0, 20_000)
-    host.run(0.2)
+    host = under_way(board)
     board.control("pin GP26 0")
     host.run(0.2)
-    status = host.rest()
-    assert (status.error, status.known) == (Error.ABORT, 0xFF)
+    status = ended(host, Error.ABORT, 0xFF)
     assert status.flags & Flag.ABORT
-    assert status.counts[0] == net(board)[0]
     host.hello(2)
     assert host.ask(protocol.jog(0, (100, *[0] * 7)), protocol.Ack).error == Error.ABORT
     board.control("pin GP26 z")
@@ -138,20 +150,14 @@ def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
 
 def test_a_cut_of_the_motors_power_is_a_lost_position(board: EmulatedBoard) -> None:
     board.control("pin GP27 1")
-    host = ready(board, MODERATE, power_sensed=True)
-    move(host, 0, 20_000)
-    host.run(0.2)
+    host = under_way(board, power_sensed=True)
     board.control("pin GP27 0")
     host.run(0.2)
-    status = host.rest()
-    assert (status.error, status.known) == (Error.POWER, 0)
-    assert status.counts[0] == net(board)[0]
+    ended(host, Error.POWER, 0)
 
 
 def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None:
-    host = ready(board, MODERATE)
-    move(host, 0, 20_000)
-    host.run(0.2)
+    host = under_way(board)
     board.control("cut both")
     host.run(1.0)
     board.control("restore")
@@ -206,12 +212,7 @@ def test_a_program_that_hangs_is_reset_by_the_watchdog(board: EmulatedBoard) -> 
 
 def test_servos_are_silent_until_consent_then_exact(board: EmulatedBoard) -> None:
     host = BareHost(board)
-    host.hello(1)
-    image = image_for(PICO, MODERATE, **TMC2209)
-    host.order(protocol.config(0, 0, image.pack()[:200]))
-    host.order(protocol.config(0, 200, image.pack()[200:]))
-    host.order(protocol.commit(0, len(image.pack()), image.crc()))
-    host.order(protocol.set_position(0, KNOWN))
+    host.configure(image_for(PICO, MODERATE, **TMC2209), KNOWN)
     host.run(0.1)
     assert all(s["pulses"] == 0 for s in board.stats()["servos"].values())
     host.order(protocol.enable(0, 2))
@@ -279,12 +280,8 @@ def test_fifteen_hundred_segments_a_second_over_the_uart() -> None:
 
 
 def test_a_tick_that_is_brought_too_late_is_told_and_ends_in_a_hold(board: EmulatedBoard) -> None:
-    host = ready(board, MODERATE)
-    move(host, 0, 20_000)
-    host.run(0.2)
+    host = under_way(board)
     board.control("absent 200us")  # an edge is due every 125 us
     host.run(0.1)
-    status = host.rest()
-    assert (status.error, status.known) == (Error.OVERRUN, 0xFF)
-    assert status.counts[0] == net(board)[0]
+    status = ended(host, Error.OVERRUN, 0xFF)
     assert 8000 * 0.2 < status.counts[0] < 8000 * 0.3

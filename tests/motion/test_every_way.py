@@ -8,24 +8,11 @@ from itertools import pairwise
 import brute
 import numpy as np
 import pytest
+from lines import random_line
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import targets_of
 from armkin.motion.chains import chains, fewest
 from armkin.motion.columns import linked
-from armkin.motion.geometry import Piece, Spot, line, spot
-
-
-def random_line(arm: armkin.Arm, rng: np.random.Generator, length: float = 300.0) -> Piece:
-    """A line in a random direction from where random legal joint values put the tool."""
-    task = task_for(arm)
-    low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
-    high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
-    q = rng.uniform(low, high)
-    a = spot(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
-    d = rng.normal(size=len(a.p))
-    return line(task, a, Spot(a.p + length * d / np.linalg.norm(d), a.sums, a.turned))
 
 
 @pytest.mark.parametrize("name", ["three_dof", "irb120", "ar4", "labvolt_5150"])
