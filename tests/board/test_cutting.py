@@ -106,14 +106,14 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02
 
 
-def off(s: Segment, axis: int = 0) -> float:
+def off(s: Segment) -> float:
     """Steps that a motor may be off at a segment's end: its rate rounded, and its ticks to whole cycles.
 
     A rate has 2^-16 step of rounding a tick, a fine one 2^-24 (PROTOCOL.md, section 6). An interval is cut to whole
     cycles: less than one a tick. Where `add` makes at most three cycles of difference in all, it is there to make up
     for that: rounding it to 2^-16 cycle moves its thresholds by T^2 / 2^17 ticks, and a cycle or two are left.
     """
-    rate, even = abs(s.rates[axis]), abs(s.add) * s.ticks <= 3 << 16
+    rate, even = abs(s.rates[0]), abs(s.add) * s.ticks <= 3 << 16
     cycles = min(s.ticks, s.ticks**2 / 2**17 + 2) if even else s.ticks
     return float(
         s.ticks * 2.0 ** (-24 if rate < 2**15 else -16) + rate / 2**23 * s.ticks * cycles / segments.cycles_of(s)

@@ -37,7 +37,7 @@ class Built:
         return armkin.fk(self.arm, c * self.ratio)
 
 
-def built(arm: armkin.Arm, seed: int, *, base: bool = True, size: float = 1.0) -> Built:
+def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
     """A built arm: every number of its table a bit off."""
     rng = np.random.default_rng(seed)
     data: dict[str, Any] = tables.dh(arm)
@@ -45,7 +45,7 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True, size: float = 1.0) -
     for joint in data["joints"]:
         row = dict(joint["dh"])
         for key, error in (("a", 0.5), ("d", 0.5), ("alpha", 0.2), ("theta", 1.0)):
-            row[key] += size * error * rng.normal()
+            row[key] += error * rng.normal()
         joints.append({key: value for key, value in joint.items() if key not in ("limits", "home")} | {"dh": row})
     where = data.get("base", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]})
     shift = (20 / np.sqrt(3) if base else 0.0) * rng.normal(size=3)
@@ -56,7 +56,7 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True, size: float = 1.0) -
     }
     keep = {key: value for key, value in data.items() if key in ("name", "convention", "tool")}
     true = build(robot_file.parse(text({**keep, "base": changed, "joints": joints})))
-    return Built(true, 1.0 + size * 0.002 * rng.normal(size=arm.n))
+    return Built(true, 1.0 + 0.002 * rng.normal(size=arm.n))
 
 
 def commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
@@ -66,14 +66,12 @@ def commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(low, high, (count, arm.n))
 
 
-def measured(
-    true: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05, off: float = 5.0
-) -> Array:
-    """Tips as measured: with noise [mm] a coordinate, and a share of rows wrong by `off` mm."""
+def measured(true: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05) -> Array:
+    """Tips as measured: with noise [mm] a coordinate, and a share of rows wrong by 5 mm."""
     x = true.tips(c) + rng.normal(size=(len(c), 3)) * noise
     bad = rng.choice(len(c), round(wrong * len(c)), replace=False)
     direction = rng.normal(size=(len(bad), 3))
-    x[bad] += off * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    x[bad] += 5 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
     return x
 
 

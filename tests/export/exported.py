@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,9 +35,9 @@ def library(arm: armkin.Arm, folder: Path, *options: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(folder / "arm.so"))
 
 
-def postures(arm: armkin.Arm, count: int, seed: int = 3) -> np.ndarray:
+def postures(arm: armkin.Arm, count: int) -> np.ndarray:
     """Random joint values: anywhere, a quarter of them within limits."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
     low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
     high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
@@ -47,16 +46,14 @@ def postures(arm: armkin.Arm, count: int, seed: int = 3) -> np.ndarray:
     )
 
 
-def agreement(
-    arm: armkin.Arm, folder: Path, count: int, solve: Callable[..., armkin.Solutions] | None = None
-) -> Agreement:
-    """Compare on random poses. solve: called like `armkin.ik` without its arm, by default that."""
+def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
+    """Compare on random poses."""
     code, n, prefix = library(arm, folder), arm.n, identifier(arm.name)
     task, _ = solver(arm, None)
     q = postures(arm, count)
     T = armkin.fk(arm, q)
     target = targets_of(task, T, q)
-    found = armkin.ik(arm, target) if solve is None else solve(target)
+    found = armkin.ik(arm, target)
     doubles = ctypes.c_double * n
 
     class Solution(ctypes.Structure):

@@ -16,6 +16,7 @@ from armkin.board.firmware.protocol import HALF, STEP, Ack, GuardImage, Info, Se
 
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)
+RAMP, LENGTH = 0.1, 0.01  # [s] of a ramp, and of a segment
 CREDIT = 0x83  # an ACK that comes unasked
 AXES = {"uno_cnc_shield": 5, "mega_ramps14": 9, "uno_servos": 6, "pico6": 8}
 SWITCHES = {"uno_cnc_shield": 3, "mega_ramps14": 6, "uno_servos": 0, "pico6": 6}
@@ -217,32 +218,30 @@ class BareHost:
         self.sequence = (first + done) % 256
         return self.rest()
 
-    def rest(self, give_up: float = 30.0) -> Status:
+    def rest(self) -> Status:
         """Ask until the board is at rest."""
-        deadline = self.time + give_up
+        deadline = self.time + 30
         while (status := self.status()).state != State.IDLE:
             assert self.time < deadline, status
         return status
 
 
-def cruise(
-    rate: float, seconds: float, share: Sequence[float], ramp: float = 0.1, length: float = 0.01
-) -> list[Segment]:
-    """Up to `rate` ticks/s and down again in `ramp` s each way; axis i makes `share[i]` steps a tick."""
+def cruise(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]:
+    """Up to `rate` ticks/s and down again in RAMP each way; axis i makes `share[i]` steps a tick."""
     segments: list[Segment] = []
     time = 0.0
     while time < seconds:
-        slope = min(1.0, time / ramp + 0.02, (seconds - time) / ramp + 0.02)
+        slope = min(1.0, time / RAMP + 0.02, (seconds - time) / RAMP + 0.02)
         interval = round(CLOCK / (rate * slope))
-        ticks = max(10, round(length * CLOCK / interval))
+        ticks = max(10, round(LENGTH * CLOCK / interval))
         segments.append(whole(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
         time += ticks * interval / CLOCK
     return segments
 
 
-def run_up(rate: float, seconds: float, share: Sequence[float], length: float = 0.01) -> list[Segment]:
+def run_up(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]:
     """From rest up to `rate` ticks/s in so many seconds; axis i makes `share[i]` steps a tick."""
-    parts = round(seconds / length)
+    parts = round(seconds / LENGTH)
     speeds = [rate * (k + 0.5) / parts for k in range(parts)]
-    counts = [(round(CLOCK / v), round(length * v)) for v in speeds]
+    counts = [(round(CLOCK / v), round(LENGTH * v)) for v in speeds]
     return [whole(n, interval, 0, tuple(round(s * n) for s in share)) for interval, n in counts if n]

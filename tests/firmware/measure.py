@@ -50,7 +50,7 @@ class Stepping:
     stack_free: int
 
 
-def stepping(board: str, rate: float, seconds: float = 0.6, elf: Path | None = None) -> Stepping:
+def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
     """Every stepper one step a tick, alternating directions and reversing half way; the first servo moves along."""
     steppers = STEPPERS[board]
     axes = tuple(range(steppers + 1))
@@ -61,7 +61,7 @@ def stepping(board: str, rate: float, seconds: float = 0.6, elf: Path | None = N
     row = protocol.RowImage(-(1 << 28), 1 << 28, (1, 1) + (0,) * (AXES[board] - 2))
     limit = replace(image.axes[0], lower=-(1 << 27), upper=1 << 27)
     image = replace(image, axes=(limit, limit, *image.axes[2:]), rows=(row,))
-    with EmulatedBoard(board, speed="step", elf=elf, trace=True) as emulated:
+    with EmulatedBoard(board, speed="step", trace=True) as emulated:
         host = BareHost(emulated)
         host.run(0.02)
         host.setup(image, counts_at_home(board))

@@ -226,11 +226,11 @@ def newton(screw: Screws, goals: Goal, q: Array, steps: int = 40) -> tuple[Array
     return q, np.sqrt(cost)
 
 
-def branches(screw: Screws, goals: Goal, starts: int, seed: int, span: Array | None = None) -> list[Array]:
+def branches(screw: Screws, goals: Goal, starts: int, seed: int) -> list[Array]:
     """For every target the solutions that Newton reaches from that many random starts: (k, n) each."""
     rng = np.random.default_rng(seed)
     n, count = len(screw.prismatic), len(goals.T)
-    width = np.where(screw.prismatic, screw.size, np.pi) if span is None else span
+    width = np.where(screw.prismatic, screw.size, np.pi)
     q, size = newton(
         screw, goals.take(np.repeat(np.arange(count), starts)), rng.uniform(-width, width, (count * starts, n))
     )

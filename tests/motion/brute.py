@@ -38,9 +38,9 @@ def legal_copies(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
     return [np.array(row) for row in itertools.product(*choices)]
 
 
-def nodes(arm: Arm, targets: np.ndarray, task: str | None = None) -> Nodes:
+def nodes(arm: Arm, targets: np.ndarray) -> Nodes:
     """All legal joint values at all targets."""
-    found = armkin.ik(arm, targets, task)
+    found = armkin.ik(arm, targets)
     out = []
     for row, valid in zip(found.q, found.valid, strict=True):
         rows = [copy for q in row[valid] for copy in legal_copies(arm, q)]
@@ -67,14 +67,12 @@ def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarra
     return near
 
 
-def carried(
-    arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = None, start: np.ndarray | None = None
-) -> list[np.ndarray]:
+def carried(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray | None = None) -> list[np.ndarray]:
     """Joint values (k, n) that some run from the first sample arrives at, at every sample up to the last it reaches.
 
     start: (k, n) those at the first sample that count; by default all.
     """
-    n = nodes(arm, targets, task)
+    n = nodes(arm, targets)
     first = n.q[0]
     if start is not None and len(first):
         away = np.abs(first[:, None] - start[None])
@@ -89,6 +87,6 @@ def carried(
     return out if len(out[-1]) else out[:-1]
 
 
-def reach(arm: Arm, targets: np.ndarray, tolerance: float, task: str | None = None) -> int:
+def reach(arm: Arm, targets: np.ndarray, tolerance: float) -> int:
     """The last sample that any run from the first sample arrives at; -1: no legal start."""
-    return len(carried(arm, targets, tolerance, task)) - 1
+    return len(carried(arm, targets, tolerance)) - 1

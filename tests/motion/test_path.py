@@ -20,12 +20,11 @@ def three_dof() -> Arm:
     return armkin.load("robots/three_dof.yaml")
 
 
-def executed(plan: PathPlan, step: float = 0.001) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, joint values and what their differences make of speed and acceleration, as shares of the limits."""
-    t = np.arange(0.0, plan.duration, step)
-    q = plan.q(t)
-    v = np.diff(q, axis=0) / step
-    a = np.diff(v, axis=0) / step
+def executed(plan: PathPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joint values every millisecond; the speeds and accelerations of their differences, as shares of the limits."""
+    q = plan.q(np.arange(0.0, plan.duration, 0.001))
+    v = np.diff(q, axis=0) / 0.001
+    a = np.diff(v, axis=0) / 0.001
     return q, np.abs(v) / plan.arm.max_speed, np.abs(a) / plan.arm.max_accel
 
 
