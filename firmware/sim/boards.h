@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 
+enum { CLOCK_HZ = 16000000 };             /* the crystal of each of them */
 enum { MAX_AXES = 6, MAX_SERVOS = 6 };
 
 /* One stepper axis; pins are Arduino names ("D5", "A3"), NULL where the board has none. */

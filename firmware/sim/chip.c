@@ -5,16 +5,10 @@
 
 #include <avr_eeprom.h>
 #include <avr_extint.h>
-#include <avr_uart.h>
 #include <sim_avr.h>
 #include <sim_core.h>
 
-#include "inputs.h"
-#include "interrupts.h"
-#include "line.h"
-#include "pins.h"
 #include "program.h"
-#include "uart.h"
 
 enum { MCUSR = 0x54, WDTCSR = 0x60 };             /* data-space addresses on both chips */
 enum { WDCE = 0x10, WDE = 0x08 };
@@ -31,6 +25,7 @@ static uint64_t random_state;
 static int resets;
 static reset_kind last_reset;
 static uint64_t lost_in_boot;
+static const chip_part *parts;
 
 /* The SRAM between the last variable and the top is filled with a pattern; what differs later was touched. */
 static uint8_t *pattern;
@@ -111,9 +106,10 @@ static void paint_stack(void) {
     memcpy(pattern, chip->data, chip->ramend + 1);
 }
 
-bool chip_load(const board *b, const char *elf, uint64_t seed) {
+bool chip_load(const board *b, const char *elf, uint64_t seed, const chip_part *hung_on) {
     avr_global_logger_set(on_log);
     chip_board = b;
+    parts = hung_on;
     random_state = seed * 0x9E3779B97F4A7C15ULL | 1;
     return program_load(elf);
 }
@@ -191,11 +187,8 @@ void chip_reset(reset_kind kind) {
     resets++;
     last_reset = kind;
 
-    interrupts_attach(avr);
-    uart_attach(avr);
-    pins_attach(avr);
-    inputs_attach(avr);
-    pins_trace_reset(kind);
+    for (const chip_part *p = parts; p->attach; p++)
+        p->attach(avr, kind);
     /* After a watchdog reset the watchdog stays on at its shortest time (16 ms) until the program turns it
      * off: a program that forgets to is reset for ever. Bootloaders turn it off. */
     if (kind == RESET_WATCHDOG && chip_bootloader_ms < 0) {
@@ -216,13 +209,15 @@ void chip_run_until(uint64_t end) {
     while (chip_now() < end && !chip_stop) {
         if (chip_now() < boot_end || !alive()) {
             uint64_t until = alive() && boot_end < end ? boot_end : end;
-            lost_in_boot += line_queued();
-            line_discard(LINE_IN);
+            for (const chip_part *p = parts; p->attach; p++)
+                lost_in_boot += p->swallow ? p->swallow() : 0;
             base += until - chip_now();
             continue;
         }
         avr_cycle_timer_register(chip, end - chip_now(), on_slice_end, NULL);
-        uart_kick();
+        for (const chip_part *p = parts; p->attach; p++)
+            if (p->start)
+                p->start();
         while (chip_now() < end && !chip_stop && alive() && chip->run == avr_callback_run_raw)
             avr_run(chip);
         if (chip->run != avr_callback_run_raw)
@@ -237,7 +232,6 @@ void chip_json(FILE *out) {
     fprintf(out, "\"cycle\": %llu, \"seconds\": %.9f, \"state\": \"%s\", \"resets\": %d, \"last_reset\": \"%s\", ",
             (unsigned long long)chip_now(), (double)chip_now() / CLOCK_HZ, chip_state(), resets, kinds[last_reset]);
     fprintf(out, "\"lost_in_bootloader\": %llu, ", (unsigned long long)lost_in_boot);
-    fprintf(out, "\"memory\": {\"flash\": %u, \"ram\": %d, \"variables\": %ld, \"stack_never_touched\": %ld}, ",
+    fprintf(out, "\"memory\": {\"flash\": %u, \"ram\": %d, \"variables\": %ld, \"stack_never_touched\": %ld}",
             program.flashsize, chip->ramend - chip->ioend, stack_floor - chip->ioend - 1, lowest_touched - stack_floor);
-    interrupts_json(out);
 }

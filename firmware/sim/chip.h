@@ -6,6 +6,7 @@
 #define SIM_CHIP_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
@@ -14,9 +15,14 @@
 struct avr_t;
 struct avr_int_vector_t;
 
-enum { CLOCK_HZ = 16000000 };
-
 typedef enum { RESET_POWER, RESET_BROWNOUT, RESET_EXTERNAL, RESET_WATCHDOG } reset_kind;
+
+/* What hangs on the chip; main.c lists the parts. */
+typedef struct {
+    void (*attach)(struct avr_t *avr, reset_kind kind);   /* a reset has just made this chip */
+    void (*start)(void);                  /* the program is about to run on; NULL: no matter */
+    size_t (*swallow)(void);              /* nobody reads the line: drop what waits on it, return how much; NULL: no matter */
+} chip_part;
 
 extern const board *chip_board;
 extern struct avr_t *chip;                /* replaced at every reset */
@@ -26,7 +32,8 @@ extern bool chip_stop;                    /* set it to make chip_run_until retur
  * uses the top of the SRAM and clears MCUSR before any start of the program; negative: there is none. */
 extern double chip_bootloader_ms;
 
-bool chip_load(const board *b, const char *elf, uint64_t seed);
+/* `parts` ends with one without `attach`. */
+bool chip_load(const board *b, const char *elf, uint64_t seed, const chip_part *parts);
 void chip_reset(reset_kind kind);
 void chip_run_until(uint64_t cycle);
 uint64_t chip_now(void);

@@ -1,10 +1,10 @@
 #include "commands.h"
 
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "chip.h"
-#include "control.h"
 #include "inputs.h"
 #include "interrupts.h"
 #include "line.h"
@@ -12,6 +12,8 @@
 #include "pins.h"
 #include "port.h"
 #include "program.h"
+#include "schedule.h"
+#include "trace.h"
 #include "uart.h"
 #include "words.h"
 
@@ -43,6 +45,7 @@ static int directions(const char *text) {      /* bit 0: in, bit 1: out; 0: no s
 void commands_stats(FILE *out) {
     fprintf(out, "{\"ok\": true, \"board\": \"%s\", \"mcu\": \"%s\", ", chip_board->name, chip_board->mcu);
     chip_json(out);
+    fputs(", ", out), interrupts_json(out);
     fputs(", \"uart\": ", out), uart_json(out);
     fputs(", \"line\": ", out), line_json(out);
     fputs(", ", out), pins_json(out);
@@ -173,7 +176,7 @@ static void do_after(FILE *reply) {
     const char *w = word();
     if (!word_time(w, &wait) || !*words_rest())
         fail(reply, "after TIME COMMAND, not 'after %s'", w);
-    else if (!control_later(chip_now() + wait, words_rest()))
+    else if (!schedule_later(chip_now() + wait, words_rest()))
         fail(reply, "too many commands are waiting already");
     else
         done(reply);
@@ -208,7 +211,7 @@ static void do_poke(FILE *reply) {
         done(reply);
 }
 
-static uint8_t outgoing[CONTROL_LONGEST / 2];
+static uint8_t outgoing[COMMANDS_MOST_BYTES];
 
 static void do_send(FILE *reply) {
     long n = word_bytes(word(), outgoing, sizeof outgoing);
@@ -225,8 +228,8 @@ static void do_run(FILE *reply) {
     uint64_t cycles;
     const char *w = word();
     uint8_t stop;
-    if (!control_stepped || !word_time(w, &cycles)) {
-        fail(reply, control_stepped ? "run TIME, not 'run %s'" : "run %s: only with --speed step", w);
+    if (!pace_stepped || !word_time(w, &cycles)) {
+        fail(reply, pace_stepped ? "run TIME, not 'run %s'" : "run %s: only with --speed step", w);
         return;
     }
     for (line_stop_byte = -1; *(w = word());) {
@@ -245,7 +248,7 @@ static void do_run(FILE *reply) {
         }
         line_feed(outgoing, (size_t)n);
     }
-    control_run_until(chip_now() + cycles);
+    schedule_run_until(chip_now() + cycles, commands_do);
     line_stop_byte = -1;
     fprintf(reply, "{\"ok\": true, \"cycle\": %llu, \"out\": \"", (unsigned long long)chip_now());
     uint8_t bytes[256];
@@ -271,12 +274,12 @@ static bool setting(FILE *reply, const char *off, double if_off, double least, d
 static void do_mark(FILE *reply) {
     double v;
     if (setting(reply, NULL, 0, 0, 255, &v))
-        pins_trace_mark((uint8_t)v);
+        trace_mark((uint8_t)v);
 }
 
 static void do_speed(FILE *reply) {
     double v;
-    if (control_stepped)
+    if (pace_stepped)
         fail(reply, "the board was started with --speed step");
     else if (setting(reply, "max", 0, 1e-3, 1e3, &v)) {
         pace_speed = v;
@@ -318,12 +321,12 @@ static void do_clear(FILE *reply) {
 }
 
 static void do_flush(FILE *reply) {
-    pins_trace_flush();
+    trace_flush();
     done(reply);
 }
 
 static void do_quit(FILE *reply) {
-    control_quit = true;
+    schedule_quit = true;
     done(reply);
 }
 
@@ -346,4 +349,17 @@ void commands_execute(char *line, FILE *reply) {
             return;
         }
     fail(reply, "no command '%s'; see help", name);
+}
+
+bool commands_do(char *line) {
+    char *text = NULL;
+    size_t size;
+    FILE *reply = open_memstream(&text, &size);
+    commands_execute(line, reply);
+    fclose(reply);
+    bool good = !strstr(text, "\"error\"");
+    if (!good)
+        fprintf(stderr, "simboard: %s", text);
+    free(text);
+    return good;
 }

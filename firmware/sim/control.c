@@ -7,10 +7,11 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "chip.h"
 #include "commands.h"
+#include "schedule.h"
 
-enum { MAX_CLIENTS = CONTROL_FDS - 1, MAX_LATER = 64 };
+enum { MAX_CLIENTS = CONTROL_FDS - 1 };
+enum { LONGEST_LINE = 2 * COMMANDS_MOST_BYTES };       /* characters */
 
 typedef struct {
     int in, out;
@@ -18,62 +19,11 @@ typedef struct {
     size_t size;
 } client;
 
-bool control_quit, control_stepped;
-
 static client clients[MAX_CLIENTS];
 static int client_count;
 static int listener = -1;
 static const char *listener_path;
 static bool quit_at_end;
-
-static struct {
-    uint64_t cycle;
-    char *command;
-} later[MAX_LATER];
-static int later_count;
-
-bool control_later(uint64_t cycle, const char *command) {
-    if (later_count == MAX_LATER)
-        return false;
-    later[later_count].cycle = cycle;
-    later[later_count++].command = strdup(command);
-    return true;
-}
-
-bool control_do(char *command) {
-    char *text = NULL;
-    size_t size;
-    FILE *reply = open_memstream(&text, &size);
-    commands_execute(command, reply);
-    fclose(reply);
-    bool good = !strstr(text, "\"error\"");
-    if (!good)
-        fprintf(stderr, "simboard: %s", text);
-    free(text);
-    return good;
-}
-
-void control_run_until(uint64_t cycle) {
-    do {
-        int next = -1;
-        for (int i = 0; i < later_count; i++)
-            if (later[i].cycle <= cycle && (next < 0 || later[i].cycle < later[next].cycle))
-                next = i;
-        if (next < 0) {
-            chip_run_until(cycle);
-            return;
-        }
-        chip_run_until(later[next].cycle);
-        if (chip_stop)
-            return;
-        char *command = later[next].command;
-        later[next] = later[--later_count];
-        control_do(command);
-        free(command);
-    } while (!control_quit);
-}
-
-/* ---- clients ---- */
 
 static void add_client(int in, int out) {
     if (client_count == MAX_CLIENTS) {
@@ -134,7 +84,7 @@ static void answer(const client *c, char *line) {
 static bool serve(client *c) {
     char chunk[65536];
     ssize_t n = read(c->in, chunk, sizeof chunk);
-    if (n <= 0 || c->size + (size_t)n > CONTROL_LONGEST)
+    if (n <= 0 || c->size + (size_t)n > LONGEST_LINE)
         return n < 0 && (errno == EAGAIN || errno == EINTR);
     c->text = realloc(c->text, c->size + (size_t)n);
     if (!c->text)
@@ -142,7 +92,7 @@ static bool serve(client *c) {
     memcpy(c->text + c->size, chunk, (size_t)n);
     c->size += (size_t)n;
     size_t begin = 0;
-    for (char *end; (end = memchr(c->text + begin, '\n', c->size - begin)) && !control_quit;) {
+    for (char *end; (end = memchr(c->text + begin, '\n', c->size - begin)) && !schedule_quit;) {
         *end = 0;
         answer(c, c->text + begin);
         begin = (size_t)(end - c->text) + 1;
@@ -162,7 +112,7 @@ void control_service(void) {
         if (!fds[first + i].revents || serve(&clients[i]))
             continue;
         if (clients[i].in == STDIN_FILENO)
-            control_quit |= quit_at_end;
+            schedule_quit |= quit_at_end;
         else
             close(clients[i].in);
         free(clients[i].text);

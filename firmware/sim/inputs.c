@@ -6,8 +6,8 @@
 #include <avr_ioport.h>
 #include <sim_avr.h>
 
-#include "chip.h"
 #include "pins.h"
+#include "trace.h"
 
 enum { MAX_SWITCHES = 16 };
 
@@ -50,7 +50,7 @@ static void drive(char port, int bit, int level) {
     uint8_t mask = (uint8_t)(1 << bit);
     driven[p].mask = (uint8_t)(level == INPUT_RELEASED ? driven[p].mask & ~mask : driven[p].mask | mask);
     driven[p].value = (uint8_t)(level == INPUT_HIGH ? driven[p].value | mask : driven[p].value & ~mask);
-    pins_trace_input(p * 8 + bit, level == INPUT_LOW ? 0 : 1);
+    trace_input(p * 8 + bit, level == INPUT_LOW ? 0 : 1);
     apply(port, bit);
 }
 
@@ -62,8 +62,8 @@ static void set_contact(limit_switch *s, bool closed) {
 
 static bool wanted(const limit_switch *s) { return s->pressed != s->set.normally_closed; }
 
-void inputs_attach(avr_t *avr) {
-    (void)avr;
+void inputs_attach(avr_t *avr, reset_kind kind) {
+    (void)avr, (void)kind;
     for (int p = 0; p < 16; p++)
         for (int bit = 0; bit < 8; bit++)
             if (driven[p].mask >> bit & 1)

@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-struct avr_t;
+#include "chip.h"
 
 enum { INPUT_LOW = 0, INPUT_HIGH = 1, INPUT_RELEASED = -1 };
 
@@ -19,11 +19,11 @@ typedef struct {
     uint64_t bounce;          /* cycles during which the contact chatters */
 } switch_setup;
 
-void inputs_attach(struct avr_t *avr);                    /* drive the pins of a chip that was just made */
+void inputs_attach(struct avr_t *avr, reset_kind kind);   /* drive the pins of a chip that was just made */
 bool inputs_drive(const char *pin, int level);            /* false: no such pin */
 int inputs_set_switch(const switch_setup *s);             /* false: no such pin, or too many */
 bool inputs_force_switch(const char *pin, int pressed);   /* 1 pressed, 0 not, -1 by position again */
-void inputs_moved(int axis, int64_t position);            /* called at every step */
+void inputs_moved(int axis, int64_t position);            /* the axis made a step */
 void inputs_json(FILE *out);                              /* member "inputs" */
 
 #endif

@@ -2,8 +2,6 @@
 
 #include <sim_avr.h>
 
-#include "chip.h"
-
 static struct {
     uint64_t raised, entered, accepted, count, total, longest, longest_wait;
 } interrupt[64];
@@ -63,7 +61,8 @@ static void watch_enabling(avr_t *avr) {
     }
 }
 
-void interrupts_attach(avr_t *avr) {
+void interrupts_attach(avr_t *avr, reset_kind kind) {
+    (void)kind;
     for (int i = 0; i < avr->interrupts.vector_count; i++) {
         avr_int_vector_t *v = avr->interrupts.vector[i];
         avr_irq_register_notify(v->irq + AVR_INT_IRQ_PENDING, on_pending, (void *)(intptr_t)(v->vector & 63));

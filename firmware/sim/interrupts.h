@@ -5,9 +5,9 @@
 #include <stdint.h>
 #include <stdio.h>
 
-struct avr_t;
+#include "chip.h"
 
-void interrupts_attach(struct avr_t *avr);
+void interrupts_attach(struct avr_t *avr, reset_kind kind);
 
 /* When the interrupt that is being served was raised; 0 outside of interrupts. */
 uint64_t interrupts_raised(void);

@@ -3,9 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "chip.h"
-#include "pins.h"
-
 line_noise line_way[2];
 double line_host_baud;
 int line_stop_byte = -1;
@@ -96,15 +93,13 @@ int line_next(void) {
     return q->head == q->size ? LINE_EMPTY : pass(LINE_IN, q->data[q->head++]);
 }
 
-void line_put(uint8_t byte) {
+bool line_put(uint8_t byte) {
     int passed = pass(LINE_OUT, byte);
-    pins_trace_byte(LINE_OUT, byte);
     if (passed == LINE_LOST)
-        return;
+        return false;
     uint8_t b = (uint8_t)passed;
     push(&queues[LINE_OUT], &b, 1);
-    if (b == line_stop_byte)
-        chip_stop = true;
+    return b == line_stop_byte;
 }
 
 void line_json(FILE *out) {

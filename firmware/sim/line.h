@@ -22,7 +22,7 @@ extern line_noise line_way[2];
 /* True bits per second of the host's side; 0 = the standard rate nearest to the board's. */
 extern double line_host_baud;
 
-/* A byte towards the host that makes chip_run_until() return at once; -1: none. */
+/* A byte towards the host that the one who runs the board waits for; -1: none. */
 extern int line_stop_byte;
 
 void line_seed(int way, uint64_t seed);
@@ -36,7 +36,7 @@ void line_discard(int way);                           /* forget what is queued *
 
 /* UART side. */
 int line_next(void);                  /* next byte towards the board, LINE_EMPTY, or LINE_LOST: a byte-time of silence */
-void line_put(uint8_t byte);          /* a byte from the board */
+bool line_put(uint8_t byte);          /* a byte from the board; true: the host has it, and it is `line_stop_byte` */
 
 void line_json(FILE *out);
 

@@ -12,10 +12,14 @@
 #include "commands.h"
 #include "control.h"
 #include "inputs.h"
+#include "interrupts.h"
 #include "line.h"
 #include "pace.h"
 #include "pins.h"
 #include "port.h"
+#include "schedule.h"
+#include "trace.h"
+#include "uart.h"
 
 static const char USAGE[] =
     "usage: simboard --board uno_cnc_shield|mega_ramps14|uno_servos --elf FILE [options]\n"
@@ -36,6 +40,16 @@ static const char USAGE[] =
 
 /* Simulated time between two looks at the port: 8 bytes at 250000 baud arrive in it. */
 enum { SLICE = CLOCK_HZ / 4000 };
+
+/* In the order in which a reset puts them to a new chip: the pins' edges are known before the inputs drive. */
+static const chip_part parts[] = {
+    {.attach = interrupts_attach},
+    {.attach = uart_attach, .start = uart_start, .swallow = uart_swallow},
+    {.attach = pins_attach},
+    {.attach = inputs_attach},
+    {.attach = trace_reset},
+    {0},
+};
 
 static volatile sig_atomic_t interrupted;
 
@@ -66,22 +80,22 @@ static void wait_ns(int64_t ns) {
 }
 
 static void service(void) {
-    if (!control_stepped && port_service())
+    if (!pace_stepped && port_service())
         pace_host_spoke();
     control_service();
 }
 
 static void loop(void) {
     pace_reset();
-    while (!control_quit && !interrupted) {
-        if (control_stepped) {
+    while (!schedule_quit && !interrupted) {
+        if (pace_stepped) {
             wait_ns(-1);
             service();
             continue;
         }
-        control_run_until(chip_now() + SLICE);
+        schedule_run_until(chip_now() + SLICE, commands_do);
         service();
-        for (int64_t ns; (ns = pace_wait()) > 0 && !control_quit && !interrupted;) {
+        for (int64_t ns; (ns = pace_wait()) > 0 && !schedule_quit && !interrupted;) {
             wait_ns(ns);
             service();
         }
@@ -115,8 +129,8 @@ int main(int argc, char **argv) {
         case CONTROL: control = optarg; break;
         case STDIN: from_stdin = true; break;
         case SPEED:
-            control_stepped = !strcmp(optarg, "step");
-            pace_speed = !strcmp(optarg, "max") || control_stepped ? 0 : positive("--speed", optarg);
+            pace_stepped = !strcmp(optarg, "step");
+            pace_speed = !strcmp(optarg, "max") || pace_stepped ? 0 : positive("--speed", optarg);
             break;
         case AHEAD: pace_ahead = (uint64_t)(positive("--ahead", optarg) * (CLOCK_HZ / 1e3)); break;
         case BOOT: chip_bootloader_ms = positive("--bootloader", optarg); break;
@@ -147,14 +161,14 @@ int main(int argc, char **argv) {
     }
     if (access(elf, R_OK))
         die(elf, strerror(errno));
-    if (!chip_load(b, elf, seed))
+    if (!chip_load(b, elf, seed, parts))
         die(elf, "no program for an AVR in it");
-    pins_init(b, d);
-    if (trace && !pins_trace_open(trace))
+    pins_init(b, d, inputs_moved);
+    if (trace && !pins_trace_to(trace))
         die(trace, strerror(errno));
     chip_reset(RESET_POWER);
     for (int i = 0; i < command_count; i++)
-        if (!control_do(commands[i]))
+        if (!commands_do(commands[i]))
             return 2;
     if (!port_start(link))
         die("serial port", strerror(errno));
@@ -175,7 +189,7 @@ int main(int argc, char **argv) {
                b->name, port_path(), port_path());
     fflush(stdout);
     loop();
-    pins_trace_flush();
+    trace_flush();
     port_end();
     control_end();
     if (stats) {

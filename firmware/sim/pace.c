@@ -4,6 +4,7 @@
 
 #include "chip.h"
 
+bool pace_stepped;
 double pace_speed = 1;
 uint64_t pace_ahead = CLOCK_HZ / 20;
 

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+extern bool pace_stepped;                 /* simulated time moves by the command `run` only */
 extern double pace_speed;                 /* simulated per real second; 0: as fast as possible */
 
 /* At speed 0, how far simulated time may run away from the host, in cycles after its last byte. */

@@ -7,9 +7,8 @@
 #include <avr_ioport.h>
 #include <sim_avr.h>
 
-#include "chip.h"
-#include "inputs.h"
 #include "interrupts.h"
+#include "trace.h"
 
 /* Signals are ordered so that of two edges in one port write DIR and ENABLE count before STEP. */
 typedef enum { DIR, ENABLE, STEP, SERVO } signal_kind;
@@ -51,7 +50,6 @@ typedef struct {
 } port_state;
 
 enum { MAX_SIGNALS = 3 * MAX_AXES + MAX_SERVOS };
-enum { TRACE_INPUT = 128, TRACE_IN = 250, TRACE_OUT = 251, TRACE_RESET = 252, TRACE_MARK = 253 };
 
 const driver drivers[] = {
     {"a4988", 1000, 1000, 200, 200, 1000},
@@ -70,7 +68,7 @@ static servo_state servos[MAX_SERVOS];
 static int servo_count;
 static port_state ports[16];
 static int port_count;
-static FILE *trace;
+static void (*stepped)(int axis, int64_t position);
 
 static int cycles_of_ns(int64_t ns) { return (int)((ns * (CLOCK_HZ / 1000000) + 999) / 1000); }
 
@@ -85,18 +83,6 @@ static void forget(range *r) {
     r->least = UINT64_MAX;
     r->most = 0;
 }
-
-static void put_record(int id, int value) {
-    if (!trace)
-        return;
-    uint64_t record = chip_now() << 16 | (uint64_t)id << 8 | (uint8_t)value;
-    fwrite(&record, sizeof record, 1, trace);         /* little-endian hosts only, as libsimavr itself */
-}
-
-void pins_trace_byte(int way, uint8_t byte) { put_record(way ? TRACE_OUT : TRACE_IN, byte); }
-void pins_trace_reset(int kind) { put_record(TRACE_RESET, kind); }
-void pins_trace_mark(uint8_t value) { put_record(TRACE_MARK, value); }
-void pins_trace_input(int input, int level) { put_record(TRACE_INPUT + input, level); }
 
 static int add_signal(signal_kind kind, int index, const char *owner, const char *what, const char *pin) {
     for (int i = 0; i < signal_count; i++)            /* one ENABLE for all axes */
@@ -126,8 +112,9 @@ static int add_signal(signal_kind kind, int index, const char *owner, const char
     return signal_count++;
 }
 
-void pins_init(const board *b, const driver *d) {
+void pins_init(const board *b, const driver *d, void (*on_stepped)(int axis, int64_t position)) {
     the_board = b;
+    stepped = on_stepped;
     limits = (driver){d->name, cycles_of_ns(d->high_ns), cycles_of_ns(d->low_ns), cycles_of_ns(d->setup_ns),
                       cycles_of_ns(d->hold_ns), cycles_of_ns(d->wake_us * 1000)};
     while (b->axis[axis_count].name)
@@ -195,7 +182,7 @@ static void on_step(int index, bool level, uint64_t now) {
     if (!a->first)
         a->first = now;
     a->last = a->rose = now;
-    inputs_moved(index, a->position);
+    stepped(index, a->position);
 }
 
 static void on_dir(int index, uint64_t now) {
@@ -239,7 +226,7 @@ static void update(port_state *p, uint8_t port, uint8_t ddr) {
         if (!(changed & s->bit))
             continue;
         s->level = level & s->bit;
-        put_record(p->signals[i], s->level);
+        trace_signal(p->signals[i], s->level);
         if (s->kind == DIR)
             on_dir(s->index, now);
         else if (s->kind == STEP)
@@ -262,7 +249,8 @@ static void on_ddr(struct avr_irq_t *irq, uint32_t value, void *param) {
     update(p, p->port, (uint8_t)value);
 }
 
-void pins_attach(avr_t *avr) {
+void pins_attach(avr_t *avr, reset_kind kind) {
+    (void)kind;
     for (int i = 0; i < port_count; i++) {
         port_state *p = &ports[i];
         update(p, 0, 0);
@@ -281,21 +269,11 @@ int pins_axis(const char *name) {
 
 int64_t pins_position(int axis) { return axes[axis].position; }
 
-bool pins_trace_open(const char *path) {
-    trace = fopen(path, "wb");
-    if (!trace)
-        return false;
-    setvbuf(trace, NULL, _IOFBF, 1 << 18);
-    fprintf(trace, "{\"armkin_trace\": 1, \"board\": \"%s\", \"clock_hz\": %d, \"signals\": [", the_board->name, CLOCK_HZ);
+bool pins_trace_to(const char *path) {
+    const char *names[MAX_SIGNALS];
     for (int i = 0; i < signal_count; i++)
-        fprintf(trace, "%s\"%s\"", i ? ", " : "", signals[i].name);
-    fprintf(trace, "]}\n");
-    return true;
-}
-
-void pins_trace_flush(void) {
-    if (trace)
-        fflush(trace);
+        names[i] = signals[i].name;
+    return trace_open(path, the_board->name, names, signal_count);
 }
 
 static void put_us(FILE *out, const char *name, uint64_t cycles, bool known) {

@@ -1,4 +1,4 @@
-/* What the pins do: every edge recorded, step counts, pulse widths and violations of the driver's timing. */
+/* What the board's outputs do: every edge recorded, step counts, pulse widths and violations of the driver's timing. */
 #ifndef SIM_PINS_H
 #define SIM_PINS_H
 
@@ -7,8 +7,7 @@
 #include <stdio.h>
 
 #include "boards.h"
-
-struct avr_t;
+#include "chip.h"
 
 /* The least times a stepper driver asks for, in nanoseconds (data sheets), and its wake-up. */
 typedef struct {
@@ -18,21 +17,15 @@ typedef struct {
 
 extern const driver drivers[];            /* ends with a NULL name */
 
-void pins_init(const board *b, const driver *d);
-bool pins_trace_open(const char *path);
-void pins_trace_flush(void);
+/* `stepped` is called after every step, with the axis's net steps. */
+void pins_init(const board *b, const driver *d, void (*stepped)(int axis, int64_t position));
+bool pins_trace_to(const char *path);     /* false: errno says why */
 
-void pins_attach(struct avr_t *avr);      /* watch the ports of a chip that was just made */
+void pins_attach(struct avr_t *avr, reset_kind kind);     /* watch the ports of a chip that was just made */
 void pins_clear(void);                    /* zero all figures but the positions */
 
 int pins_axis(const char *name);          /* index, or -1 */
 int64_t pins_position(int axis);          /* net steps since power-on of the emulator; positive = DIR low */
-
-/* Records in the trace that are no edges of the board's outputs. */
-void pins_trace_byte(int way, uint8_t byte);
-void pins_trace_reset(int kind);
-void pins_trace_mark(uint8_t value);
-void pins_trace_input(int input, int level);
 
 void pins_json(FILE *out);                /* members "axes" and "servos" */
 

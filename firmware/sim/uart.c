@@ -5,9 +5,8 @@
 
 #include <sim_avr.h>
 
-#include "chip.h"
 #include "line.h"
-#include "pins.h"
+#include "trace.h"
 
 /* Data-space addresses, the same on the ATmega328P and the ATmega2560. */
 enum { UCSRA = 0xC0, UCSRB = 0xC1, UCSRC = 0xC2, UBRRL = 0xC4, UBRRH = 0xC5, UDR = 0xC6 };
@@ -110,7 +109,7 @@ static avr_cycle_count_t on_frame_end(avr_t *avr, avr_cycle_count_t when, void *
     uint8_t *d = avr->data;
     if (u.arriving != LINE_LOST) {
         uint8_t byte = (uint8_t)u.arriving;
-        pins_trace_byte(LINE_IN, byte);
+        trace_byte(LINE_IN, byte);
         if (u.garbled) {
             byte = (uint8_t)(byte * 37 + 0x5A);      /* anything but the byte; a framing error tells */
             d[UCSRA] |= FE;
@@ -133,7 +132,7 @@ static avr_cycle_count_t on_frame_end(avr_t *avr, avr_cycle_count_t when, void *
     return 0;
 }
 
-void uart_kick(void) {
+void uart_start(void) {
     if (u.arriving != LINE_EMPTY || !line_queued() || avr_cycle_timer_status(u.avr, on_frame_start, NULL))
         return;
     u.frame = (double)u.avr->cycle;
@@ -151,7 +150,10 @@ static void start_sending(uint8_t byte) {
 static avr_cycle_count_t on_sent(avr_t *avr, avr_cycle_count_t when, void *param) {
     (void)when, (void)param;
     count.sent++;
-    line_put(mismatched() ? (uint8_t)(u.tx_shift * 37 + 0x5A) : u.tx_shift);
+    uint8_t byte = mismatched() ? (uint8_t)(u.tx_shift * 37 + 0x5A) : u.tx_shift;
+    trace_byte(LINE_OUT, byte);
+    if (line_put(byte))
+        chip_stop = true;
     u.tx_busy = false;
     if (u.tx_full) {
         u.tx_full = false;
@@ -230,7 +232,8 @@ static void take_register(int addr, avr_io_read_t read, avr_io_write_t write) {
     u.avr->io[AVR_DATA_TO_IO(addr)].w.param = NULL;
 }
 
-void uart_attach(avr_t *avr) {
+void uart_attach(avr_t *avr, reset_kind kind) {
+    (void)kind;
     memset(&u, 0, sizeof u);
     u.avr = avr;
     u.shifted = -1;
@@ -249,6 +252,12 @@ void uart_attach(avr_t *avr) {
     avr->data[UCSRC] = 0x06;
     avr_irq_register_notify(u.rx->irq + AVR_INT_IRQ_RUNNING, on_running, NULL);
     avr_irq_register_notify(u.udre->irq + AVR_INT_IRQ_RUNNING, on_running, NULL);
+}
+
+size_t uart_swallow(void) {
+    size_t n = line_queued();
+    line_discard(LINE_IN);
+    return n;
 }
 
 void uart_clear(void) { memset(&count, 0, sizeof count); }

@@ -10,10 +10,11 @@
 #include <stdint.h>
 #include <stdio.h>
 
-struct avr_t;
+#include "chip.h"
 
-void uart_attach(struct avr_t *avr);      /* take over the registers of a chip that was just made */
-void uart_kick(void);                     /* bytes may wait on the line */
+void uart_attach(struct avr_t *avr, reset_kind kind);     /* take over the registers of a chip that was just made */
+void uart_start(void);                    /* bytes may wait on the line */
+size_t uart_swallow(void);                /* drop them: a bootloader has the chip, or nobody; how many */
 void uart_clear(void);                    /* zero the counters */
 void uart_json(FILE *out);
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "chip.h"
+#include "boards.h"
 
 static char *rest;
 

@@ -1,27 +1,58 @@
-"""The layers of the firmware's core: no module reaches itself, errors return upward, no chip is named."""
+"""The layers of the firmware and of its emulators: no module reaches itself, by its includes or by its calls."""
 
 from __future__ import annotations
 
 import re
+import subprocess
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pytest
-from emulator import FIRMWARE
+from emulator import BUILD, FIRMWARE, build_simulator
 
+SOURCE = FIRMWARE / "src"
 INCLUDE = re.compile(r'^\s*#include "([^"]+)"', re.M)
+IMPORT = re.compile(r"^import .* from '\./([^']+)\.mjs';$", re.M)
+
+# Room of src -> its compiler. The PC's has no files of its own: there the core alone is compiled.
+COMPILERS = {
+    "pc": ["gcc", "-DBOARD_uno_cnc_shield"],
+    "avr": ["avr-gcc", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-DBOARD_uno_cnc_shield"],
+    "rp2040": ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-DBOARD_pico6"],
+}
+C_LIBRARY = {"memcpy", "memset", "memcmp", "memmove"}
+HAL = re.compile(r"hal_\w+|dda_direction")  # what core/hal.h and chip.h ask of a chip
 
 
-def modules(folder: Path) -> dict[str, set[str]]:
-    """What each module (X.h and X.c together) of a folder includes of the same folder."""
+def included(folder: Path) -> dict[str, set[str]]:
+    """What each module (X.h and X.c together, "core/motion") below a folder includes of the same folder."""
     out: dict[str, set[str]] = {}
-    for file in sorted(folder.glob("*.[ch]")):
-        names = {Path(name).stem for name in INCLUDE.findall(file.read_text())}
-        out.setdefault(file.stem, set()).update(names)
+    for file in sorted([*folder.rglob("*.h"), *folder.rglob("*.c")]):
+        name = file.relative_to(folder).with_suffix("").as_posix()
+        paths = [(file.parent / other).resolve() for other in INCLUDE.findall(file.read_text())]
+        uses = {path.relative_to(folder).with_suffix("").as_posix() for path in paths}
+        out.setdefault(name, set()).update(uses)
     return {name: (uses & set(out)) - {name} for name, uses in out.items()}
 
 
-def circle(uses: dict[str, set[str]]) -> list[str]:
-    """Modules that reach themselves; empty if there are none."""
+def called(objects: Iterable[Path]) -> tuple[dict[str, set[str]], set[str]]:
+    """Which other object each one takes a function or a variable from; and the names that none of them defines."""
+    defines: dict[str, str] = {}
+    wants: dict[str, set[str]] = {}
+    for file in objects:
+        table = subprocess.run(["nm", "-P", "-g", str(file)], capture_output=True, text=True, check=True).stdout
+        wants[file.stem] = set()
+        for name, kind, *_ in (line.split() for line in table.splitlines()):
+            if kind == "U":
+                wants[file.stem].add(name)
+            else:
+                defines[name] = file.stem
+    uses = {module: {defines[name] for name in names if name in defines} - {module} for module, names in wants.items()}
+    return uses, set().union(*wants.values()) - set(defines)
+
+
+def circle(uses: Mapping[str, set[str]]) -> list[str]:
+    """Modules that reach themselves, and those above them; empty if there are none."""
     left = dict(uses)
     while left:
         ready = [name for name, needs in left.items() if not needs & set(left)]
@@ -32,19 +63,78 @@ def circle(uses: dict[str, set[str]]) -> list[str]:
     return []
 
 
-@pytest.mark.parametrize("folder", ["src/core"])
-def test_no_module_reaches_itself(folder: str) -> None:
-    assert circle(modules(FIRMWARE / folder)) == []
+def below(uses: Mapping[str, set[str]], name: str) -> set[str]:
+    """All that a module reaches."""
+    found, new = set[str](), {name}
+    while new:
+        found |= new
+        new = set().union(*(uses[one] for one in new)) - found
+    return found - {name}
+
+
+def compiled(room: str, sources: Iterable[Path], into: Path) -> list[Path]:
+    """One object a source, nothing inlined across them."""
+    command = [*COMPILERS[room], "-std=gnu11", "-O1", "-c", *map(str, sources)]
+    subprocess.run(command, cwd=into, check=True, capture_output=True)
+    return sorted(into.glob("*.o"))
+
+
+def test_a_circle_is_found(tmp_path: Path) -> None:
+    """Three files that include nothing but call each other in a round, by declarations of their own."""
+    for name, other in [("a", "b"), ("b", "c"), ("c", "a")]:
+        (tmp_path / f"{name}.c").write_text(f"void {other}(void); void {name}(void) {{ {other}(); }}")
+    uses, missing = called(compiled("pc", sorted(tmp_path.glob("*.c")), tmp_path))
+    assert uses == {"a": {"b"}, "b": {"c"}, "c": {"a"}}
+    assert (circle(uses), missing) == (["a", "b", "c"], set())
+    assert circle(uses | {"c": set()}) == []
+    assert below(uses, "a") == {"b", "c"}
+
+
+@pytest.mark.parametrize("folder", ["src", "sim"])
+def test_no_module_includes_itself(folder: str) -> None:
+    assert circle(included(FIRMWARE / folder)) == []
+
+
+def test_no_module_of_the_core_calls_itself(tmp_path: Path) -> None:
+    uses, missing = called(compiled("pc", sorted((SOURCE / "core").glob("*.c")), tmp_path))
+    assert circle(uses) == []
+    assert {name for name in missing if not HAL.fullmatch(name)} <= C_LIBRARY, "the core calls the chip by hal.h alone"
+    includes = included(SOURCE)
+    for module, others in uses.items():
+        assert {f"core/{other}" for other in others} <= below(includes, f"core/{module}"), module
+
+
+@pytest.mark.parametrize("room", ["avr", "rp2040"])
+def test_no_module_of_a_chip_calls_itself(room: str, tmp_path: Path) -> None:
+    uses, _ = called(compiled(room, sorted((SOURCE / room).glob("*.c")), tmp_path))
+    assert circle(uses) == []
+
+
+def test_no_module_of_the_emulator_calls_itself() -> None:
+    build_simulator()
+    sources = sorted((FIRMWARE / "sim").glob("*.c"))
+    uses, _ = called(BUILD / "sim" / f"{file.stem}.o" for file in sources)
+    assert circle(uses) == []
+    includes = included(FIRMWARE / "sim")
+    for module, others in uses.items():
+        assert others <= below(includes, module), module
+
+
+def test_no_module_of_the_picos_emulator_imports_itself() -> None:
+    files = sorted((FIRMWARE / "sim" / "rp2040").glob("*.mjs"))
+    uses = {file.stem: set(IMPORT.findall(file.read_text())) for file in files}
+    assert uses["board"] == set(uses) - {"board"}, "every file is found, and board.mjs stands at the top"
+    assert circle(uses) == []
 
 
 def test_only_the_protocol_ends_sessions() -> None:
-    for file in sorted((FIRMWARE / "src" / "core").glob("*.[ch]")):
+    for file in sorted((SOURCE / "core").glob("*.[ch]")):
         if file.stem != "protocol":
             assert "session" not in re.sub(r"//.*", "", file.read_text()), file.name
 
 
 def test_the_core_knows_no_chip() -> None:
-    for file in sorted((FIRMWARE / "src" / "core").glob("*.[ch]")):
+    for file in sorted((SOURCE / "core").glob("*.[ch]")):
         text = file.read_text()
         assert "__AVR__" not in text, file.name
         assert "avr/" not in text, file.name

@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pins.h"
+#include "ports.h"
 
 void stepper_setup(void);
 

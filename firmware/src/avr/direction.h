@@ -1,6 +1,6 @@
 // The DIR pins, inline for the tick interrupt: a call there would cost it a dozen saved registers.
 #pragma once
-#include "pins.h"
+#include "ports.h"
 
 extern uint8_t direction_invert;  // axes whose positive counts put DIR high
 

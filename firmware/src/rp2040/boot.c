@@ -5,7 +5,6 @@
 // on speed does not matter: all of the program is copied into RAM and runs there, so that no tick waits for the flash.
 // image.py puts the checksum in.
 #ifdef __arm__
-#include "../core/protocol.h"
 #include "pico.h"
 
 __asm__(
@@ -34,6 +33,8 @@ __asm__(
     "    .ltorg\n"
     ".text\n");
 
+typedef void (*vector)(void);
+
 int main(void);
 void start(void);
 extern uint32_t ram_begin[], ram_end[], ram_image[], bss_begin[], bss_end[], stack_top[];
@@ -49,6 +50,14 @@ __attribute__((section(".flash"), noreturn)) static void fault(void) {
     }
 }
 
+#define VECTORS                                                                                                \
+    {                                                                                                          \
+        [0] = (vector)stack_top, [1] = start, [2] = fault, [3] = fault, [11] = fault, [14] = fault, [15] = fault, \
+        [16 + IRQ_TIMER0] = timer_interrupt, [16 + IRQ_USB] = usb_interrupt, [16 + IRQ_PIO0] = pio_interrupt, [16 + IRQ_UART0] = uart_interrupt   \
+    }
+__attribute__((section(".vectors"), used)) static const vector first_vectors[48] = VECTORS;
+__attribute__((aligned(256))) static const vector vectors[48] = VECTORS;  // in RAM
+
 __attribute__((section(".flash"), noreturn, optimize("no-tree-loop-distribute-patterns"))) void start(void) {
     const uint32_t *from = ram_image;
     for (uint32_t *to = ram_begin; to < ram_end; to++) {
@@ -57,16 +66,8 @@ __attribute__((section(".flash"), noreturn, optimize("no-tree-loop-distribute-pa
     for (uint32_t *to = bss_begin; to < bss_end; to++) {
         *to = 0;
     }
+    REG(VTOR) = (uint32_t)vectors;
     main();
     fault();
 }
-
-#define VECTORS                                                                                                \
-    {                                                                                                          \
-        [0] = (vector)stack_top, [1] = start, [2] = fault, [3] = fault, [11] = fault, [14] = fault, [15] = fault, \
-        [16 + IRQ_TIMER0] = timer_interrupt, [16 + IRQ_USB] = usb_interrupt, [16 + IRQ_PIO0] = pio_interrupt, [16 + IRQ_UART0] = uart_interrupt   \
-    }
-__attribute__((section(".vectors"), used)) static const vector first_vectors[48] = VECTORS;
-__attribute__((aligned(256))) const vector vectors[48] = VECTORS;  // in RAM
-
 #endif

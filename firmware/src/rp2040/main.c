@@ -7,15 +7,7 @@
 
 enum { SERVO_PERIOD_MS = 20, MS = 1000 };
 
-volatile bool awake;
-
 static uint32_t last;  // microsecond of the last millisecond
-
-void timer_interrupt(void) {
-    REG(TIMER_INTR) = 1;
-    REG(TIMER_ALARM0) = REG(TIMER_RAWL) + MS;
-    awake = true;
-}
 
 static void milliseconds(void) {
     while (REG(TIMER_RAWL) - last >= MS) {
@@ -29,19 +21,7 @@ static void milliseconds(void) {
     }
 }
 
-// Interrupts are off between the look and the sleep: one that comes then ends the sleep at once.
-static void sleep(void) {
-    while (!awake) {
-        __asm__ volatile("cpsid i" ::: "memory");
-        if (!awake) {
-            __asm__ volatile("wfi" ::: "memory");
-        }
-        __asm__ volatile("cpsie i\n\tisb" ::: "memory");
-    }
-}
-
 __attribute__((noinline)) int main(void) {  // not into start(), which stays in the flash
-    REG(VTOR) = (uint32_t)vectors;
     const uint8_t cause = reset_cause();
     clocks_setup();
     pins_setup();
@@ -50,9 +30,7 @@ __attribute__((noinline)) int main(void) {  // not into start(), which stays in 
     serial_setup();
     protocol_start(cause);
     last = REG(TIMER_RAWL);
-    REG(TIMER_INTE) = 1;
-    REG(TIMER_ALARM0) = last + MS;
-    irq_enable(IRQ_TIMER0, 3);
+    sleep_setup(last);
     watchdog_start();  // for hangs only
     for (;;) {
         const uint8_t *bytes;
@@ -65,7 +43,7 @@ __attribute__((noinline)) int main(void) {  // not into start(), which stays in 
         milliseconds();
         protocol_poll();
         serial_pump();
-        sleep();
+        sleep_until_awake();
     }
 }
 #endif

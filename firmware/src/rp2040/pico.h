@@ -3,10 +3,9 @@
 #include "../board.h"
 #include "rp2040.h"
 
-typedef void (*vector)(void);
-extern const vector vectors[];
-
 extern volatile bool awake;  // an interrupt has left something for the main loop
+void sleep_setup(uint32_t now);
+void sleep_until_awake(void);  // at most a millisecond
 
 void stepper_setup(void);
 
