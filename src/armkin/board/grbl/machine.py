@@ -19,6 +19,7 @@ from armkin.board.grbl import gcode, lines, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
+from armkin.board.grbl.watch import Watch
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
 from armkin.motion.plan import plan as plan_joints
@@ -26,6 +27,8 @@ from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
+    from armkin.board.grbl.lines import Report
+    from armkin.board.grbl.settings import Axis
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
@@ -40,7 +43,7 @@ class GrblMachine:
     """An arm on the GRBL board behind an open port."""
 
     differences = (
-        "GRBL has no checksum: a damaged line may move the arm wrongly until the position is read back",
+        "GRBL has no checksum: a damaged line may move the arm wrongly until a report, some 0.2 s later, tells",
         "GRBL forgets its position at a reset, and an Arduino resets when its port is opened",
         "when the computer falls silent GRBL finishes what it holds, up to 16 lines",
     )
@@ -51,7 +54,7 @@ class GrblMachine:
         self.session = Session(port)
         self.session.open()
         self._offset: np.ndarray[Any, np.dtype[np.int64]] | None = None  # machine steps less counts
-        self.settings = self._read_settings()
+        self.settings = self.session.settings()
         self._spindle = Spindle(self.session)
         self._read()
 
@@ -64,7 +67,7 @@ class GrblMachine:
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         offset = np.zeros(len(self.axes), dtype=np.int64) if self._offset is None else self._offset
-        return tuple(int(steps) for steps in self._steps() - offset)
+        return tuple(int(steps) for steps in _steps(self.session.report, self.axes) - offset)
 
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
@@ -105,7 +108,7 @@ class GrblMachine:
         before = self.wrong()
         for difference in before:
             self.session.ask(f"${difference.number}={difference.wanted:.3f}")
-        self.settings = self._read_settings()
+        self.settings = self.session.settings()
         if before:
             self._forget()
         left = self.wrong()
@@ -115,13 +118,13 @@ class GrblMachine:
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
-        serious = [difference for difference in self.wrong() if difference.serious]
+        serious = self._read_again()  # the board may have been reset, or set by somebody else
         if serious:
             more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
             raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
-        status = self.session.status()
-        if status.state not in ("Idle", "Jog"):
-            raise LinkError(f"GRBL is in state {status.state}, not Idle: home it, or unlock it once you know why")
+        if (state := self.session.status().state) not in ("Idle", "Jog"):
+            raise LinkError(f"GRBL is in state {state}, not Idle: home it, or unlock it once you know why")
+        self.session.was_reset = False  # what a reset has taken from it is read now
         self._read()
         if assume is not None and self._offset is not None:
             joints = joints_out(self.arm, self.joints()).tolist()
@@ -140,7 +143,7 @@ class GrblMachine:
 
     def vouch(self, counts: Any) -> None:
         """Take somebody's word that the motors stand at these counts."""
-        self._offset = self._steps() - np.asarray(counts, dtype=np.int64)
+        self._offset = _steps(self.session.report, self.axes) - np.asarray(counts, dtype=np.int64)
         words = "".join(
             f"{axis.letter}{count / axis.steps - MARK:.5f}" for axis, count in zip(self.axes, counts, strict=True)
         )
@@ -150,8 +153,8 @@ class GrblMachine:
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        made = joints_of(self.arm, np.asarray(start, dtype=np.int64))
-        return gcode.job(plan_joints(self.arm, made, targets, speed=speed), np.asarray(start, dtype=np.int64))
+        counts = np.asarray(start, dtype=np.int64)
+        return gcode.job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
@@ -170,9 +173,11 @@ class GrblMachine:
             assert self._offset is not None
             total += job.duration
             began = self.port.now()
+            watch = Watch(job, self.axes, self._offset)
 
-            def tick(done: float = done, total: float = total, began: float = began) -> bool:
+            def tick(done: float = done, total: float = total, began: float = began, watch: Watch = watch) -> bool:
                 progress(min(done + self.port.now() - began, total), total)
+                watch.heed(self.session.fresh(), self.port.now() - began)
                 return self._stop()
 
             try:
@@ -253,8 +258,13 @@ class GrblMachine:
 
     # What GRBL says
 
-    def _read_settings(self) -> dict[int, float]:
-        return dict(pair for line in self.session.ask("$$") if (pair := lines.setting(line)) is not None)
+    def _read_again(self) -> list[settings.Difference]:
+        """Serious differences of the settings as they are now; $$ has no checksum: two readings must find them."""
+        for _ in range(2):
+            self.settings = self.session.settings()
+            if not (found := [difference for difference in self.wrong() if difference.serious]):
+                break
+        return found
 
     def _read(self) -> None:
         """Read position and offset: what stands in G92 since the last reset tells where the arm stands."""
@@ -271,20 +281,19 @@ class GrblMachine:
         shift = [(g92[axis.index] + (g54[axis.index] if g54 else 0.0) - MARK) * axis.steps for axis in self.axes]
         self._offset = np.rint(shift).astype(np.int64)
 
-    def _steps(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """GRBL's machine position in steps, as last reported."""
-        report = self.session.report
-        assert report is not None
-        assert report.position is not None
-        place = [report.position[axis.index] * axis.steps for axis in self.axes]
-        return np.rint(place).astype(np.int64)
-
     def _forget(self) -> None:
         self._offset = None
         try:
             self._reset()
         except LinkError:
             return  # in an alarm, or gone: forgotten all the same
+
+
+def _steps(report: Report | None, axes: Sequence[Axis]) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """GRBL's machine position in steps, as it was reported."""
+    assert report is not None
+    assert report.position is not None
+    return np.rint([report.position[axis.index] * axis.steps for axis in axes]).astype(np.int64)
 
 
 def _listed(arm: Arm, joints: list[float]) -> str:

@@ -48,6 +48,7 @@ class Session:
         self.version = ""
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
+        self._unseen: Report | None = None
         self.buffer = lines.RX_BUFFER
         self._text, self._heard = "", 0
         self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
@@ -98,6 +99,11 @@ class Session:
                 return self.report
         raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
 
+    def fresh(self) -> Report | None:
+        """A status report that has come since this was asked last."""
+        found, self._unseen = self._unseen, None
+        return found
+
     def sure_status(self) -> Report:
         """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
         return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
@@ -110,6 +116,10 @@ class Session:
             return found if found.keys() >= {"G54", "G92"} else {}
 
         return _agreed(read, self.port.name)
+
+    def settings(self) -> dict[int, float]:
+        """The answer to ``$$``: number -> value."""
+        return dict(pair for line in self.ask("$$") if (pair := lines.setting(line)) is not None)
 
     def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
         """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
@@ -200,7 +210,7 @@ class Session:
             self.was_reset = True
             self._sent.clear()
         elif (found := lines.report(line)) is not None:
-            self.report = found
+            self.report = self._unseen = found
             self._heard += found.state not in ("Idle", "Check", "Sleep")  # else it only repeats itself
         elif line:
             self._other.append(line)

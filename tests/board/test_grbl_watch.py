@@ -1,0 +1,125 @@
+"""Lines that reach GRBL damaged: it obeys them, and is held as soon as its reports tell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.board import following
+from armkin.board.backend.job import Job
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.machine import GrblMachine
+from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.watch import Watch
+from armkin.board.sim.grbl import Grbl
+from armkin.errors import LinkError
+
+ARM = armkin.load("three_dof")
+FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
+Spoil = Callable[[str], str]
+
+
+class Spoilt(Grbl):
+    """Lines of motion are changed on their way, from the time when `spoil` is set."""
+
+    spoil: Spoil | None = None
+
+    def write(self, data: bytes) -> None:
+        """Send bytes: lines come whole, one a call."""
+        text = data.decode("latin1")
+        super().write((self.spoil(text) if self.spoil and text.startswith("G53") else text).encode("latin1"))
+
+
+def opened(spoil: Spoil | None = None) -> tuple[Spoilt, GrblMachine]:
+    port = Spoilt(axes=4, settings=FITS)
+    port.simulated = False
+    one = GrblMachine(port, ARM)
+    one.prepare(assume=ARM.home)
+    port.spoil = spoil
+    return port, one
+
+
+def feed(value: float) -> Spoil:
+    return lambda line: re.sub(r"F[\d.]+", f"F{value}", line)
+
+
+def target(old: str, new: str) -> Spoil:
+    return lambda line: line.replace(old, new)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message", "seconds"),
+    [
+        (feed(9000), "it is faster than planned", 1.5),
+        (feed(0.02), "it hardly moves on", 4.5),
+        (target("X-5", "X-1"), "it has left its path", 1.5),
+        (target("Y", "A"), "it has left its path", 1.5),
+    ],
+)
+def test_a_damaged_line_is_held_in_motion(spoil: Spoil, message: str, seconds: float) -> None:
+    port, one = opened(spoil)
+    plan = one.plan(one.counts(), np.deg2rad([-60, 60, -60]), speed=0.2)
+    began = port.now()
+    with pytest.raises(LinkError, match=f"{message}; a line was damaged on its way; the arm was stopped"):
+        one.run([plan])
+    assert port.now() - began < seconds
+    assert one.position() == "known"
+    assert list(one.counts()) == port.steps[:3]
+    port.spoil = None
+    one.prepare()
+    one.run([one.plan(one.counts(), ARM.home[None])])
+    assert port.steps[:3] == [0, 0, 0]
+
+
+def test_a_feed_lost_of_a_slow_move_is_caught_before_it_comes_far() -> None:
+    """At 5 % of the speed a lost decimal point asks for 1,000 times as much; GRBL's own limits allow 20 times."""
+    port, one = opened(lambda line: line[: line.index("F")] + line[line.index("F") :].replace(".", ""))
+    plan = one.plan(one.counts(), np.deg2rad([-60, 60, -60]), speed=0.05)
+    with pytest.raises(LinkError, match="faster than planned"):
+        one.run([plan])
+    share = np.abs(port.steps[:3]).max() / np.abs(plan.end).max()
+    assert share < 0.6
+
+
+def test_what_is_as_planned_is_left_alone() -> None:
+    """A curve, a pause, a slow board: all of them arrive."""
+    for accel in (1.0, 0.2):
+        port, one = opened()
+        port.settings.update({120 + k: FITS[120 + k] * accel for k in range(3)})
+        one.prepare()
+        moves = [{"joint": [0, 80, -80]}, {"wait": 5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
+        plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
+        for part in following.parts(plan, one.counts(), one.lay):
+            assert isinstance(part, Job)
+            one.run([part])
+        assert port.steps[:3] == [0, 0, 0]
+
+
+def test_one_damaged_report_is_not_believed() -> None:
+    _, one = opened()
+    job = one.plan(one.counts(), np.deg2rad([-60, 60, -60]))
+    watch = Watch(job, one.axes, np.zeros(3, dtype=np.int64))
+    one.refresh()
+    report = one.session.report
+    assert report is not None
+    away = report.__class__("Run", 0, (99.0, 0.0, 0.0, 0.0), None, "")
+    assert watch.see(away, 0.1) is None
+    assert watch.see(away, 0.2) == "it has left its path"
+
+
+def test_settings_are_read_again_before_a_motion() -> None:
+    """A long session (a page) outlives resets, and whoever else turns a board's screws."""
+    port, one = opened()
+    port.settings[100] = 250.0
+    with pytest.raises(LinkError, match=r"settings do not fit three_dof: \$100"):
+        one.prepare()
+    port.settings[100] = FITS[100]
+    port.boot()
+    port.advance(0.1)
+    assert one.prepare(assume=ARM.home)
+    one.run([one.plan(one.counts(), np.deg2rad([-3, 85, -85]))])
+    assert list(one.counts()) == port.steps[:3]
