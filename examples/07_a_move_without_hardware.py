@@ -5,8 +5,8 @@ import numpy as np
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import plan
-from armkin.board.moving import where
 from armkin.board.opening import open_machine
+from armkin.board.planner import where
 
 arm = armkin.load("three_dof")
 with open_machine(arm, configure(arm), "sim") as machine:

@@ -14,7 +14,7 @@ import pytest
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.moving import Planner
+from armkin.board.planner import Planner
 from command_line import ROOT, run
 
 LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]

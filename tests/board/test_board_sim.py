@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from armkin.board.firmware import protocol
-from armkin.board.firmware.lines import line
 from armkin.board.firmware.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
+from armkin.board.firmware.straight_lines import line
 from armkin.board.sim.board import SimBoard
 from armkin.hardware import BOARDS
 

@@ -10,8 +10,8 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import cut
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.segments import cycles_of
-from armkin.board.following import follow, parts
 from armkin.board.opening import open_port
+from armkin.board.path_run import follow, parts
 
 
 def some_path(seed: int) -> dict[str, object]:

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from armkin.board.firmware import lines, segments
+from armkin.board.firmware import segments, straight_lines
 from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.protocol import AxisImage, Image, Segment
 from armkin.board.sim.velocity import Velocity, times_valid
@@ -75,7 +75,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
     rate = data.draw(st.floats(500, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
     accel = min(400_000, rate / data.draw(RAMPS))
-    move = lines.line(start, end, rate / max(n, 1), accel / max(n, 1))
+    move = straight_lines.line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
     for s in move.segments:
@@ -130,7 +130,7 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
     A place that is e off at an end of a stretch of h seconds makes e / h of its mean speed: much behind a long cruise,
     where a ramp's first piece of 1.5 ms makes up for it.
     """
-    cut = list(lines.line([0], [n], rate / n, accel / n).segments)
+    cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
     h = np.array([segments.cycles_of(s) / CLOCK for s in cut])
     mean = np.array([s.ticks * s.rates[0] / 2**23 for s in cut]) / h
     e = np.zeros(len(cut) + 1)
@@ -149,7 +149,7 @@ def test_a_short_ramp_pays_for_no_long_cruise(n: int, rate: float, ramp: float) 
     The cutter lets a segment's ends have 102 % of the rate; its intervals lie between those of its ends, but for the
     whole cycles of each tick and of their sum so far: two of at least MIN_INTERVAL.
     """
-    move = lines.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
+    move = straight_lines.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
     gaps = np.diff(np.array(tick_times(move.segments)), prepend=0)
     per_tick = np.repeat([abs(s.rates[0]) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
     assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02 * MIN_INTERVAL / (MIN_INTERVAL - 2)
@@ -176,7 +176,7 @@ def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float
     rates, accels = ([math.ceil(most * abs(x) / n) for x in end] for most in (rate * 1.05, accel))
     axes = [AxisImage(True, False, -n, n, 0, max(1, v), max(1, a)) for v, a in zip(rates, accels, strict=True)]
     velocity = Velocity(replace(BOARDS["uno_cnc_shield"], min_interval=MIN_INTERVAL), Image(tuple(axes)))
-    for s in lines.line([0, 0, 0], end, rate / n, accel / n).segments:
+    for s in straight_lines.line([0, 0, 0], end, rate / n, accel / n).segments:
         velocity.begin(s)
         for axis, made_of in enumerate(s.rates):
             velocity.check(axis, made_of)
@@ -189,7 +189,8 @@ def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float
 @example(30_000, 50.0, 200.0)
 def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
-    cut = list(lines.line([0], [n], rate / n, accel / n).segments)  # once: a long line makes them anew each time
+    # once: a long line makes them anew each time
+    cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
     length = [segments.cycles_of(s) / CLOCK for s in cut]
     for i, s in enumerate(cut[:-30]):
         u = abs(s.rates[0]) / 2**23 * CLOCK / min(s.interval, s.last_interval) / accel
@@ -280,10 +281,10 @@ def test_a_piece_at_rest_has_one_speed() -> None:
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     law = profile.trapezoid(1.0, 0.06, 2.0)
-    whole = lines.LineSegments(np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, False)
+    whole = straight_lines.LineSegments(np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, False)
     once = list(whole)
-    assert len(once) == len(whole) == lines.count(law, 90_001) > 40
-    monkeypatch.setattr(lines, "_AT_ONCE", 3)
+    assert len(once) == len(whole) == straight_lines.count(law, 90_001) > 40
+    monkeypatch.setattr(straight_lines, "_AT_ONCE", 3)
     assert list(whole) == once
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board import following
+from armkin.board import path_run
 from armkin.board.backend import StoppedError
 from armkin.board.backend.job import Job
 from armkin.board.grbl.axes import axes_of
@@ -268,7 +268,7 @@ def test_a_pause_of_a_path_is_a_dwell() -> None:
         ARM, {"start": "home", "moves": [{"joint": [0, 80, -80]}, {"wait": 1.5}, {"joint": [0, 90, -90]}]}
     )
     before = port.now()
-    for part in following.parts(plan, one.counts(), one.lay):
+    for part in path_run.parts(plan, one.counts(), one.lay):
         assert isinstance(part, Job)
         one.run([part])
     assert port.now() - before > 1.5

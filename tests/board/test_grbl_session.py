@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from armkin.board.grbl import lines, settings
+from armkin.board.grbl import replies, settings
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.settings import Axis
 from armkin.board.sim.grbl import Grbl
@@ -42,7 +42,7 @@ def test_a_hold_stands_on_the_line_and_a_reset_there_keeps_the_position() -> Non
     session = opened(board)
     asked = iter(range(1000))
     assert not session.stream(["G53G1X40Y20F6000", "G4P0"], lambda: next(asked) > 20)
-    session.realtime(lines.HOLD)
+    session.realtime(replies.HOLD)
     while session.status().detail or session.status().state != "Hold":
         board.advance(0.01)
     x, y = board.steps
@@ -61,7 +61,7 @@ def test_a_reset_in_motion_is_an_alarm() -> None:
     session.realtime(b"G4P1\n")
     with pytest.raises(GrblError, match="reset in motion") as caught:
         session.reset()
-    assert caught.value.alarm in lines.LOSES_POSITION
+    assert caught.value.alarm in replies.LOSES_POSITION
     with pytest.raises(GrblError, match="locked by an alarm"):
         session.ask("G53G1X0F100")
 
@@ -92,12 +92,12 @@ def test_a_cable_that_is_pulled_is_told() -> None:
 def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     board = Grbl(axes=4)
     session = opened(board)
-    found = dict(pair for line in session.ask("$$") if (pair := lines.setting(line)))
+    found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
     odd = {difference.number: difference.serious for difference in settings.differences(AXES, found)}
     assert odd == {1: False, 3: True, 100: True, 102: True, 110: False, 112: False, 120: False, 122: False}
     for number, (_, value) in settings.wanted(AXES).items():
         session.ask(f"${number}={value:g}")
-    found = dict(pair for line in session.ask("$$") if (pair := lines.setting(line)))
+    found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
     assert settings.differences(AXES, found) == []
     assert found[101] == 250  # another axis is left alone
     too_fast = settings.differences(AXES, found | {110: 9000.0})
@@ -107,7 +107,7 @@ def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
 
 @pytest.mark.parametrize("text", ["<Idle|MPos:1,x,3>", "<>", "Idle", "<Run|MPos:", "<Hold:x|MPos:0>", "<Idle|Bf:3>"])
 def test_damaged_reports_are_no_reports(text: str) -> None:
-    found = lines.report(text)
+    found = replies.report(text)
     assert found is None or found.position is None
 
 

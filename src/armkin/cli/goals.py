@@ -12,7 +12,7 @@ from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.moving import Stream
+    from armkin.board.planner import Stream
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -54,7 +54,7 @@ def goals(
         close = None if near is None else inputs.joint_list(arm, near, "--near")
         return arm, Goals(None, [1], goal, what.name, branch, holding.locks(arm, lock), close)
     if batch == "-":
-        from armkin.board.moving import Stream
+        from armkin.board.planner import Stream
 
         return arm, Stream(arm, streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm)))
     if batch is not None:

@@ -83,7 +83,7 @@ def port_name(given: str | None, configuration: Configuration | None, baud: int,
     """The port given (or ARMKIN_PORT), else the only one where a board answers as the robot file's kind."""
     if given is not None:
         return given
-    from armkin.board.firmware.finding import answering
+    from armkin.board.firmware.find_boards import answering
     from armkin.board.stopping import stoppable
 
     kind = (
@@ -183,7 +183,7 @@ def foreign_port(given: str | None, board: Foreign, baud: int | None, *, reset: 
     """
     if given is not None:
         return given
-    from armkin.board.firmware.finding import others
+    from armkin.board.firmware.find_boards import others
     from armkin.board.stopping import stoppable
 
     with stoppable() as stop:

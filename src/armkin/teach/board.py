@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armkin.board import following
+from armkin.board import path_run
 from armkin.board.feetech.machine import ServoMachine
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.machine import Machine
@@ -198,9 +198,9 @@ class Board:
         """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
-        following.check_gripper(plan, self.pilot.board)
-        laid = following.parts(plan, machine.counts(), machine.lay)
-        following.follow(machine, plan, laid, self._progress)
+        path_run.check_gripper(plan, self.pilot.board)
+        laid = path_run.parts(plan, machine.counts(), machine.lay)
+        path_run.follow(machine, plan, laid, self._progress)
 
     def _home(self, machine: Backend) -> None:
         if isinstance(self.pilot.board, Foreign):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware import needs
+from armkin.board.firmware import missing_keys
 from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
 from armkin.errors import UsageError
 from armkin.hardware import BOARDS, DRIVERS, Board, Driver
@@ -74,7 +74,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
-    if lacks := needs.lacks(arm, board=not rehearsal):
+    if lacks := missing_keys.lacks(arm, board=not rehearsal):
         said = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]
         raise UsageError(
@@ -82,7 +82,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
             robot_file=arm.path,
             lines_to_add=lines,
         )
-    made_up = rehearsal and bool(needs.without_board(arm))
+    made_up = rehearsal and bool(missing_keys.without_board(arm))
     motors = arm.motors
     if made_up:
         board = _rehearsal_board(arm)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.lines import along, count
 from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move
+from armkin.board.firmware.straight_lines import along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.plan import check_limits, check_rates

@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import cutting, protocol, streaming
-from armkin.board.firmware.batch import WHY
+from armkin.board.firmware.motion_frame import WHY
 from armkin.board.firmware.protocol import Error, Flag, Status
 from armkin.board.firmware.reporting import told
 from armkin.board.firmware.session import DeviceError, Session

@@ -12,16 +12,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+from armkin.board.firmware.configuration_image import AxisImage as AxisImage
+from armkin.board.firmware.configuration_image import GuardImage as GuardImage
+from armkin.board.firmware.configuration_image import Image as Image
+from armkin.board.firmware.configuration_image import RowImage as RowImage
 from armkin.board.firmware.framing import MAX_FRAME as MAX_FRAME
 from armkin.board.firmware.framing import Splitter as Splitter
 from armkin.board.firmware.framing import cobs_decode as cobs_decode
 from armkin.board.firmware.framing import cobs_encode as cobs_encode
 from armkin.board.firmware.framing import unwire as unwire
 from armkin.board.firmware.framing import wire as wire
-from armkin.board.firmware.image import AxisImage as AxisImage
-from armkin.board.firmware.image import GuardImage as GuardImage
-from armkin.board.firmware.image import Image as Image
-from armkin.board.firmware.image import RowImage as RowImage
 from armkin.board.firmware.segment import BLOCK as BLOCK
 from armkin.board.firmware.segment import COARSE as COARSE
 from armkin.board.firmware.segment import FINE as FINE

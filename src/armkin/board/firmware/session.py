@@ -6,11 +6,11 @@ import secrets
 from collections.abc import Callable, Iterator
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware import heed, protocol
-from armkin.board.firmware.heed import DeviceError as DeviceError
-from armkin.board.firmware.heed import ReplacedError as ReplacedError
-from armkin.board.firmware.line import Line
+from armkin.board.firmware import protocol, reply_checks
 from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
+from armkin.board.firmware.reply_checks import DeviceError as DeviceError
+from armkin.board.firmware.reply_checks import ReplacedError as ReplacedError
+from armkin.board.firmware.serial_line import Line
 from armkin.board.firmware.window import Window
 from armkin.board.ports import Port
 from armkin.errors import LinkError
@@ -88,7 +88,7 @@ class Session:
             for payload in self.line.splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
                 version = protocol.info_version(payload)
                 if version is not None and version != protocol.VERSION:
-                    raise heed.other_version(self.port.name, version)
+                    raise reply_checks.other_version(self.port.name, version)
                 info = protocol.parse(payload)
                 if isinstance(info, Info) and info.nonce == nonce:
                     self._begin(info)
@@ -96,7 +96,7 @@ class Session:
         return None
 
     def _begin(self, info: Info) -> None:
-        heed.check_info(info, self.port.name)
+        reply_checks.check_info(info, self.port.name)
         self.info = info
         self._digest = info.nonce & 0xFFFF
         self._window.begin(info)
@@ -182,7 +182,7 @@ class Session:
                 self._same(reply.nonce & 0xFFFF)
                 continue  # of a HELLO that was repeated
             assert self.info is not None
-            heed.check_reply(reply, self.info, self.port.name)
+            reply_checks.check_reply(reply, self.info, self.port.name)
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 self._same(reply.session)
                 self._window.check(reply)

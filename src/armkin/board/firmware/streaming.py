@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware import protocol
-from armkin.board.firmware.batch import Batch
+from armkin.board.firmware.motion_frame import Batch
 from armkin.board.firmware.protocol import Segment, State, Status
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from armkin.board.firmware import heed, protocol
-from armkin.board.firmware.line import Line
+from armkin.board.firmware import protocol, reply_checks
 from armkin.board.firmware.protocol import Ack, Error, Info, Status
+from armkin.board.firmware.serial_line import Line
 
 _RESEND = 0.03  # [s] without progress
 _GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
@@ -131,7 +131,7 @@ class Window:
 
     def check(self, reply: Ack | Status) -> None:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
-        heed.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
+        reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
     def acknowledge(self, reply: Ack | Status) -> bool:
         """Take a reply's `next` and `free`; True if that acknowledges something."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.grbl.lines import LETTERS
+from armkin.board.grbl.replies import LETTERS
 from armkin.board.grbl.settings import COARSE, Axis
 from armkin.errors import UsageError
 from armkin.motors import motor_accel, motor_names

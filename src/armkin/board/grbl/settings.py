@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from armkin.board.grbl.lines import LETTERS
+from armkin.board.grbl.replies import LETTERS
 
 HOMING = (22, 23)  # settings that only homing needs
 COARSE = 500.0  # [steps a unit] beyond which GRBL's three decimals do not tell every step

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from armkin.board.grbl import lines
+from armkin.board.grbl import replies
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Spindle:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        answer = (lines.spindle(line) for line in session.ask("$G"))
+        answer = (replies.spindle(line) for line in session.ask("$G"))
         self.value = next((s for s in answer if s is not None), None)  # the S word in force; None: off, or not known
 
     def grip(self, gripper: Gripper, value: float, settings: Mapping[int, float]) -> float:

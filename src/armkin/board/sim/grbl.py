@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from armkin.board.grbl.lines import LETTERS, RX_BUFFER
+from armkin.board.grbl.replies import LETTERS, RX_BUFFER
 
 STEP = 0.004  # [s] of simulated time
 BLOCKS = 15  # planner blocks

@@ -61,7 +61,7 @@ def _ours(
 ) -> dict[str, Any]:
     """Home the arm on a board with armkin's firmware."""
     from armkin.board.firmware import homing
-    from armkin.board.moving import where
+    from armkin.board.planner import where
 
     configuration = linking.configured(arm, rehearsal=port == linking.SIM)
     homing.searches(arm, configuration, joints, rest_at_home=rest_at_home)  # refuses before a port is opened
@@ -107,7 +107,7 @@ def _of_others(
     reset: bool,
 ) -> dict[str, Any]:
     """Home the arm on a board that homes by itself, all joints at once."""
-    from armkin.board.moving import where
+    from armkin.board.planner import where
 
     kind = other.board.kind
     if joints:

@@ -33,7 +33,7 @@ def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = Non
 
 
 def _answer(arm: Arm, task: str | None) -> Info:
-    from armkin.board.firmware.needs import lines_to_add, needs
+    from armkin.board.firmware.missing_keys import lines_to_add, needs
 
     file = arm.file
     assert file is not None  # it was read from one

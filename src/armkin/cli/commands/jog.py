@@ -32,7 +32,7 @@ def jog(
     itself when this command falls silent, and before the joint limits if the position is known.
     """
     from armkin.board.firmware import jogging
-    from armkin.board.moving import where
+    from armkin.board.planner import where
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)

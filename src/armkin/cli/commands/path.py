@@ -174,8 +174,8 @@ def _carried_out(
     resume: bool = False,
 ) -> None:
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
-    from armkin.board import following, resuming
-    from armkin.board.moving import where
+    from armkin.board import path_run, resuming
+    from armkin.board.planner import where
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
@@ -186,11 +186,11 @@ def _carried_out(
         began = machine.counts() if held is None else held.start
         with planning():
             plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
-            following.check_gripper(plan, board)
-            laid = following.parts(plan, began, machine.lay)
+            path_run.check_gripper(plan, board)
+            laid = path_run.parts(plan, began, machine.lay)
             _files(plan, out, plot)
         with resuming.under_way(machine, laid, held) as (left, first, note), linking.told(left, note) as tell:
-            following.follow(machine, plan, left, tell, first)
+            path_run.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
     _print(plan, found, json=json)
     if not json:
@@ -249,7 +249,7 @@ def _rehearsed(plan: PathPlan) -> list[Planned] | None:
     """The plan on the robot file's board, or on one that is made up; None without drives."""
     from functools import partial
 
-    from armkin.board import following
+    from armkin.board import path_run
     from armkin.board.firmware.cutting import cut
     from armkin.motors import pulses
 
@@ -258,7 +258,7 @@ def _rehearsed(plan: PathPlan) -> list[Planned] | None:
     except UsageError:
         return None
     start = pulses(plan.arm, plan.motion.start).tolist()
-    return following.parts(plan, start, partial(cut, clock=board.clock, min_interval=board.min_interval))
+    return path_run.parts(plan, start, partial(cut, clock=board.clock, min_interval=board.min_interval))
 
 
 def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:

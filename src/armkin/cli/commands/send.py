@@ -18,7 +18,7 @@ from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
-    from armkin.board.moving import Planner, Stream
+    from armkin.board.planner import Planner, Stream
     from armkin.board.resuming import Note
     from armkin.cli.goals import Goals
     from armkin.model.arm import Arm
@@ -88,7 +88,7 @@ def send(
     its path; its position stays known.
     """
     from armkin.board.firmware.machine import Machine
-    from armkin.board.moving import Planner, Stream, Total, where
+    from armkin.board.planner import Planner, Stream, Total, where
     from armkin.board.stopping import planning
 
     fraction = inputs.percent(speed, "--speed")
@@ -198,7 +198,7 @@ def _blend(text: str | None, batch: str | None) -> float:
 def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
     """All plans at once, from counts; a stream is read to its end."""
     import armkin
-    from armkin.board.moving import Stream
+    from armkin.board.planner import Stream
 
     if isinstance(goals, Stream):
         return goals.whole(planner, start)

@@ -17,7 +17,7 @@ def status(
     Moves nothing and changes nothing. (Opening its port resets an Uno the first time: an arm that stood
     still keeps its position.)
     """
-    from armkin.board.moving import where
+    from armkin.board.planner import where
 
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"

@@ -56,7 +56,7 @@ def stop(
 
 def _port(given: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
-    from armkin.board.firmware.finding import likely
+    from armkin.board.firmware.find_boards import likely
     from armkin.board.ports import holder
 
     if given is None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.board.firmware.cutting import cut, plan
 from armkin.board.foreign import Foreign
-from armkin.board.told import Summary, Where
+from armkin.board.report import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
