@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from armkin.model.build import load as load
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
-    from armkin.motion.law import time_law as time_law
     from armkin.motion.path import path as path
     from armkin.motion.path_plan import PathPlan as PathPlan
+    from armkin.motion.time_law import time_law as time_law
     from armkin.motors import best_pulses as best_pulses
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
@@ -81,7 +81,7 @@ _HOME = {
     "lock": "model.lock",
     "unlock": "model.lock",
     "path": "motion.path",
-    "time_law": "motion.law",
+    "time_law": "motion.time_law",
     "PathPlan": "motion.path_plan",
     "best_pulses": "motors",
     "joints": "motors",

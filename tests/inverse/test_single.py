@@ -12,7 +12,7 @@ from oracle import goal
 from test_every_branch import NAMES, shipped
 
 import armkin
-from armkin.inverse import single
+from armkin.inverse import one_target
 from armkin.inverse.branches.turns import nearest_copy, nearest_number
 from armkin.inverse.recognise import solver
 from armkin.model.arm import Arm
@@ -23,7 +23,7 @@ FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
     """One target by the short way, and a check that it is as in a batch."""
-    alone = single.solve(arm, target, None, near)
+    alone = one_target.solve(arm, target, None, near)
     batch = armkin.ik(arm, target[None], near=None if near is None else near[None])
     if alone is None:
         return None
@@ -77,12 +77,12 @@ def test_what_is_not_plain_is_left_to_the_batch() -> None:
     arm = shipped("puma560")[0]
     T = armkin.fk(arm, np.full(6, 0.3))
     rounded = T.round(8)
-    assert single.solve(arm, T, None, None) is not None
-    assert single.solve(arm, rounded, None, None) is None  # made a rotation first
-    assert single.solve(arm, T * np.nan, None, None) is None
-    assert single.solve(arm, np.array([T, T]), None, None) is None
-    assert single.solve(arm, T, None, [0.0] * 5) is None
-    assert single.solve(arm, armkin.fk(arm, np.zeros(6)), None, None) is None  # the wrist is singular
+    assert one_target.solve(arm, T, None, None) is not None
+    assert one_target.solve(arm, rounded, None, None) is None  # made a rotation first
+    assert one_target.solve(arm, T * np.nan, None, None) is None
+    assert one_target.solve(arm, np.array([T, T]), None, None) is None
+    assert one_target.solve(arm, T, None, [0.0] * 5) is None
+    assert one_target.solve(arm, armkin.fk(arm, np.zeros(6)), None, None) is None  # the wrist is singular
 
 
 ANGLE = st.floats(-np.pi, np.pi)

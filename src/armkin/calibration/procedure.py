@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.calibration import sight
+from armkin.calibration import observability
 from armkin.calibration.chain import KINDS, model
-from armkin.calibration.doubts import check
 from armkin.calibration.fit import Measured
-from armkin.calibration.levels import LEVELS, MANY, Choice, choose, free_at
+from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
+from armkin.calibration.suspect_rows import check
 from armkin.errors import UsageError
 from armkin.export import tables
 from armkin.formula import arrays
@@ -94,7 +94,7 @@ def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str]
     _must_explain(data, choice)
     found = choice.fit
     new, tool = corrections.corrected(found.p)
-    doubts = sight.doubts(corrections, found) if len(found.free) else np.zeros(0)
+    doubts = observability.doubts(corrections, found) if len(found.free) else np.zeros(0)
     listed = [
         (corrections.parameters[k].name, float(found.p[k]), float(doubt), corrections.parameters[k].unit)
         for k, doubt in zip(found.free, doubts, strict=True)
@@ -108,7 +108,7 @@ def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str]
         flagged=np.flatnonzero(found.weights < FLAGGED),
         noise=found.scale[0],
         corrections=listed,
-        unseen=sight.unseen(corrections, found),
+        unseen=observability.unseen(corrections, found),
         held=held,
     )
 
@@ -122,7 +122,7 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
     hold, _ = holding(arm, _kinds(fix))
     before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
     none = Measured(np.zeros((0, arm.n)), np.zeros((0, 3)))
-    return sight.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
+    return observability.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
 
 
 def holding(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:

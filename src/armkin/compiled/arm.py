@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from armkin import forward
 from armkin.compiled import source, toolchain
+from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
-from armkin.compiled.single import Single
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array

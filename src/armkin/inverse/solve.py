@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse import single
+from armkin.inverse import one_target
 from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -55,7 +55,7 @@ def ik(
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
     values = arrays.real(targets, "targets")
-    if examine and values.ndim <= 2 and (alone := single.solve(arm, values, task, near)) is not None:
+    if examine and values.ndim <= 2 and (alone := one_target.solve(arm, values, task, near)) is not None:
         return alone
     if (turned := actual(arm)) is not arm:
         return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine))

@@ -15,9 +15,9 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian, position
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
-from armkin.motion.chains import Chain, Run, chains, fewest
-from armkin.motion.columns import Columns, change, chord_bound, levers, linked
+from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.linked_branches import Columns, change, chord_bound, levers, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
 from armkin.motors import motor_accel

@@ -19,7 +19,7 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.limits import outside, said
-from armkin.motion import geometry, readings, report
+from armkin.motion import geometry, path_numbers, report
 from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
@@ -186,16 +186,16 @@ class _Walk:
         if start is None:
             return None
         if isinstance(start, str):
-            return readings.joints(self.arm, self.q, start)
+            return path_numbers.joints(self.arm, self.q, start)
         if start.joints is not None:
-            return readings.joints(self.arm, self.q, start.joints)
+            return path_numbers.joints(self.arm, self.q, start.joints)
         assert start.point is not None
         return self._reached(self._target(start.point), None)
 
     # Moves
 
     def _joint(self, move: Move, value: Any) -> None:
-        goal = readings.joints(self.arm, self.q, value)
+        goal = path_numbers.joints(self.arm, self.q, value)
         self._close()
         self._go(goal, move)
         self._clear(None)
@@ -219,7 +219,7 @@ class _Walk:
             geometry.arc(
                 self.task,
                 self.spot,
-                readings.place(self.task, value.via),
+                path_numbers.place(self.task, value.via),
                 self._target(value.to),
             ),
         )
@@ -228,14 +228,14 @@ class _Walk:
         if value.turns == 0:
             raise UsageError("circle: turns 0 is no circle")
         flat = self.task.position == 2
-        normal = np.array([0.0, 0.0, 1.0]) if flat else readings.place(self.task, value.normal)
+        normal = np.array([0.0, 0.0, 1.0]) if flat else path_numbers.place(self.task, value.normal)
         if np.linalg.norm(normal) < 1e-9:
             raise UsageError("circle: its normal has no length")
         angle = 2 * np.pi * value.turns
         self._add(
             move,
             geometry.circle(
-                self.task, self.spot, readings.place(self.task, value.centre), normal, angle, value.rise, None
+                self.task, self.spot, path_numbers.place(self.task, value.centre), normal, angle, value.rise, None
             ),
         )
 
@@ -246,7 +246,7 @@ class _Walk:
         )
 
     def _offset(self, move: Move, value: Any) -> None:
-        d = readings.place(self.task, value.xyz)
+        d = path_numbers.place(self.task, value.xyz)
         if value.frame == "tool":
             if self.task.orientation == "full":
                 assert self.spot.turned is not None
@@ -261,7 +261,7 @@ class _Walk:
         self._between("wait", value)
 
     def _grip(self, move: Move, value: Any) -> None:
-        readings.check_grip(self.arm, value)
+        path_numbers.check_grip(self.arm, value)
         self._between("grip", value)
 
     def _between(self, kind: str, value: Any) -> None:
@@ -284,7 +284,7 @@ class _Walk:
         self.spot = piece.last
 
     def _target(self, value: list[float]) -> Spot:
-        return readings.target(self.task, self.spot, value)
+        return path_numbers.target(self.task, self.spot, value)
 
     # Groups
 

@@ -9,14 +9,14 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion.chains import Chain, why_ended
+from armkin.motion.branch_chains import Chain, why_ended
 from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.motion.branch_chains import Run
     from armkin.motion.branch_path import Carried
-    from armkin.motion.chains import Run
-    from armkin.motion.columns import Columns
+    from armkin.motion.linked_branches import Columns
 
 _WHY = {
     "end": "carries all",

@@ -1,6 +1,6 @@
 """Path files: YAML or CSV in, one validated path out, or an error with its line.
 
-    model.py   keys, types, bounds       words.py   errors in the file's own words
+    model.py   keys, types, bounds       messages.py   errors in the file's own words
     table.py   CSV: one row a corner, columns chosen by the header
 
 This package imports pydantic and yaml, and is itself imported only when a path is read.
@@ -56,9 +56,9 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     try:
         return PathFile.model_validate(_lists(document.data)).read_from(Source(name, document.lines))
     except ValidationError as error:
-        from armkin.path_file import words
+        from armkin.path_file import messages
 
-        raise _invalid(name, [(document.line(at), text) for at, text in words.told(error)]) from None
+        raise _invalid(name, [(document.line(at), text) for at, text in messages.told(error)]) from None
 
 
 def validated(data: dict[str, Any], name: str = "path") -> PathFile:
@@ -66,9 +66,9 @@ def validated(data: dict[str, Any], name: str = "path") -> PathFile:
     try:
         return PathFile.model_validate(_lists(data))
     except ValidationError as error:
-        from armkin.path_file import words
+        from armkin.path_file import messages
 
-        raise _invalid(name, [(0, text) for _, text in words.told(error)]) from None
+        raise _invalid(name, [(0, text) for _, text in messages.told(error)]) from None
 
 
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:

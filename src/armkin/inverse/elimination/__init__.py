@@ -9,5 +9,5 @@ pencil.py         the eigenvalue problem of the middle joints
 roots.py          its roots as joint values
 polish.py         Newton and Levenberg-Marquardt on the chain
 merge.py          equal answers made one, rows packed by pose
-slides.py         three prismatic joints: a closed form instead
+three_prismatic.py three prismatic joints: a closed form instead
 """

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination import closed_loop, roots, slides
+from armkin.inverse.elimination import closed_loop, roots, three_prismatic
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, best, concatenate, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
@@ -334,7 +334,7 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
         return found[0], touching
     for begin in range(0, goal.shape[0], CHUNK):
         part = goal[begin : begin + CHUNK]
-        q = slides.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
+        q = three_prismatic.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
         good = done.residual < GRAZING

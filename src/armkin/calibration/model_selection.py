@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.calibration.chain import Model
 from armkin.calibration.fit import Fit, Measured, fit, residuals
-from armkin.calibration.sight import left_open
+from armkin.calibration.observability import left_open
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")

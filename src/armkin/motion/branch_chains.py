@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.columns import ENDS, Columns, Int, turns_of
+from armkin.motion.linked_branches import ENDS, Columns, Int, turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
