@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import armkin
-from armkin.teach.desk import Desk
+from armkin.teach.actions import Desk
 from armkin.teach.server import Server
 from command_line import ROOT
 

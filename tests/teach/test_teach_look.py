@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.model import units
-from armkin.teach.look import Question, look
+from armkin.teach.pose_answers import Question, look
 from armkin.teach.scene import first_lock, scene
 from command_line import ROOT, run
 

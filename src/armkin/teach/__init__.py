@@ -1,9 +1,12 @@
 """A page for an arm: see it, choose the branch, write a program, move the motors.
 
-server.py   HTTP on 127.0.0.1: files, events, actions; who may ask is decided in guard.py
-tabs.py     the open pages: which one holds control, what each has still to hear
-desk.py     one arm, one page: every action by its name
-scene.py    what the page draws: links, bodies, limits
-look.py     one pose or one target: branches, limits, pulses
-static/     the page itself; static/vendor/three is three.js, byte for byte
+server.py           HTTP on 127.0.0.1: files, events, actions
+request_checks.py   who may ask, and whether a request's fields are what they must be
+tabs.py             the open pages: which one holds control, what each has still to hear
+actions.py          one arm, one page: every action by its name; program_actions.py: those on its program
+program.py          moves recorded one after another, in the words of a path file
+scene.py            what the page draws: links, bodies, limits
+pose_answers.py     one pose or one target: branches, limits, pulses
+board.py            what the page may have the board do; board_thread.py: the thread that owns the port
+static/             the page itself; static/vendor/three is three.js, byte for byte
 """

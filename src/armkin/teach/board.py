@@ -21,14 +21,14 @@ from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits
 from armkin.robot_file.catalogue import locate
-from armkin.teach import guard
-from armkin.teach.guard import RefusedError
+from armkin.teach import request_checks
+from armkin.teach.request_checks import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
     from armkin.formula.arrays import Array
     from armkin.motion.path_plan import PathPlan
-    from armkin.teach.pilot import Pilot
+    from armkin.teach.board_thread import Pilot
     from armkin.teach.tabs import Action, Fields, Tab
 
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
@@ -82,8 +82,8 @@ class Board:
     def send(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Move to joint values, at a percentage of the joints' speeds."""
         arm = self.arm
-        q = units.joints_in(arm, guard.numbers(fields, "q", arm.n))
-        speed = guard.number(fields, "speed", 1, 100) / 100
+        q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
+        speed = request_checks.number(fields, "speed", 1, 100) / 100
         check_limits(arm, q[None])
         self.check_file()
         self.pilot.submit("send", lambda machine: self._move(machine, q, speed))
@@ -91,14 +91,14 @@ class Board:
 
     def run_program(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Carry out the page's program from where the arm stands."""
-        speed = guard.number(fields, "speed", 1, 100) / 100
+        speed = request_checks.number(fields, "speed", 1, 100) / 100
         self.check_file()
         self.pilot.submit("run", lambda machine: self._run_program(machine, speed))
         return {}
 
     def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Take the operator's word that the arm stands in its home pose."""
-        if not guard.flag(fields, "consent"):
+        if not request_checks.flag(fields, "consent"):
             raise UsageError("say first that the arm stands in its home pose")
         self.check_file()
 
@@ -120,8 +120,8 @@ class Board:
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Turn one joint as long as this is asked again and again; the arm stops when it is not."""
         arm = self.arm
-        joint = guard.whole(fields, "joint", arm.n)
-        percent = guard.number(fields, "percent", -100, 100)
+        joint = request_checks.whole(fields, "joint", arm.n)
+        percent = request_checks.number(fields, "percent", -100, 100)
         if percent == 0:
             raise UsageError("percent: 0 is no jog")
         wanted = (joint, percent)
@@ -143,18 +143,18 @@ class Board:
         value = fields.get("value")
         if isinstance(value, str) and value not in ("open", "closed"):
             raise UsageError("value: expected open, closed or a number")
-        wanted = value if isinstance(value, str) else guard.number(fields, "value", -1e6, 1e6)
+        wanted = value if isinstance(value, str) else request_checks.number(fields, "value", -1e6, 1e6)
         board = self.pilot.board
         if not isinstance(board, Foreign):
             gripping.count_of(gripping.gripper_of(self.arm.name, board), wanted)
-        assume = guard.flag(fields, "assume")
+        assume = request_checks.flag(fields, "assume")
         self.check_file()
         self.pilot.submit("grip", lambda machine: self._grip(machine, wanted, assume))
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Let the arm follow the page's pose, slowly; off at every start."""
-        self.follows = guard.flag(fields, "on")
+        self.follows = request_checks.flag(fields, "on")
         self._goal = None
         return {"on": self.follows}
 

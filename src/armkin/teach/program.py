@@ -16,7 +16,7 @@ from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
-from armkin.teach import guard
+from armkin.teach import request_checks
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -61,7 +61,7 @@ class Program:
 
     def edit(self, fields: Mapping[str, Any]) -> None:
         """Carry out one edit: `do` names it. Raises UsageError and changes nothing if it makes no sense."""
-        what = guard.text(fields, "do", 20)
+        what = request_checks.text(fields, "do", 20)
         if what in ("undo", "redo"):
             back, forth = (self._before, self._after) if what == "undo" else (self._after, self._before)
             if back:
@@ -155,20 +155,24 @@ class Program:
         """Append a move to the pose q, or put it behind `index`."""
         if len(self.moves) >= MOST:
             raise UsageError(f"a program has at most {MOST} moves")
-        kind = guard.text(fields, "kind", 20)
-        at = len(self.moves) if fields.get("index") is None else guard.whole(fields, "index", len(self.moves)) + 1
+        kind = request_checks.text(fields, "kind", 20)
+        at = (
+            len(self.moves)
+            if fields.get("index") is None
+            else request_checks.whole(fields, "index", len(self.moves)) + 1
+        )
         self.moves.insert(at, self._move(kind, fields))
         self.names.insert(at, "")
 
     def _move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
         if kind == "wait":
-            return {"wait": guard.number(fields, "seconds", 0, 3600)}
+            return {"wait": request_checks.number(fields, "seconds", 0, 3600)}
         if kind == "grip":
-            value = guard.text(fields, "value", 10)
+            value = request_checks.text(fields, "value", 10)
             if value not in ("open", "closed"):
                 raise UsageError("value: expected open or closed")
             return {"grip": value}
-        values = guard.numbers(fields, "q", self.arm.n)
+        values = request_checks.numbers(fields, "q", self.arm.n)
         if kind == "joint":
             return {"joint": _rounded(values)}
         target = self._target(values)
@@ -188,14 +192,14 @@ class Program:
         return _rounded(target)
 
     def _set_via(self, fields: Mapping[str, Any]) -> None:
-        q = units.joints_in(self.arm, guard.numbers(fields, "q", self.arm.n))
+        q = units.joints_in(self.arm, request_checks.numbers(fields, "q", self.arm.n))
         self.via = _rounded(fk(self.arm, q)[:3, 3].tolist())
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
-        self.names[self._index(fields)] = " ".join(guard.text(fields, "name", 60).replace("#", "").split())
+        self.names[self._index(fields)] = " ".join(request_checks.text(fields, "name", 60).replace("#", "").split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
-        at, to = self._index(fields), guard.whole(fields, "to", len(self.moves))
+        at, to = self._index(fields), request_checks.whole(fields, "to", len(self.moves))
         self.moves.insert(to, self.moves.pop(at))
         self.names.insert(to, self.names.pop(at))
 
@@ -212,7 +216,7 @@ class Program:
         if fields.get("blend") is None:
             move.pop("blend", None)
         else:
-            move["blend"] = guard.number(fields, "blend", 0, 1e6)
+            move["blend"] = request_checks.number(fields, "blend", 0, 1e6)
 
     def _settings(self, fields: Mapping[str, Any]) -> None:
         for key in _SETTINGS:
@@ -220,12 +224,12 @@ class Program:
                 if fields[key] is None:
                     self.head.pop(key, None)
                 else:
-                    self.head[key] = guard.number(fields, key, 0, 1e6)
+                    self.head[key] = request_checks.number(fields, key, 0, 1e6)
 
     def _index(self, fields: Mapping[str, Any]) -> int:
         if not self.moves:
             raise UsageError("the program has no moves")
-        return guard.whole(fields, "index", len(self.moves))
+        return request_checks.whole(fields, "index", len(self.moves))
 
     def _copy(self) -> tuple[Any, ...]:
         return copy.deepcopy((self.head, self.moves, self.names, self.via))

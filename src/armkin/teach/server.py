@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from armkin.errors import ArmkinError, LinkError
-from armkin.teach import guard
-from armkin.teach.desk import Desk
-from armkin.teach.guard import Guard, RefusedError
+from armkin.teach import request_checks
+from armkin.teach.actions import Desk
+from armkin.teach.request_checks import Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -130,9 +130,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.server.known(self.connection)
         if not self.path.startswith("/api/"):
             raise RefusedError(404, "there is no such action")
-        fields = guard.body(self.rfile.read(guard.length(headers)))
+        fields = request_checks.body(self.rfile.read(request_checks.length(headers)))
         try:
-            answer = self.server.desk.act(self.path.removeprefix("/api/"), headers.get(guard.TAB, ""), fields)
+            answer = self.server.desk.act(self.path.removeprefix("/api/"), headers.get(request_checks.TAB, ""), fields)
         except ArmkinError as error:
             status = 502 if isinstance(error, LinkError) else 422
             self._json(status, {"error": error.message, "kind": error.kind})
@@ -207,7 +207,7 @@ def _headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, value in handler.headers.items():
         key = name.title()
-        if key in found and key in ("Host", "Origin", "Content-Length", guard.KEY):
+        if key in found and key in ("Host", "Origin", "Content-Length", request_checks.KEY):
             raise RefusedError(400, f"{key} is there twice")
         found[key] = value
     return found

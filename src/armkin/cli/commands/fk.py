@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, piped, render
+from armkin.cli import inputs, output, piped_answers, render
 from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
 from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe
@@ -34,7 +34,7 @@ def fk(
         arm = inputs.load(inputs.named(robot))
         chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
     else:
-        arm, values = piped.poses(robot, q)
+        arm, values = piped_answers.poses(robot, q)
         if len(values) == 1:
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out) as write:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import holding, inputs, output, piped, render
+from armkin.cli import inputs, lock_and_sweep, output, piped_answers, render
 from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
 from armkin.cli.options import (
@@ -68,18 +68,18 @@ def ik(
     from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
 
-    given = None if target or batch is not None else piped.joint_values(robot)
+    given = None if target or batch is not None else piped_answers.joint_values(robot)
     arm = inputs.load(inputs.named(robot)) if given is None else given[0]
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
-    held = holding.locks(arm, lock)
+    held = lock_and_sweep.locks(arm, lock)
     request = choose.Request(
         arm=arm,
         task=what.name,
         near=None if near is None else inputs.joint_list(arm, near, "--near"),
         branch=branch,
         held=held,
-        swept=holding.sweeps(arm, sweep, held),
+        swept=lock_and_sweep.sweeps(arm, sweep, held),
         every=all_branches or continuous,
     )
     if compiled:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import holding, inputs, linking, output, render
+from armkin.cli import inputs, linking, lock_and_sweep, output, render
 from armkin.cli.batch import csv_line
 from armkin.cli.linking import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.numbers import listed, number, whole
@@ -91,7 +91,7 @@ def path(
     import numpy as np
 
     arm = inputs.load(robot)
-    held = holding.locks(arm, lock)
+    held = lock_and_sweep.locks(arm, lock)
     if held:
         import armkin
 

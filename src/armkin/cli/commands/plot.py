@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import holding, inputs, piped, render
+from armkin.cli import inputs, lock_and_sweep, piped_answers, render
 from armkin.cli.csv_rows import batch_rows
 from armkin.cli.numbers import listed
 from armkin.cli.options import Joints, Lock, RobotOrPipe, TaskName
@@ -105,7 +105,7 @@ def _piped(robot: str | None, out: str | None, **style: Any) -> None:
     """What a command before the pipe has printed: its branches, or its poses."""
     from armkin.plot import plot_poses
 
-    found = piped.answers(robot)
+    found = piped_answers.answers(robot)
     if found is None:
         arm = inputs.load(inputs.named(robot))
         names = " ".join(arm.joint_names)
@@ -116,7 +116,7 @@ def _piped(robot: str | None, out: str | None, **style: Any) -> None:
         q = units.joints_in(arm, [branch["joints"] for branch in branches])
         plot_poses(arm, q, out, names=[str(branch["name"]) for branch in branches], **style)
         return
-    values = piped.joints_of(arm, answers)
+    values = piped_answers.joints_of(arm, answers)
     if len(values) == 1:
         _pose(arm, values[0], out, **style)
     else:
@@ -150,7 +150,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
 
     what = task_for(arm, task)
     values = inputs.target_list(arm, what, text)
-    request = choose.Request(arm=arm, task=what.name, held=holding.locks(arm, lock))
+    request = choose.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
     [answer] = choose.solve(request, units.targets_in(what.labels, [values]))
     goal = render.labelled(what.labels, values, units.label_units(what.labels))
     if not answer.branches:

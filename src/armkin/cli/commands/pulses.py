@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, piped, render
+from armkin.cli import inputs, output, piped_answers, render
 from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
 from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
@@ -46,7 +46,7 @@ def pulses(
         arm = inputs.load(inputs.named(robot))
         chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
     else:
-        arm, values = piped.poses(robot, q)
+        arm, values = piped_answers.poses(robot, q)
         chunks = all_rows(values)
     origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
     if batch is None and len(values) == 1:

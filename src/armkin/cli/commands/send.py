@@ -9,10 +9,10 @@ import typer
 
 from armkin.cli import inputs, linking, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.goals import goals as read_goals
 from armkin.cli.linking import SIM, Assume, Baud, NoReset, PortName, Resume
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
+from armkin.cli.send_goals import goals as read_goals
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
     from armkin.board.planner import Planner, Stream
     from armkin.board.resuming import Note
-    from armkin.cli.goals import Goals
+    from armkin.cli.send_goals import Goals
     from armkin.model.arm import Arm
 
 

@@ -27,7 +27,7 @@ def teach(
     """
     import threading
 
-    from armkin.teach.desk import Desk
+    from armkin.teach.actions import Desk
     from armkin.teach.server import Server
 
     arm = inputs.load(robot)

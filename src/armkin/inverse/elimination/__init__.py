@@ -1,13 +1,13 @@
 """The general six-joint arm, from the chain to the branches.
 
-method.py         the method, why it is complete, `prepare` and `solve`
-closed_loop.py    the chain closed and scaled
-walks.py          which joint plays which part
-line_features.py  the numbers of a line on which rigid motions are matrices
-end_joints.py     removes the two end joints, and gives them back
-pencil.py         the eigenvalue problem of the middle joints
-roots.py          its roots as joint values
-polish.py         Newton and Levenberg-Marquardt on the chain
-merge.py          equal answers made one, rows packed by pose
+method.py          the method, why it is complete, `prepare` and `solve`
+closed_loop.py     the chain closed and scaled
+walks.py           which joint plays which part
+line_features.py   the numbers of a line on which rigid motions are matrices
+end_joints.py      removes the two end joints, and gives them back
+pencil.py          the eigenvalue problem of the middle joints
+roots.py           its roots as joint values
+polish.py          Newton and Levenberg-Marquardt on the chain
+merge.py           equal answers made one, rows packed by pose
 three_prismatic.py three prismatic joints: a closed form instead
 """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.model import units
 from armkin.motors import joints as joints_of
-from armkin.teach import guard
+from armkin.teach import request_checks
 from armkin.teach.program import Program, played
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ class Rehearsal:
     def load(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Take a path file's text as the program."""
         with self._lock:
-            self.program.load(guard.text(fields, "text", guard.LARGEST), guard.text(fields, "name"))
+            self.program.load(
+                request_checks.text(fields, "text", request_checks.LARGEST), request_checks.text(fields, "name")
+            )
             return self._told()
 
     def save(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -61,7 +63,7 @@ class Rehearsal:
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a move ends."""
         with self._lock:
-            index = guard.whole(fields, "index", max(len(self.program.moves), 1))
+            index = request_checks.whole(fields, "index", max(len(self.program.moves), 1))
             q = self.program.end_of(index, self.start())
         return {"q": units.joints_out(self.arm, q).tolist()}
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
 from armkin.model import units
-from armkin.teach import guard
-from armkin.teach.guard import RefusedError
-from armkin.teach.rehearsal import Rehearsal
+from armkin.teach import request_checks
+from armkin.teach.program_actions import Rehearsal
+from armkin.teach.request_checks import RefusedError
 from armkin.teach.scene import first_lock, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
@@ -34,7 +34,7 @@ class Desk:
         self.free: dict[str, Action] = {"take": self._take, "stop": self._stop}
         if port is not None:
             from armkin.teach.board import Board
-            from armkin.teach.pilot import Pilot
+            from armkin.teach.board_thread import Pilot
 
             pilot = Pilot(arm, port, baud, lambda state: self.tabs.tell("board", state))
             self.board = Board(pilot, self.rehearsal.program.plan)
@@ -61,7 +61,7 @@ class Desk:
 
     def warm(self) -> None:
         """Have the first page's answer ready, while its browser still loads the files."""
-        from armkin.teach.look import Question, look
+        from armkin.teach.pose_answers import Question, look
 
         with self._solving:
             if not self._shown:
@@ -82,24 +82,24 @@ class Desk:
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a pose or a target is, with all branches; the other pages see it, too."""
-        from armkin.teach.look import Question, look  # the solver: imported while the browser loads the page
+        from armkin.teach.pose_answers import Question, look  # the solver: imported while the browser loads the page
 
         arm = self.arm
-        q = units.joints_in(arm, guard.numbers(fields, "q", arm.n))
+        q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
         held = fields.get("held", [])
         if not isinstance(held, list) or any(name not in arm.joint_names for name in held):
             raise UsageError("held: expected names of joints")
         target = fields.get("target")
         if target is not None:
             count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
-            target = guard.numbers(fields, "target", count)
+            target = request_checks.numbers(fields, "target", count)
         question = Question(
             q,
             target,
             tuple(name for name in arm.joint_names if name in held),
-            guard.text(fields, "branch") if fields.get("branch") is not None else "",
-            guard.flag(fields, "best"),
-            guard.flag(fields, "nearest"),
+            request_checks.text(fields, "branch") if fields.get("branch") is not None else "",
+            request_checks.flag(fields, "best"),
+            request_checks.flag(fields, "nearest"),
             self.stands(),
         )
         with self._solving:

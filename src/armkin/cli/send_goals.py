@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from armkin.cli import holding, inputs, piped
+from armkin.cli import inputs, lock_and_sweep, piped_answers
 from armkin.cli.csv_rows import streamed_rows
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
@@ -52,7 +52,7 @@ def goals(
         values = inputs.target_list(arm, what, target)
         goal = units.targets_in(what.labels, np.array([values]))
         close = None if near is None else inputs.joint_list(arm, near, "--near")
-        return arm, Goals(None, [1], goal, what.name, branch, holding.locks(arm, lock), close)
+        return arm, Goals(None, [1], goal, what.name, branch, lock_and_sweep.locks(arm, lock), close)
     if batch == "-":
         from armkin.board.planner import Stream
 
@@ -115,7 +115,7 @@ def _from_pipe(robot: str | None) -> tuple[Arm, Goals]:
 
     import armkin
 
-    answer = piped.read(robot)
+    answer = piped_answers.read(robot)
     arm = inputs.load(answer.robot_file)
     if arm.sha256 != answer.robot_sha256:
         raise FileError(

@@ -23,7 +23,7 @@ from armkin.board.sim.port import Paced
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
 from armkin.motors import joints as joints_of
-from armkin.teach.guard import RefusedError
+from armkin.teach.request_checks import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
