@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.numbers import is_number, number
 from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
@@ -43,14 +44,14 @@ def grip(
     from armkin.board.firmware import gripping
 
     arm = inputs.load(robot)
-    if (other := linking.foreign(arm)) is not None:
+    if (other := board_link.foreign(arm)) is not None:
         _grip_other(arm, other, value, port, baud, not no_reset, json)
         return
-    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
+    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
     gripper = gripping.gripper_of(arm.name, configuration)
     target = _count(gripper, value, "VALUE")
     start = None if assume is None else _count(gripper, assume, "--assume")
-    with linking.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
+    with board_link.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
         gripping.prepare(machine, gripper, start)
         at = gripping.grip(machine, gripper, target)
     if at != target:
@@ -72,7 +73,7 @@ def _grip_other(
     """A gripper on a board of another kind: a servo may close on something before it is where it was sent."""
     gripper = other.gripper()
     target = other.grip_value(_WORD[value] if value in _WORD else number(value, "VALUE"))
-    with linking.backend(arm, other, port, baud, reset=reset) as machine:
+    with board_link.backend(arm, other, port, baud, reset=reset) as machine:
         at = other.grip(machine, target)
     unit = "S" if gripper.kind == "spindle" else "deg"
     measured = gripper.kind == "bus"

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import completion, inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, completion, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 from armkin.errors import HomingIncompleteError, UsageError
 from armkin.model import units
@@ -47,13 +48,13 @@ def home(
     --port sim the switches are where the robot file says.
     """
     arm = inputs.load(robot)
-    other = linking.foreign(arm)
+    other = board_link.foreign(arm)
     if other is not None:
         found = _of_others(arm, other, port, baud, joints, rest_at_home, stay, not no_reset)
     else:
         found = _ours(arm, port, baud, joints or (), rest_at_home, stay, not no_reset)
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else linking.where_text(arm, found))
+        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
 
 
 def _ours(
@@ -63,9 +64,9 @@ def _ours(
     from armkin.board.firmware import homing
     from armkin.board.planner import where
 
-    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
+    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
     homing.searches(arm, configuration, joints, rest_at_home=rest_at_home)  # refuses before a port is opened
-    with linking.machine(arm, configuration, port, baud, simulated=_REHEARSAL, reset=reset) as machine:
+    with board_link.machine(arm, configuration, port, baud, simulated=_REHEARSAL, reset=reset) as machine:
         steps = homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
         lost = homing.lost_joints(machine)
         if lost:
@@ -114,7 +115,7 @@ def _of_others(
         raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(joints)} out")
     if rest_at_home:
         raise UsageError(f"boards of kind {kind} home all joints at once: leave --rest-at-home out")
-    with linking.backend(arm, other, port, baud, reset=reset) as backend:
+    with board_link.backend(arm, other, port, baud, reset=reset) as backend:
         other.home(backend)
         if not stay:
             output.note("moving to the home pose")

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import completion, inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, completion, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
@@ -36,7 +37,7 @@ def jog(
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)
-    other = linking.foreign(arm)
+    other = board_link.foreign(arm)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")
@@ -46,14 +47,14 @@ def jog(
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     if other is not None:
-        with linking.backend(arm, other, port, baud, reset=not no_reset) as backend:
+        with board_link.backend(arm, other, port, baud, reset=not no_reset) as backend:
             other.jog(backend, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
             told = {**render.head(arm), "port": backend.port.name, **where(backend)}
         with output.destination(None) as write:
-            write(render.to_json(told) + "\n" if json else linking.where_text(arm, told))
+            write(render.to_json(told) + "\n" if json else board_link.where_text(arm, told))
         return
-    configuration = linking.configured(arm, rehearsal=port == linking.SIM)
-    with linking.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
+    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
+    with board_link.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
         jogging.prepare(machine)
         slow = top / jogging.SLOW
         if machine.position() == "lost" and abs(rate) > slow:
@@ -65,5 +66,5 @@ def jog(
         write(
             render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"
             if json
-            else linking.where_text(arm, found)
+            else board_link.where_text(arm, found)
         )

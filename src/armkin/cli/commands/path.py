@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import inputs, linking, lock_and_sweep, output, render
+from armkin.cli import board_link, inputs, lock_and_sweep, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import SIM, Assume, Baud, NoReset, Resume
+from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError
@@ -112,7 +112,7 @@ def path(
         "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
     }
     if resume:
-        linking.can_resume(
+        board_link.can_resume(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
     if port is None or dry_run:
@@ -179,23 +179,23 @@ def _carried_out(
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
-    board, stands = linking.board_of(arm, rehearsal=port == SIM), linking.assumed(arm, assume)
-    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=reset) as machine:
-        linking.prepare(arm, machine, assume, stands)
-        held = linking.held(machine, resume)
+    board, stands = board_link.board_of(arm, rehearsal=port == SIM), board_link.assumed(arm, assume)
+    with board_link.backend(arm, board, port, baud, simulated=board_link.simulated(assume), reset=reset) as machine:
+        board_link.prepare(arm, machine, assume, stands)
+        held = board_link.held(machine, resume)
         began = machine.counts() if held is None else held.start
         with planning():
             plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
             laid = path_run.parts(plan, began, machine.lay)
             _files(plan, out, plot)
-        with resuming.under_way(machine, laid, held) as (left, first, note), linking.told(left, note) as tell:
+        with resuming.under_way(machine, laid, held) as (left, first, note), board_link.told(left, note) as tell:
             path_run.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
     _print(plan, found, json=json)
     if not json:
         with output.destination(None) as write:
-            write(linking.where_text(arm, found))
+            write(board_link.where_text(arm, found))
 
 
 def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
@@ -254,7 +254,7 @@ def _rehearsed(plan: PathPlan) -> list[Planned] | None:
     from armkin.motors import pulses
 
     try:
-        board = linking.configured(plan.arm, rehearsal=True).board
+        board = board_link.configured(plan.arm, rehearsal=True).board
     except UsageError:
         return None
     start = pulses(plan.arm, plan.motion.start).tolist()

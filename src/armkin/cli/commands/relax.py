@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import inputs, linking, output
+from armkin.cli import board_link, inputs, output
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Out, Robot
 from armkin.errors import UsageError
@@ -36,13 +37,13 @@ def relax(
     from armkin.board.feetech.machine import ServoMachine
 
     arm = inputs.load(robot)
-    other = linking.foreign(arm)
+    other = board_link.foreign(arm)
     if other is None or other.board.kind != "feetech":
         raise UsageError(f"{arm.name} has no bus servos: other motors cannot be moved by hand and read")
     time = number(seconds, "--seconds")
     if not 0 <= time <= _LONGEST:
         raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
-    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
+    with board_link.backend(arm, other, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
         assert isinstance(machine, ServoMachine)
         machine.relax()
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
+from armkin.cli import board_link, inputs, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.linking import SIM, Assume, Baud, NoReset, PortName, Resume
+from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
+from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.cli.send_goals import goals as read_goals
@@ -101,7 +102,7 @@ def send(
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     if resume:
         beside = {"--dry-run": dry_run, "--assume": assume, "--batch -": batch == "-", "--port sim": port == SIM}
-        linking.can_resume(beside)
+        board_link.can_resume(beside)
     if path is not None:
         from armkin.cli.commands.path import sent
 
@@ -124,12 +125,12 @@ def send(
     if accel is not None:
         arm = _accelerated(arm, number(accel, "--accel"))
     try:
-        board = linking.board_of(arm, rehearsal=rehearsal)
+        board = board_link.board_of(arm, rehearsal=rehearsal)
     except UsageError as error:
         if rehearsal and all(line.startswith("max_accel") for line in error.fields.get("lines_to_add", ["no"])):
             error.fields["option"] = "--accel"
         raise
-    planner, stands = Planner(arm, board, fraction, radius), linking.assumed(arm, assume)
+    planner, stands = Planner(arm, board, fraction, radius), board_link.assumed(arm, assume)
     if dry_run:
         home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
         plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
@@ -140,9 +141,11 @@ def send(
                 render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
             )
         return
-    with linking.backend(arm, board, port, baud, simulated=linking.simulated(assume), reset=not no_reset) as machine:
-        linking.prepare(arm, machine, assume, stands)
-        held = linking.held(machine, resume)
+    with board_link.backend(
+        arm, board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset
+    ) as machine:
+        board_link.prepare(arm, machine, assume, stands)
+        held = board_link.held(machine, resume)
         began = machine.counts() if held is None else held.start
         if isinstance(machine, Machine):
             planner.use(machine.info.clock, machine.info.min_interval)
@@ -167,7 +170,7 @@ def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], hel
     """Move through the plans, or through what is left of them since they were held."""
     from armkin.board import resuming
 
-    with resuming.under_way(machine, plans, held) as (left, _, note), linking.told(left, note) as tell:
+    with resuming.under_way(machine, plans, held) as (left, _, note), board_link.told(left, note) as tell:
         machine.run(planner.noted(left), tell)
 
 
@@ -229,7 +232,7 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
 
 def _arrived(arm: Arm, planned: Mapping[str, Any], found: Mapping[str, Any]) -> str:
     """Where the arm stands, and whether that is where the plan ends."""
-    text = linking.where_text(arm, found)
+    text = board_link.where_text(arm, found)
     if found["pulses"] is None:
         return text
     off = [

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
 
@@ -33,10 +34,10 @@ def setup(
     from armkin.board.grbl.machine import GrblMachine
 
     arm = inputs.load(robot)
-    other = linking.foreign(arm)
+    other = board_link.foreign(arm)
     if other is None or other.board.kind != "grbl":
         raise UsageError(f"{arm.name}'s board has no settings to compare: setup is for board: {{kind: grbl}}")
-    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine:
+    with board_link.backend(arm, other, port, baud, reset=not no_reset) as machine:
         assert isinstance(machine, GrblMachine)
         found = machine.wrong()
         if write:

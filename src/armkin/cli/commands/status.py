@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 
 
@@ -21,8 +22,8 @@ def status(
 
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
-    board = linking.board_of(arm, rehearsal=port == linking.SIM)
-    with linking.backend(arm, board, port, baud, simulated=new, reset=not no_reset) as machine:
+    board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
+    with board_link.backend(arm, board, port, baud, simulated=new, reset=not no_reset) as machine:
         found = {
             **render.head(arm),
             "port": machine.port.name,
@@ -32,7 +33,7 @@ def status(
         }
     with output.destination(None) as write:
         words = _servos if "servos" in found else _grbl if "settings" in found else _text
-        write(render.to_json(found) + "\n" if json else linking.where_text(arm, found) + words(found))
+        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found))
 
 
 def _servos(found: dict[str, Any]) -> str:

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import linking, output
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, output
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName, port_name
 from armkin.errors import LinkError, UsageError
 
 _PATIENCE = 15.0  # [s] for an arm to come to rest
@@ -29,7 +30,7 @@ def stop(
     """
     from armkin.board.ports import SIM, SerialPort, holder
 
-    baud = baud or linking.BAUD
+    baud = baud or board_link.BAUD
     port = _port(port, baud, not no_reset)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
@@ -63,7 +64,7 @@ def _port(given: str | None, baud: int, reset: bool) -> str:
         held = [name for name in likely() if holder(name) is not None]
         if len(held) == 1:
             return held[0]
-    return linking.port_name(given, None, baud, reset=reset)
+    return port_name(given, None, baud, reset=reset)
 
 
 def _end(process: int, port: str) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import inputs, output
-from armkin.cli.linking import SIM, Baud
+from armkin.cli.board_link import SIM, Baud
 from armkin.cli.options import Robot
 
 

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, linking, output, render
-from armkin.cli.linking import Baud, NoReset, PortName
+from armkin.cli import board_link, inputs, output, render
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
@@ -48,12 +49,12 @@ def zero(
     from armkin.robot_file.edit import replaced
 
     arm = inputs.load(robot)
-    other = linking.foreign(arm)
+    other = board_link.foreign(arm)
     if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
     q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
     jaw = None if gripper is None else other.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
-    with linking.backend(arm, other, port, baud, reset=not no_reset) as machine:
+    with board_link.backend(arm, other, port, baud, reset=not no_reset) as machine:
         assert isinstance(machine, ServoMachine)
         counts, name = list(machine.counts()), machine.port.name
         grips = None if jaw is None else gripping.zero(machine.bus, other.gripper(), jaw)

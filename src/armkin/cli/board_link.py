@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import completion, inputs, output, render
+from armkin.cli.default_port import foreign_port, port_name
 from armkin.cli.numbers import whole
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -22,19 +23,6 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-PortName = Annotated[
-    str | None,
-    typer.Option(
-        "--port",
-        "-p",
-        metavar="PORT",
-        envvar="ARMKIN_PORT",
-        show_envvar=False,
-        autocompletion=completion.ports,
-        help="Device, COM port, pyserial URL, or sim: a board in this process. "
-        "[default: ARMKIN_PORT, else the only board that answers]",
-    ),
-]
 _FASTEST = 4_000_000  # what USB adapters make; a bus has 1,000,000
 
 
@@ -77,35 +65,6 @@ Assume = Annotated[
 BAUD = 250_000
 SIM = "sim"
 AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
-
-
-def port_name(given: str | None, configuration: Configuration | None, baud: int, *, reset: bool = True) -> str:
-    """The port given (or ARMKIN_PORT), else the only one where a board answers as the robot file's kind."""
-    if given is not None:
-        return given
-    from armkin.board.firmware.find_boards import answering
-    from armkin.board.stopping import stoppable
-
-    kind = (
-        "a board"
-        if configuration is None
-        else f"{'an' if configuration.board.kind[0] in 'aeiou' else 'a'} {configuration.board.kind}"
-    )
-    with stoppable() as stop:
-        found = answering(None if configuration is None else configuration.board.number, baud, stop, reset=reset)
-    return _only(found, kind)
-
-
-def _only(found: Sequence[str], kind: str) -> str:
-    """The one port that was found. Raises UsageError if there are none or several."""
-    if len(found) == 1:
-        output.note(f"using {found[0]}, the only port where {kind} answers")
-        return found[0]
-    where = f"{len(found)} boards answer ({', '.join(found)})" if found else f"no port where {kind} answers was found"
-    raise UsageError(
-        f"--port is missing, and {where}\n"
-        "armkin ports lists them, ARMKIN_PORT names one for every command; sim is a board in this process"
-    )
 
 
 @contextmanager
@@ -174,21 +133,6 @@ def held(machine: Backend, resume: bool) -> Note | None:
     if not isinstance(machine, Machine):
         raise UsageError("--resume is for boards with armkin's firmware: only they tell where a motion was held")
     return resuming.recall(machine)
-
-
-def foreign_port(given: str | None, board: Foreign, baud: int | None, *, reset: bool = True) -> str:
-    """The port given (or ARMKIN_PORT), else the only one where a board of the robot file's kind answers.
-
-    GRBL is asked for its status, a bus for its servos' numbers: nothing moves.
-    """
-    if given is not None:
-        return given
-    from armkin.board.firmware.find_boards import others
-    from armkin.board.stopping import stoppable
-
-    with stoppable() as stop:
-        found = [name for name in others() if board.answers(name, baud, stop, reset=reset)]
-    return _only(found, f"a {board.board.kind} board")
 
 
 def foreign(arm: Arm) -> Foreign | None:
