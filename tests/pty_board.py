@@ -9,7 +9,7 @@ import time
 
 from armkin.board.firmware.protocol import State
 from armkin.board.sim.board import SimBoard
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 from pty_port import Pty
 
 

@@ -14,10 +14,10 @@ SOURCE = Path(__file__).parents[1] / "src"
 # The order is the way of the data: a room imports what stands above it.
 MAY_IMPORT: dict[str, str] = {
     "errors": "",
-    "hardware": "",
+    "board_kinds": "",
     "files": "errors",
     "formula": "errors",
-    "robot_file": "errors files hardware",
+    "robot_file": "errors files board_kinds",
     "model": "errors formula robot_file",
     "forward": "errors formula model",
     "inverse/tasks": "errors formula model forward",
@@ -40,14 +40,14 @@ MAY_IMPORT: dict[str, str] = {
     "view": "errors formula model forward",
     "plot": "errors files formula model forward motion view reach",
     "board/ports": "errors",
-    "board/firmware": "board/backend errors hardware formula model forward motors motion board/ports robot_file",
+    "board/firmware": "board/backend errors board_kinds formula model forward motors motion board/ports robot_file",
     "board/backend": "formula model motion motors board/ports",
     "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
-    "board/sim": "errors hardware board/ports board/firmware board/grbl board/feetech",
-    "board": "errors hardware formula robot_file model forward motors motion board/ports board/backend board/firmware"
-    " board/grbl board/feetech board/sim",
-    "teach": "errors files hardware formula robot_file model forward inverse inverse/tasks inverse/branches motors"
+    "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
+    "board": "errors board_kinds formula robot_file model forward motors motion board/ports board/backend"
+    " board/firmware board/grbl board/feetech board/sim",
+    "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/sim",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them

@@ -12,7 +12,7 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
 from armkin.board.firmware.straight_lines import line
 from armkin.board.sim.board import SimBoard
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 
 GOLDEN = Path(__file__).parents[2] / "firmware" / "golden"
 

@@ -18,8 +18,8 @@ from armkin.board.firmware import segments, straight_lines
 from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.protocol import AxisImage, Image, Segment
 from armkin.board.sim.velocity import Velocity, times_valid
+from armkin.board_kinds import BOARDS
 from armkin.errors import NoSolutionError, UsageError
-from armkin.hardware import BOARDS
 from armkin.model import build as arms
 from armkin.model.arm import Arm
 from armkin.motion import profile

@@ -20,8 +20,8 @@ from armkin.board.firmware.reply_checks import BoardSaysError, ReplacedError
 from armkin.board.opening import Switches
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
+from armkin.board_kinds import BOARDS
 from armkin.errors import LinkError
-from armkin.hardware import BOARDS
 from armkin.model import build as arms
 from armkin.model.arm import Arm
 from armkin.motion.corners import rounded

@@ -20,8 +20,8 @@ from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import ReplacedError
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
+from armkin.board_kinds import BOARDS
 from armkin.errors import LinkError, UsageError
-from armkin.hardware import BOARDS
 from armkin.model import build as arms
 from armkin.model.arm import Arm
 from armkin.motors import joints, pulses

@@ -13,7 +13,7 @@ import armkin
 from armkin.board.ports import note_path
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 from armkin.motors import places
 from command_line import ROOT, THREE_DOF, run
 

@@ -13,7 +13,7 @@ from armkin.board.sim.board import SimBoard
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.port import SimPort
 from armkin.board.sim.servo_bus import Servo, ServoBus
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 from command_line import ROOT
 
 BOARDS_OF: dict[str, Callable[[], Port]] = {

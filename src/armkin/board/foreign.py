@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board_kinds import FOREIGN, ForeignBoard
 from armkin.errors import LinkError, UsageError
-from armkin.hardware import FOREIGN, ForeignBoard
 from armkin.model import units
 from armkin.motion.plan import plan as plan_joints
 from armkin.motion.plan import rate_lines

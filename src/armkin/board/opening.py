@@ -13,7 +13,7 @@ from armkin.board.ports import BAUD, SIM, Port, SerialPort
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.hardware import Board
+    from armkin.board_kinds import Board
     from armkin.model.arm import Arm
 
 

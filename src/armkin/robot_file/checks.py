@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin.hardware import BOARDS, FOREIGN
+from armkin.board_kinds import BOARDS, FOREIGN
 from armkin.robot_file.model import Gripper, Triple, dot
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ import numpy as np
 
 from armkin.board.firmware import missing_keys
 from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
+from armkin.board_kinds import BOARDS, DRIVERS, Board, Driver
 from armkin.errors import UsageError
-from armkin.hardware import BOARDS, DRIVERS, Board, Driver
 from armkin.motors import motor_accel, pulse_range, pulses
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from armkin.board.firmware.motion_frame import WHY
 from armkin.board.firmware.protocol import Error, Flag, Status
 from armkin.board.firmware.reporting import told
 from armkin.board.firmware.session import DeviceError, Session
+from armkin.board_kinds import board_name
 from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
-from armkin.hardware import board_name
 from armkin.model.units import joints_out
 from armkin.motors import joints as joints_of
 from armkin.motors import pulses

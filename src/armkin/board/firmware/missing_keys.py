@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from armkin.board_kinds import BOARDS, DRIVERS, FOREIGN
 from armkin.errors import UsageError
-from armkin.hardware import BOARDS, DRIVERS, FOREIGN
 from armkin.motion.plan import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
 

@@ -17,7 +17,7 @@ from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.inputs import Inputs
 from armkin.board.sim.motors import Motors
 from armkin.board.sim.setup import Setup
-from armkin.hardware import Board
+from armkin.board_kinds import Board
 
 _SILENCE = 0.5  # [s]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import Error, Image, Segment
-from armkin.hardware import Board
+from armkin.board_kinds import Board
 
 
 class RefusedError(Exception):

@@ -6,7 +6,7 @@ import zlib
 
 from armkin.board.firmware.protocol import AxisImage, Error, Image
 from armkin.board.sim.frames import RefusedError, image_valid
-from armkin.hardware import Board
+from armkin.board_kinds import Board
 
 
 class Setup:

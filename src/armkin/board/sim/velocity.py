@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armkin.board.firmware.protocol import Error, Image, Segment
 from armkin.board.sim.frames import RefusedError
-from armkin.hardware import Board
+from armkin.board_kinds import Board
 
 _BITS = 38  # velocities are in 2^-38 steps a cycle
 _UNCHECKED = 1 << 23  # change in a window from which on an acceleration is not checked

@@ -1,5 +1,6 @@
 """What the host must know of each board before it is connected: one entry a board, one a driver.
 
+A new entry here also needs its name in `BoardKind` of `robot_file/model.py`; CONTRIBUTING.md has the whole walk.
 The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two tables together.
 """
 
