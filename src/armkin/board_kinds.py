@@ -6,11 +6,10 @@ The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Board:
+class Board(NamedTuple):
     """A board that the firmware supports."""
 
     kind: str  # as `board: {kind: ...}` in a robot file
@@ -85,8 +84,7 @@ def board_name(number: int) -> str:
     return f"a board unknown to this armkin (number {number})" if kind is None else kind
 
 
-@dataclass(frozen=True)
-class ForeignBoard:
+class ForeignBoard(NamedTuple):
     """A board with somebody else's firmware, or a bus of servos."""
 
     kind: str
@@ -105,8 +103,7 @@ FOREIGN = {
 }
 
 
-@dataclass(frozen=True)
-class Driver:
+class Driver(NamedTuple):
     """What a stepper driver's data sheet asks for; times in 0.1 us, `wake` in ms."""
 
     step_high: int

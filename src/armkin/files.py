@@ -14,7 +14,7 @@ from armkin.errors import FileError, UsageError
 _APPEND = {"w": "a", "wb": "ab"}
 
 
-_ROBOT = re.compile(rb"^convention[ \t]*:", re.MULTILINE), re.compile(rb"^joints[ \t]*:", re.MULTILINE)
+_ROBOT = rb"(?m)^convention[ \t]*:", rb"(?m)^joints[ \t]*:"
 _HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are shorter
 _kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
@@ -87,7 +87,7 @@ def _check_replaceable(name: str, real: str, there: os.stat_result) -> None:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
     with open(real, "rb") as file:
         head = file.read(_HEAD)
-    if all(key.search(head) for key in _ROBOT):
+    if all(re.search(key, head) for key in _ROBOT):
         raise UsageError(f"{name} is a robot file, which no output replaces; give another name", file=name)
     if (there.st_dev, there.st_ino) in _kept:
         raise UsageError(f"{name} is what this command reads; give the output another name", file=name)

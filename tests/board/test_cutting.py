@@ -175,7 +175,7 @@ def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float
     end = [n, *(round(share * n) for share in of)]
     rates, accels = ([math.ceil(most * abs(x) / n) for x in end] for most in (rate * 1.05, accel))
     axes = [AxisImage(True, False, -n, n, 0, max(1, v), max(1, a)) for v, a in zip(rates, accels, strict=True)]
-    velocity = Velocity(replace(BOARDS["uno_cnc_shield"], min_interval=MIN_INTERVAL), Image(tuple(axes)))
+    velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=MIN_INTERVAL), Image(tuple(axes)))
     for s in straight_lines.line([0, 0, 0], end, rate / n, accel / n).segments:
         velocity.begin(s)
         for axis, made_of in enumerate(s.rates):

@@ -18,7 +18,6 @@ from armkin import errors
 from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
-from armkin.cli.numbers import is_number
 
 RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED = 1, 2, 3, 4, 5, 130
 
@@ -250,6 +249,8 @@ def _meant(error: Any, context: Any) -> list[str]:
 def _unexpected(error: Exception) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
+        from armkin.cli.numbers import is_number
+
         message = str(error.format_message()).rstrip(".")
         context = getattr(error, "ctx", None)
         if possible := _meant(error, context):

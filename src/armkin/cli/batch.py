@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from armkin.cli import output
-from armkin.cli.csv_rows import Chunk
 from armkin.cli.render import to_json
+from armkin.cli.rows import Chunk
 from armkin.errors import NoSolutionError
 
 _MOST_TEXT = 1_000_000  # characters that are written at once

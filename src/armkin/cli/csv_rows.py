@@ -7,45 +7,19 @@ import csv
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import IO, TYPE_CHECKING, NamedTuple
+from typing import IO
 
 from armkin import files
 from armkin.cli import output
 from armkin.cli.numbers import LARGEST, numbers
+from armkin.cli.rows import ROWS, Chunk
 from armkin.errors import FileError, UsageError
 
-if TYPE_CHECKING:
-    from armkin.formula.arrays import Array
-
-ROWS = 4096  # rows in memory at a time
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
 _TARGETS = "; targets are solved first: armkin ik ROBOT --batch FILE --continuous | this command with --batch -"
-
-
-class Chunk(NamedTuple):
-    """Some rows: their numbers in the file, from 1, and their values (N, m)."""
-
-    numbers: Sequence[int]
-    values: Array
-
-
-def one_row(values: Sequence[float]) -> Chunk:
-    """A chunk of the one row that the command line gives."""
-    import numpy as np
-
-    return Chunk([1], np.array([values]))
-
-
-def all_rows(values: Sequence[Sequence[float]]) -> Iterator[Chunk]:
-    """Chunks of rows that are there already."""
-    import numpy as np
-
-    for start in range(0, len(values), ROWS):
-        part = values[start : start + ROWS]
-        yield Chunk(range(start + 1, start + 1 + len(part)), np.array(part))
 
 
 class Columns:

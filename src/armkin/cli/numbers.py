@@ -9,7 +9,7 @@ from armkin.errors import UsageError
 LARGEST = 1e9
 NOT_FINITE = ("nan", "inf", "infinity")
 
-_PI = re.compile(r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?")
+_PI = r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
 _LONGEST = 10_000  # characters of a number
 
@@ -106,7 +106,7 @@ def of_pi(text: str) -> float | None:
     >>> of_pi("-pi/2"), of_pi("3pi/4"), of_pi("pie")
     (-90.0, 135.0, None)
     """
-    found = _PI.fullmatch(text.strip().lower())
+    found = re.fullmatch(_PI, text.strip().lower())
     if found is None or (found[3] is not None and int(found[3]) == 0):
         return None
     return float(f"{found[1]}1") * 180 * float(found[2] or 1) / float(found[3] or 1)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-from armkin import files
 from armkin.errors import FileError, UsageError
 
 Write = Callable[[str], object]
@@ -23,6 +22,8 @@ def destination(path: str | None) -> Iterator[Write]:
     if path == "":
         raise UsageError("--out needs the name of a file")
     if path is not None and path != "-":
+        from armkin import files
+
         with files.whole(path) as file:
             yield file.write
     elif sys.stdout is None:
@@ -50,7 +51,8 @@ def for_programs(wanted: bool, words: Iterable[str] = ()) -> None:
     _waiting = [] if wanted else None
     parts = {part for word in words for part in (word, word.partition("=")[2])}
     _broken = sorted((part for part in parts if part.strip() and len(f"{part}.".splitlines()) > 1), key=len)[::-1]
-    files.forget()
+    if (used := sys.modules.get("armkin.files")) is not None:  # `armkin --help` needs no files
+        used.forget()
 
 
 def warn(message: str) -> None:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula import numpy_code, python_code
 from armkin.formula.arrays import Array
-from armkin.formula.recording import axes_of, record
+
+if TYPE_CHECKING:
+    from armkin.formula import numpy_code
 
 SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
 LENGTHS = 16  # of batches, for which a thread keeps buffers
@@ -22,6 +23,8 @@ class Straight:
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
+        from armkin.formula.recording import record  # here, as one pose from the command line records nothing
+
         self._recording = record(formula, inputs)
         self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
@@ -30,6 +33,8 @@ class Straight:
     def workspace(self, length: int) -> list[NDArray[Any]]:
         """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
         if self._batch is None:
+            from armkin.formula import numpy_code
+
             self._batch = numpy_code.write(self._recording)
         kept: dict[int, list[NDArray[Any]]] = self._kept.__dict__.setdefault("buffers", {})
         if length in kept:
@@ -54,11 +59,15 @@ class Straight:
     def numbers(self) -> Callable[..., tuple[Any, ...]]:
         """The formula for one pose in plain Python: takes numbers; an output on branch axes is a tuple of them."""
         if self._run_single is None:
+            from armkin.formula import python_code
+
             self._run_single = python_code.write(self._recording)
         return self._run_single
 
     def single(self, inputs: Sequence[float]) -> list[Array]:
         """The formula's outputs for one pose, as arrays (*branch axes, 1)."""
+        from armkin.formula.recording import axes_of
+
         values = self.numbers()(*inputs)
         return [
             np.array(v).reshape(*axes_of(x), 1) if isinstance(v, tuple) else np.array([v])

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, piped_answers, render
-from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
+from armkin.cli import inputs, output, render
 from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe
 from armkin.cli.render import fixed
+from armkin.cli.rows import Chunk, all_rows, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -30,11 +29,13 @@ def fk(
 ) -> None:
     """Where the tool is for given joint values."""
     if batch is not None:
+        from armkin.cli.csv_rows import batch_rows
+
         inputs.no_numbers(q)
         arm = inputs.load(inputs.named(robot))
         chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
     else:
-        arm, values = piped_answers.poses(robot, q)
+        arm, values = _poses(robot, q)
         if len(values) == 1:
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out) as write:
@@ -42,6 +43,8 @@ def fk(
             render.warn_of_limits(arm, answer["violations"])
             return
         chunks = all_rows(values)
+    from armkin.cli.batch import run_batch
+
     tally = run_batch(
         chunks,
         out,
@@ -51,6 +54,16 @@ def fk(
         lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
     )
     tally.warn_of_limits()
+
+
+def _poses(robot: str | None, q: list[str] | None) -> tuple[Arm, list[list[float]]]:
+    """The arm and joint values [deg | mm] of the command line, or of an answer on standard input."""
+    if q:
+        arm = inputs.load(inputs.named(robot))
+        return arm, [inputs.joints(arm, q)]
+    from armkin.cli import piped_answers
+
+    return piped_answers.poses(robot, q)
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:

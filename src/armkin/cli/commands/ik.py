@@ -10,7 +10,7 @@ import typer
 
 from armkin.cli import inputs, lock_and_sweep, output, piped_answers, render
 from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
+from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -26,6 +26,7 @@ from armkin.cli.options import (
     TaskName,
 )
 from armkin.cli.render import fixed
+from armkin.cli.rows import Chunk, all_rows, one_row
 from armkin.errors import UsageError
 from armkin.model import units
 

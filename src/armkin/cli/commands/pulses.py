@@ -9,9 +9,10 @@ import typer
 
 from armkin.cli import inputs, output, piped_answers, render
 from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import Chunk, all_rows, batch_rows, one_row
+from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
 from armkin.cli.render import fixed
+from armkin.cli.rows import Chunk, all_rows, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:

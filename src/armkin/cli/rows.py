@@ -1,0 +1,34 @@
+"""Poses or targets in chunks of rows, wherever they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+
+ROWS = 4096  # rows in memory at a time
+
+
+class Chunk(NamedTuple):
+    """Some rows: their numbers in the file, from 1, and their values (N, m)."""
+
+    numbers: Sequence[int]
+    values: Array
+
+
+def one_row(values: Sequence[float]) -> Chunk:
+    """A chunk of the one row that the command line gives."""
+    import numpy as np
+
+    return Chunk([1], np.array([values]))
+
+
+def all_rows(values: Sequence[Sequence[float]]) -> Iterator[Chunk]:
+    """Chunks of rows that are there already."""
+    import numpy as np
+
+    for start in range(0, len(values), ROWS):
+        part = values[start : start + ROWS]
+        yield Chunk(range(start + 1, start + 1 + len(part)), np.array(part))
