@@ -26,9 +26,9 @@ import brute
 from lines import random_line
 
 import armkin
-from armkin.motion.chains import chains, fewest
-from armkin.motion.columns import linked
+from armkin.motion.branch_chains import chains, fewest
 from armkin.motion.curve import Curve
+from armkin.motion.linked_branches import linked
 from armkin.motion.profile import seven_phases
 from armkin.motion.time_optimal import Bounds, Knots, optimal
 

@@ -18,7 +18,7 @@ import pytest
 
 from armkin.board.firmware.protocol import State
 from armkin.board.sim.board import SimBoard
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
 from pty_board import PtyBoard
 

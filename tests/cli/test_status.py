@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from armkin.board.sim.board import SimBoard
-from armkin.hardware import BOARDS
+from armkin.board_kinds import BOARDS
 from command_line import ROOT, THREE_DOF, run
 from sim_wire import plug_in
 
