@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job
-from armkin.board.grbl import gcode, lines, settings
+from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
@@ -27,7 +27,7 @@ from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
-    from armkin.board.grbl.lines import Report
+    from armkin.board.grbl.replies import Report
     from armkin.board.grbl.settings import Axis
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
@@ -194,7 +194,7 @@ class GrblMachine:
 
     def hold(self) -> None:
         """Stop along the path and clear what is queued; the position stays known."""
-        self.session.realtime(lines.HOLD)
+        self.session.realtime(replies.HOLD)
         end = self.port.now() + _REST
         while (status := self.session.status()).state not in ("Idle", "Alarm") and (
             status.state != "Hold" or status.detail
@@ -235,7 +235,7 @@ class GrblMachine:
             except LinkError:
                 return error
             return LinkError(f"{error}; the arm was stopped\n{self.standing()}")
-        if error.alarm == 0 or error.alarm in lines.LOSES_POSITION:
+        if error.alarm == 0 or error.alarm in replies.LOSES_POSITION:
             self._forget()
         return LinkError(f"{error}\n{self.standing()}")
 

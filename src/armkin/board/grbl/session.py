@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING, TypeVar
 
-from armkin.board.grbl import lines
-from armkin.board.grbl.lines import Report
+from armkin.board.grbl import replies
+from armkin.board.grbl.replies import Report
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Session:
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
         self._unseen: Report | None = None
-        self.buffer = lines.RX_BUFFER
+        self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
         self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
         self._other: list[str] = []  # what came between: settings, offsets, messages
@@ -58,7 +58,7 @@ class Session:
         """Wait until GRBL answers a status request. Raises LinkError if it does not."""
         end = self.port.now() + _BOOT
         while self.port.now() < end:
-            self.port.write(lines.STATUS)
+            self.port.write(replies.STATUS)
             if self._wait(lambda: self.report is not None, 0.25):
                 break
         else:
@@ -93,7 +93,7 @@ class Session:
         """A fresh status report."""
         for _ in range(6):  # a request or its answer may be lost
             self.report = None
-            self.port.write(lines.STATUS)
+            self.port.write(replies.STATUS)
             if self._wait(lambda: self.report is not None, patience):
                 assert self.report is not None
                 return self.report
@@ -112,14 +112,14 @@ class Session:
         """Work offsets by name (G54, G92, ...), as three whole readings in a row agree on."""
 
         def read() -> dict[str, tuple[float, ...]]:
-            found = dict(pair for line in self.ask("$#") if (pair := lines.offset(line)) is not None)
+            found = dict(pair for line in self.ask("$#") if (pair := replies.offset(line)) is not None)
             return found if found.keys() >= {"G54", "G92"} else {}
 
         return _agreed(read, self.port.name)
 
     def settings(self) -> dict[int, float]:
         """The answer to ``$$``: number -> value."""
-        return dict(pair for line in self.ask("$$") if (pair := lines.setting(line)) is not None)
+        return dict(pair for line in self.ask("$$") if (pair := replies.setting(line)) is not None)
 
     def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
         """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
@@ -142,7 +142,7 @@ class Session:
             before, now = self._heard, self.port.now()
             if now > asked + _POLL:
                 asked = now
-                self.port.write(lines.STATUS)
+                self.port.write(replies.STATUS)
             self._pump(0.01)
             if self._heard != before:
                 quiet = self.port.now()
@@ -161,7 +161,7 @@ class Session:
 
     def reset(self) -> None:
         """Soft reset: clears GRBL's queue and its offsets; at a standstill it keeps the machine position."""
-        self.port.write(lines.RESET)
+        self.port.write(replies.RESET)
         self._sent.clear()
         self.report = None
         self._wait(lambda: self.was_reset, 1.0)
@@ -201,15 +201,15 @@ class Session:
         elif match := re.fullmatch(r"error:(\d{1,3})", line):
             what = self._sent.popleft()[1] if self._sent else ""
             number = int(match[1])
-            raise GrblError(f"GRBL refused {what!r}: {lines.error(number)} (error {number})", error=number)
+            raise GrblError(f"GRBL refused {what!r}: {replies.error(number)} (error {number})", error=number)
         elif match := re.fullmatch(r"ALARM:(\d{1,3})", line):
             number = int(match[1])
             self._sent.clear()
-            raise GrblError(f"GRBL stopped: {lines.alarm(number)} (alarm {number})", alarm=number)
+            raise GrblError(f"GRBL stopped: {replies.alarm(number)} (alarm {number})", alarm=number)
         elif line.lower().startswith("grbl "):
             self.was_reset = True
             self._sent.clear()
-        elif (found := lines.report(line)) is not None:
+        elif (found := replies.report(line)) is not None:
             self.report = self._unseen = found
             self._heard += found.state not in ("Idle", "Check", "Sleep")  # else it only repeats itself
         elif line:

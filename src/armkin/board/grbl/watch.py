@@ -19,7 +19,7 @@ from armkin.motors import places, pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend.job import Job
-    from armkin.board.grbl.lines import Report
+    from armkin.board.grbl.replies import Report
     from armkin.board.grbl.settings import Axis
     from armkin.formula.arrays import Array
 
