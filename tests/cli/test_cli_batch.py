@@ -15,7 +15,8 @@ import pytest
 
 import armkin
 from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import Chunk, batch_rows
+from armkin.cli.csv_rows import batch_rows
+from armkin.cli.rows import Chunk
 from armkin.errors import UsageError
 from command_line import ROOT, THREE_DOF, run
 
