@@ -20,7 +20,7 @@ bool bench_abort = true;
 uint64_t bench_cycles, bench_ticks;
 bool bench_drivers_on;
 void (*bench_on_tick)(void);
-bool bench_frozen, bench_spill, bench_power_level = true;
+bool bench_frozen, bench_power_level = true;
 
 static uint16_t directions;
 static bool timer_on;
@@ -64,12 +64,6 @@ bool hal_abort_level(void) {
 
 bool hal_power_level(void) {
     return bench_power_level;
-}
-
-bool hal_spilled(void) {
-    const bool since = bench_spill;
-    bench_spill = false;
-    return since;
 }
 
 void hal_probe(uint8_t input, bool high) {
@@ -149,7 +143,7 @@ void bench_power(void) {
     memset(bench_pins, 0, sizeof bench_pins);
     bench_switches = 0xFF;
     bench_abort = bench_power_level = true;
-    bench_frozen = bench_spill = false;
+    bench_frozen = hal_spilled = false;
     bench_reset(0);
 }
 

@@ -22,6 +22,5 @@ extern uint64_t bench_cycles;
 extern uint64_t bench_ticks;
 extern bool bench_drivers_on;
 extern bool bench_frozen;       // the main loop hangs, the ticks go on
-extern bool bench_spill;        // bytes were lost
 extern bool bench_power_level;  // of the motors' supply
 extern void (*bench_on_tick)(void);  // with each tick, once its edges are out

@@ -19,7 +19,6 @@ enum { RING = HAL_RECEIVE + 1, MASK = RING - 1, SENDING = RING / 2, SENDING_MASK
 _Static_assert((RING & MASK) == 0, "powers of two");
 
 static uint8_t received[RING], sending[SENDING];
-static volatile bool spilled;
 static volatile uint8_t received_head, received_tail, sending_head, sending_tail;
 
 ISR(USART_RX_vect) {
@@ -29,7 +28,7 @@ ISR(USART_RX_vect) {
         received[head] = byte;
         received_head = next;
     } else {
-        spilled = true;  // it is lost
+        hal_spilled = true;  // it is lost
     }
 }
 
@@ -51,14 +50,6 @@ bool serial_get(uint8_t *byte) {
     *byte = received[tail];
     received_tail = (tail + 1) & MASK;
     return true;
-}
-
-bool hal_spilled(void) {
-    const bool since = spilled;
-    if (since) {
-        spilled = false;
-    }
-    return since;
 }
 
 uint8_t hal_send_room(void) {

@@ -1,4 +1,4 @@
-// What the core asks of the chip, by calls; chip.h has the rest. src/avr and src/rp2040 implement it; so does the PC test bench.
+// What the core asks of the chip, by calls and one flag; chip.h has the rest. src/avr and src/rp2040 implement it; so does the PC test bench.
 #pragma once
 #include <stdbool.h>
 #include <stdint.h>
@@ -8,7 +8,7 @@
 // Serial line out. A reply goes only if it fits, so that the core never waits.
 uint8_t hal_send_room(void);
 void hal_send(uint8_t byte);
-bool hal_spilled(void);  // since the last call bytes were lost because more than HAL_RECEIVE waited
+extern volatile bool hal_spilled;  // set by the chip when bytes are lost because more than HAL_RECEIVE wait
 
 // The tick timer: its interrupt runs dda.h. start: the first tick comes after `interval` cycles.
 void hal_timer_start(uint16_t interval);

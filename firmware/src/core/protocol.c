@@ -18,6 +18,7 @@ enum { SILENCE_MS = 500 };
 enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32, CUT = 64 };  // flags
 
 struct session session;
+volatile bool hal_spilled;
 
 static uint32_t nonce;
 static bool greeted;  // `nonce` is of a HELLO
@@ -187,7 +188,11 @@ APART void protocol_millisecond(void) {
 
 // Bytes were lost because more of them waited than the host may send: it hears of it at once, and goes back.
 static void watch_line(void) {
-    if (hal_spilled() && !session.error) {
+    if (!hal_spilled) {
+        return;
+    }
+    hal_spilled = false;
+    if (!session.error) {
         session.detail = E_SPILL;
         send_ack(CREDIT);
         session.detail = 0;

@@ -16,7 +16,6 @@ enum { OVERRUN = 1 << 11 };                                // DR
 
 enum { AT_ONCE = 64 };  // bytes, between two looks at the clock
 static uint8_t received[RING], taken[AT_ONCE], sending[SENDING];
-static volatile bool spilled;
 static volatile uint16_t received_head, received_tail;
 static uint16_t sending_head, sending_tail;
 static bool by_usb;
@@ -26,7 +25,7 @@ void uart_interrupt(void) {
         const uint32_t data = REG(UART_DR);
         const uint16_t next = (received_head + 1) & MASK;
         if (next == received_tail || data & OVERRUN) {
-            spilled = true;
+            hal_spilled = true;
         }
         if (next != received_tail) {
             received[received_head] = data;
@@ -63,14 +62,6 @@ uint8_t serial_get(const uint8_t **bytes) {
     received_tail = (tail + count) & MASK;
     awake = true;  // there may be more
     return count;
-}
-
-bool hal_spilled(void) {
-    const bool since = spilled;
-    if (since) {
-        spilled = false;
-    }
-    return since;
 }
 
 uint8_t hal_send_room(void) {

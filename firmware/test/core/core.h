@@ -7,6 +7,7 @@
 #include "../../src/core/bytes.h"
 #include "../../src/core/crc.h"
 #include "../../src/core/dda.h"
+#include "../../src/core/hal.h"
 #include "../../src/core/motion.h"
 #include "../../src/core/protocol.h"
 #include "../host.h"

@@ -52,7 +52,7 @@ static void free_slots_are_told_unasked(void) {
 static void lost_bytes_are_told_at_once(void) {
     uint8_t answer[300];
     fresh(86);
-    bench_spill = true;
+    hal_spilled = true;
     bench_run(1000);
     CHECK(bench_answer(answer, sizeof answer) == 10 && answer[0] == 0x83 && answer[1] == host_next);
     CHECK(answer[2] == OK && answer[3] == E_SPILL);
