@@ -1,12 +1,12 @@
 """Paths against brute force, toppra and ruckig, in one run on one machine.
 
     pip install -e '.[bench]'
-    OPENBLAS_NUM_THREADS=1 python tests/bench/bench_path.py [--lines 50] [--splines 20]
+    OPENBLAS_NUM_THREADS=1 python tests/bench/bench_path.py [--lines 50] [--splines 20] [--tips 2000]
 
-Runs and reach against brute force over every branch, copy and edge at four times the samples (where the two differ,
-brute force is asked again ten times finer about the place); the chosen time against the fastest of all branches; the
-ladder against the arm's own ik batch; the law of time against toppra on the same grid; straight moves with jerk
-against ruckig; what is executed at 1 ms against the limits.
+Runs and reach against brute force over every branch, copy and edge at four times the samples (about the place where a
+run ends again and again, until its samples are 0.005 mm apart; where the runs differ, ten times finer); the chosen time
+against the fastest of all branches; the ladder against the arm's own ik batch; the law of time against toppra on the
+same grid; straight moves with jerk against ruckig; what is executed at 1 ms against the limits.
 """
 
 from __future__ import annotations
@@ -26,12 +26,15 @@ import brute
 from lines import random_line
 
 import armkin
-from armkin.motion.branch_chains import chains, fewest
+from armkin.inverse.tasks.fitting import task_for
+from armkin.motion.branch_chains import Chain, chains, fewest
 from armkin.motion.curve import Curve
+from armkin.motion.geometry import spot
 from armkin.motion.linked_branches import linked
 from armkin.motion.profile import seven_phases
-from armkin.motion.time_optimal import Bounds, Knots, optimal
+from armkin.motion.time_optimal import Bounds, Knots, finer, optimal
 
+SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")
 
 
@@ -44,31 +47,26 @@ def moving(name: str) -> armkin.Arm:
 
 
 def branches(lines: int) -> None:
-    """Reach, worst tip deviation and cost of the ladder."""
-    print("arm            lines  whole  differ  worst dev/um  ladder us/pt  ik us/pt")
+    """Reach, runs, worst tip deviation and cost of the ladder."""
+    print("arm            lines  whole  reach differs (worst/mm)  runs differ  worst dev/um  ladder us/pt  ik us/pt")
     for name in ARMS:
         arm, rng = moving(name), np.random.default_rng(7)
-        whole = differ = 0
-        worst = spent = own = 0.0
+        whole = differ = others = 0
+        off = worst = spent = own = 0.0
         for _ in range(lines):
             way = random_line(arm, rng)
             dense = np.linspace(0, way.length, 1001)
             columns = linked(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
             all_ = chains(arm, columns)
             mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
-            alive = brute.carried(arm, way.targets(dense), 0.05)
             whole += mine >= way.length - 1e-9
-            if abs(mine - (dense[len(alive) - 1] if alive else -1.0)) > 0.3 + 1e-6:
-                before = max(int(np.searchsorted(dense, min(mine, dense[max(len(alive) - 1, 0)]) - 1.0)) - 1, 0)
-                fine = np.linspace(dense[before], way.length, 10_001)
-                finer = len(brute.carried(arm, way.targets(fine), 0.05, start=alive[before])) if alive else 0
-                differ += abs(mine - (fine[finer - 1] if finer else -1.0)) > 0.06
-            for chain in all_:
-                if len(chain.q) > 1:
-                    f = np.linspace(0, 1, 20)[:, None]
-                    a, b = chain.q[:-1, None], chain.q[1:, None]
-                    p = armkin.fk(arm, a + f * (b - a))[..., :3, 3]
-                    worst = max(worst, np.linalg.norm(p - p[:, :1] - f * (p[:, -1:] - p[:, :1]), axis=2).max())
+            apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
+            off, differ = max(off, apart), differ + (apart > 0.01)
+            own_runs = sum(run.last > run.first for run in fewest(all_, len(columns.s)))
+            if own_runs != len(brute.runs(arm, way.targets(dense), 0.05)):
+                finer = np.linspace(0, way.length, 10_001)
+                others += own_runs != len(brute.runs(arm, way.targets(finer), 0.05))
+            worst = max(worst, tips_off(arm, all_))
             s = np.linspace(0, way.length, 10_000)
             targets = way.targets(s)
             began = time.process_time()
@@ -78,7 +76,58 @@ def branches(lines: int) -> None:
             own, spent = own + between - began, spent + time.process_time() - between
         per = 1e6 / lines / 10_000
         print(
-            f"{name:14} {lines:5d} {whole:6d} {differ:7d} {1000 * worst:13.1f} {spent * per:13.1f} {own * per:9.2f}",
+            f"{name:14} {lines:5d} {whole:6d} {differ:7d} ({off:.4f}) {others:20d} {1000 * worst:13.1f} "
+            f"{spent * per:13.1f} {own * per:9.2f}",
+            flush=True,
+        )
+
+
+def tips_off(arm: armkin.Arm, all_: list[Chain]) -> float:
+    """How far the tip leaves its chord at most, on twenty points of every step of all chains [mm]."""
+    worst, f = 0.0, np.linspace(0, 1, 20)[:, None]
+    for chain in all_:
+        for part in np.array_split(np.arange(len(chain.q) - 1), max(len(chain.q) // 2000, 1)):
+            if len(part):
+                a, b = chain.q[part, None], chain.q[part + 1, None]
+                p = armkin.fk(arm, a + f * (b - a))[..., :3, 3]
+                off = np.linalg.norm(p - p[:, :1] - f * (p[:, -1:] - p[:, :1]), axis=2).max()
+                worst = max(worst, float(off))
+    return worst
+
+
+def tips(lines: int) -> None:
+    """The tip between samples on many lines, few samples each: every chain, and what is planned of those carried."""
+    print("arm            lines  chains' steps  beyond 0.05 mm  worst dev/um  planned  beyond  worst/um")
+    for name in SIX:
+        arm, rng = moving(name), np.random.default_rng(31)
+        each = -(-lines // len(SIX))
+        steps = beyond = planned = wrong = 0
+        worst = far = 0.0
+        for _ in range(each):
+            way = random_line(arm, rng)
+            columns = linked(arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home)
+            all_ = chains(arm, columns)
+            steps += sum(len(chain.q) - 1 for chain in all_)
+            off = tips_off(arm, all_)
+            worst, beyond = max(worst, off), beyond + (off > 0.05)
+            ends = way.targets(np.array([0.0, way.length]))
+            try:
+                plan = armkin.path(arm, ends, hold=None)
+            except armkin.NoSolutionError:
+                continue
+            planned += 1
+            curve = plan.motion.stretches[-1]
+            assert isinstance(curve, Curve)
+            t = np.interp(np.arange(20 * len(curve.times)) / 20, np.arange(len(curve.times)), curve.times)
+            p = armkin.fk(arm, curve.at(t))[:, :3, 3]
+            a, b = (spot(task_for(arm), end).p for end in ends)
+            a, b = (np.append(x, p[0, 2])[:3] if len(x) < 3 else x for x in (a, b))
+            d = (b - a) / np.linalg.norm(b - a)
+            off = float(np.linalg.norm(p - a - ((p - a) @ d)[:, None] * d, axis=1).max())
+            far, wrong = max(far, off), wrong + (off > 0.05)
+        print(
+            f"{name:14} {each:5d} {steps:14d} {beyond:15d} {1000 * worst:13.1f} {planned:8d} {wrong:7d} "
+            f"{1000 * far:9.1f}",
             flush=True,
         )
 
@@ -121,17 +170,17 @@ def laws(splines: int) -> None:
     logging.disable(logging.CRITICAL)
     print("joints  points  ours ms  toppra ms  ratio   T ours/toppra - 1 (least, greatest)")
     for n in (3, 6):
-        for N in (1000, 10_000):
+        for N in (100, 200, 1000, 10_000):
             ours = theirs = 0.0
             apart = []
             for seed in range(splines):
                 way = np.random.default_rng(seed).normal(size=(7, n))
                 u, s = np.linspace(0, 1, 7), np.linspace(0, 1, N)
                 curve = CubicSpline(u, way)
-                path = Knots(s, curve(s), curve(s, 1))
                 v, a = np.ones(n), np.full(n, 2.0)
                 began = time.process_time()
-                x = optimal(path, Bounds(v, a, np.full(N, np.inf)))
+                path = finer(Knots(s, curve(s), curve(s, 1)))
+                x = optimal(path, Bounds(v, a, np.full(len(path.s), np.inf)))
                 between = time.process_time()
                 bounds = [
                     constraint.JointVelocityConstraint(np.stack([-v, v], 1)),
@@ -175,7 +224,11 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--lines", type=int, default=50)
     parser.add_argument("--splines", type=int, default=20)
+    parser.add_argument("--tips", type=int, default=0, help="lines on six arms, 20 points a step, and nothing else")
     given = parser.parse_args()
+    if given.tips:
+        tips(given.tips)
+        return
     straight(2000)
     laws(given.splines)
     chosen(given.lines)

@@ -7,6 +7,7 @@ step, stays within the tolerance of the straight line between its ends, and the 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,35 @@ def carried(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray |
             break
         out.append(n.q[i + 1][edges(arm, out[-1], n.q[i + 1], tolerance).any(axis=0)])
     return out if len(out[-1]) else out[:-1]
+
+
+def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
+    """The fewest runs that carry all that can be carried, as first and last samples: each goes as far as any can."""
+    n = nodes(arm, targets)
+    goes = [edges(arm, n.q[i], n.q[i + 1], tolerance) for i in range(len(targets) - 1)]
+    out = []
+    i = 0
+    while i < len(goes):
+        alive: np.ndarray = np.ones(len(n.q[i]), bool)
+        begin = i
+        while i < len(goes) and goes[i][alive].any():
+            alive, i = goes[i][alive].any(axis=0), i + 1
+        if i > begin:
+            out.append((begin, i))
+        else:
+            i += 1
+    return out
+
+
+def zoomed(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray, tolerance: float) -> float:
+    """The length that some run from the first sample arrives at, to a two-hundredth of a millimetre; -1: no start."""
+    start = None
+    while True:
+        alive = carried(arm, targets(s), tolerance, start=start)
+        if not alive or len(alive) == len(s) or s[1] - s[0] < 0.005:
+            return float(s[len(alive) - 1]) if alive else -1.0
+        k = max(len(alive) - 3, 0)
+        start, s = alive[k], np.linspace(s[k], s[min(len(alive) + 1, len(s) - 1)], 41)
 
 
 def reach(arm: Arm, targets: np.ndarray, tolerance: float) -> int:

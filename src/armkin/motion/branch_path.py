@@ -19,7 +19,7 @@ from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.linked_branches import Columns, change, chord_bound, levers, linked
 from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, Knots, hold_cap, knots, optimal
+from armkin.motion.time_optimal import Bounds, Knots, finer, hold_cap, knots, optimal
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
@@ -147,8 +147,9 @@ def stretches(
         if b - a <= 1e-9:
             continue
         number = max(int(grid * (b - a) / route.length), 60)
-        for damping, finer in [(d, 2**k) for d in _DAMPING for k in range(5)]:
-            path, breaks = _on_grid(arm, route, s, q, a, b, number * finer, damping)
+        here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
+        for damping, times in [(d, 2**k) for d in _DAMPING for k in range(5)]:
+            path, breaks = _on_grid(arm, route, s[here], q[here], a, b, number * times, damping)
             off = 0.0 if grid < _GRID else deviation(arm, route, path)
             if off <= pace.tolerance:
                 break
@@ -167,7 +168,8 @@ def _on_grid(
     arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, damping: float
 ) -> tuple[Knots, list[int]]:
     """Joint values on a grid from a to b that follows way and joints, exact to the inverse kinematics."""
-    inside = [float(x) for x in route.ends if a + 1e-9 < x < b - 1e-9]
+    first, last = np.searchsorted(route.ends, [a + 1e-9, b - 1e-9])
+    inside = route.ends[first:last].tolist()
     moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
     at = np.interp([a, *inside, b], s, measure)
@@ -177,7 +179,7 @@ def _on_grid(
     for (x, y), (m, n) in zip(pairwise([a, *inside, b]), pairwise(at.tolist()), strict=True):
         share = _MOTION * (n - m) / total + (1 - _MOTION) * (y - x) / (b - a)
         count = max(int(number * share), each)
-        here = s[(s > x) & (s < y)]
+        here = s[np.searchsorted(s, x, side="right") : np.searchsorted(s, y)]
         grid = np.concatenate([[x], here, [y]])
         level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
         parts.append(np.interp(np.linspace(level[0], level[-1], count + 1)[:-1], level, grid))
@@ -235,6 +237,7 @@ def deviation(arm: Arm, route: Route, path: Knots) -> float:
 
 def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
     """The fastest law of time on a grid."""
+    path = finer(path)
     fraction, tool = route.limit(path.s, pace.speed, pace.tool_speed)
     tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
     with np.errstate(over="ignore"):

@@ -17,7 +17,6 @@ from armkin.forward import condition, fk
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model import units
 from armkin.model.limits import outside, said
 from armkin.motion import geometry, path_numbers, report
 from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
@@ -30,11 +29,13 @@ from armkin.motion.route import joined
 from armkin.motion.trajectory import Straight, Stretch
 
 if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.path_file import Move, PathFile
 
 TOLERANCE = 0.05  # [mm]
 HOLD = 1.5  # of max_accel, on a hold
+_OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
 
 
 def path(
@@ -75,7 +76,7 @@ def path(
     from armkin.path_file.model import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
     check_rates(arm)
-    file = read_moves(arm, moves, task)
+    file = path_numbers.moves(arm, moves, task)
     check_robot(file, arm.name, arm.path)
     for name, value in (("speed", speed), ("accel", accel)):
         check_share(name, value)
@@ -103,37 +104,13 @@ def path(
     return walk.walked()
 
 
-def read_moves(arm: Arm, moves: Any, task: str | None = None) -> PathFile:
-    """Whatever `armkin.path` takes as the model of a path file."""
-    from armkin import path_file
-
-    if isinstance(moves, path_file.PathFile):
-        return moves
-    if isinstance(moves, str | os.PathLike):
-        return path_file.read(os.fspath(moves))
-    if isinstance(moves, Mapping):
-        return path_file.validated(dict(moves))
-    definition = task_for(arm, task)
-    rows = np.asarray(moves, dtype=float)
-    if definition.orientation == "full" and rows.ndim == 3:
-        from armkin.model.rotation import rpy
-
-        rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
-    elif rows.ndim == 2:
-        unit = [units.DEGREE if u == "deg" else 1.0 for u in units.label_units(definition.labels)]
-        rows = rows / np.array(unit)[: rows.shape[-1]]
-    if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
-        raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
-    listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
-    return path_file.validated({"moves": listed, "task": definition.name})
-
-
 class _Walk:
     """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
 
     split = False
     branch: str | None = None
     samples: int | None = None
+    _spot: Spot | None = None
     at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
     def __init__(
@@ -148,19 +125,39 @@ class _Walk:
     ) -> None:
         self.arm, self.file, self.pace = arm, file, pace
         with _told(file, "task"):
-            self.task = task_for(arm, task or file.task)
+            self.plan = PathPlan(arm, self._task(task or file.task), pace.tolerance)
         self.blend = file.blend if blend is None else blend
         self.q = here  # where the joints are when all so far is done
         self.near = near
         self.made: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
-        self.plan = PathPlan(arm, self.task, pace.tolerance)
         self._clear(None)
+
+    def _task(self, name: str | None) -> Task | None:
+        """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
+        try:
+            return task_for(self.arm, name)
+        except UsageError:
+            if name is None and all(move.kind in _OF_JOINTS for move in self.file.moves):
+                return None
+            raise
+
+    @property
+    def task(self) -> Task:
+        """What targets prescribe. Raises UsageError if no task fits the arm."""
+        return self.plan.task or task_for(self.arm, None)
+
+    @property
+    def spot(self) -> Spot:
+        """Where the tool is when all that has gathered is done."""
+        if self._spot is None:
+            self._spot = geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+        return self._spot
 
     def _clear(self, goal: Spot | None, branch: str | None = None) -> None:
         """Begin a group: at a target whose branch is free, or where the joints are."""
         self.goal, self.goal_branch, self.group = goal, branch, self.at
-        self.spot = goal or geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+        self._spot = goal
         self.pieces: list[Piece] = []
         self.blends: list[float] = []
         self.pauses: dict[int, list[tuple[str, Any]]] = {}
@@ -281,7 +278,7 @@ class _Walk:
         self.group = (self.group if self.goal is not None or self.pieces else self.at)[0], self.at[1]
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
         self.blends.append(self.blend if move.blend is None else move.blend)
-        self.spot = piece.last
+        self._spot = piece.last
 
     def _target(self, value: list[float]) -> Spot:
         return path_numbers.target(self.task, self.spot, value)

@@ -1,7 +1,8 @@
-"""The numbers of a path file, in millimetres and degrees, as joint values and targets."""
+"""Moves as a path file has them, and its numbers, in millimetres and degrees, as joint values and targets."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -10,12 +11,39 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
 from armkin.motion.geometry import Spot, spot
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
+    from armkin.path_file import PathFile
+
+
+def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
+    """Whatever `armkin.path` takes as the model of a path file."""
+    from armkin import path_file
+
+    if isinstance(given, path_file.PathFile):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return path_file.read(os.fspath(given))
+    if isinstance(given, Mapping):
+        return path_file.validated(dict(given))
+    definition = task_for(arm, task)
+    rows = np.asarray(given, dtype=float)
+    if definition.orientation == "full" and rows.ndim == 3:
+        from armkin.model.rotation import rpy
+
+        rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
+    elif rows.ndim == 2:
+        unit = [units.DEGREE if u == "deg" else 1.0 for u in units.label_units(definition.labels)]
+        rows = rows / np.array(unit)[: rows.shape[-1]]
+    if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
+        raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
+    listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
+    return path_file.validated({"moves": listed, "task": definition.name})
 
 
 def joints(arm: Arm, now: Array, value: Any) -> Array:

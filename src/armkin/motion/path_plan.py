@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from armkin.formula.arrays import Array
 from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.trajectory import Stretch, Trajectory
+from armkin.motion.trajectory import Stretch, Trajectory, grouped
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -70,7 +70,7 @@ class PathPlan:
     """
 
     arm: Arm
-    task: Task
+    task: Task | None  # None: joint moves alone, on an arm that no task fits
     tolerance: float
     length: float = 0.0
     samples: int = 0
@@ -118,13 +118,16 @@ class PathPlan:
 
     def s(self, t: ArrayLike) -> Array:
         """Way of the tool along its path at times t: (...,) [mm]; before, between and behind it stays."""
-        when = np.atleast_1d(np.asarray(t, dtype=float))
+        when = np.asarray(t, dtype=float).ravel()
         out = np.zeros(len(when))
-        begins = self.motion.begins
-        for k, (stretch, base) in sorted(self.on_path.items()):
-            if isinstance(stretch, Curve | Smoothed):
-                late = when >= begins[k]
-                out[late] = base + stretch.way(when[late] - begins[k])
+        numbers = sorted(self.on_path)
+        begins = self.motion.begins[numbers]
+        last = np.searchsorted(begins, when, side="right") - 1  # on the way, or behind it
+        for i, here in grouped(last):
+            if i >= 0:
+                stretch, base = self.on_path[numbers[i]]
+                assert isinstance(stretch, Curve | Smoothed)
+                out[here] = base + stretch.way(when[here] - begins[i])
         return out.reshape(np.shape(t))
 
     def s_range(self, number: int) -> tuple[float, float]:

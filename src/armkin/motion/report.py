@@ -92,7 +92,7 @@ def answer(plan: PathPlan) -> dict[str, Any]:
     planned = plan.trajectory is not None
     worst = plan.nearest_singularity
     return {
-        "task": plan.task.name,
+        "task": None if plan.task is None else plan.task.name,
         "length_mm": plan.length,
         "duration_s": plan.duration if planned else None,
         "samples": plan.samples,

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.geometry import SMALL, Piece, blend
+from armkin.motion.trajectory import grouped
 
 _SMOOTH = 1e-3  # [rad] between two directions that count as one
 
@@ -33,16 +35,14 @@ class Route:
         """Whole length [mm, and 30 mm per rad]."""
         return float(self.ends[-1])
 
-    def which(self, s: Array) -> Array:
+    def which(self, s: Array) -> NDArray[np.intp]:
         """Number of the piece at lengths s (N,)."""
         return np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, len(self.pieces) - 1)
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,), increasing or not."""
-        which = self.which(s)
         out: Array | None = None
-        for k in np.unique(which):
-            here = which == k
+        for k, here in grouped(self.which(s)):
             values = self.pieces[k].targets(s[here] - self.ends[k])
             if out is None:
                 out = np.empty((len(s), *values.shape[1:]))
@@ -50,12 +50,20 @@ class Route:
         assert out is not None
         return out
 
+    @cached_property
+    def _paces(self) -> tuple[Array, Array]:
+        """Fraction of the joints' speed and tool speed of every piece; nan: it has none of its own."""
+        return tuple(  # type: ignore[return-value]
+            np.array([np.nan if x is None else x for x in each])
+            for each in ([p.speed for p in self.pieces], [p.tool_speed for p in self.pieces])
+        )
+
     def limit(self, s: Array, speed: float, tool: float | None) -> tuple[Array, Array]:
         """Fraction of the joints' speed and tool speed [mm/s] (inf: none) in the intervals between s: (N - 1,) each."""
         which = self.which((s[:-1] + s[1:]) / 2)
-        parts = [p.speed if p.speed is not None else speed for p in self.pieces]
-        tools = [p.tool_speed if p.tool_speed is not None else tool for p in self.pieces]
-        return np.array(parts)[which], np.array([np.inf if t is None else t for t in tools])[which]
+        parts, tools = (own[which] for own in self._paces)
+        most = np.inf if tool is None else tool
+        return np.where(np.isnan(parts), speed, parts), np.where(np.isnan(tools), most, tools)
 
 
 def joined(
@@ -69,12 +77,14 @@ def joined(
     made: list[Piece] = []
     side = 0.0  # of the last piece, before it was cut
     stops, order = {0}, {}
+    rests: set[int] = set()  # values of `order`
     for k, piece in enumerate(pieces):
         if k in pauses:
             order[k] = len(made)
+            rests.add(len(made))
         if piece.length < SMALL:
             continue
-        if not made or order.get(k) == len(made) or len(made) in order.values():
+        if not made or order.get(k) == len(made) or len(made) in rests:
             stops.add(len(made))
             made.append(piece)
             side = piece.length

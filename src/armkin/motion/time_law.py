@@ -13,7 +13,7 @@ from armkin.forward import as_joints, position
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.plan import check_rates
-from armkin.motion.time_optimal import Bounds, hold_cap, knots, optimal
+from armkin.motion.time_optimal import Bounds, finer, hold_cap, knots, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -51,10 +51,10 @@ def time_law(
         raise UsageError(f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {way.shape}")
     if not (np.isfinite(values).all() and np.isfinite(way).all() and (np.diff(way) > 0).all()):
         raise UsageError("samples must be finite, and s must increase from each to the next")
-    path = knots(way, values)
-    cap = np.full(len(way), np.inf)
+    path = finer(knots(way, values))
+    cap = np.full(len(path.s), np.inf)
     if tool_speed is not None:
-        tip = np.linalg.norm(np.diff(position(arm, values), axis=0), axis=1) / path.h
+        tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
         tip = np.maximum(np.append(tip, 0.0), np.append(0.0, tip))
         cap = (tool_speed / np.maximum(tip, 1e-150)) ** 2
     if hold is not None:

@@ -32,7 +32,8 @@ _TINY = 1e-300
 _MOST = 1e18  # of x, where nothing bounds it
 _EXCESS = 1.001  # of an acceleration, between grid points
 _ROUNDS = 6
-_FEW = 400  # grid points: their intervals are long, and bounded in the middle from the first round on
+_FEW = 400  # samples of a way: the law needs more grid points
+_AT_ONCE = 4096  # grid points that are looked at together
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,30 @@ def _slopes(s: Array, q: Array) -> Array:
     return out
 
 
+def finer(path: Knots) -> Knots:
+    """The same cubics on more grid points, if there are few: u is constant between two of them.
+
+    With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
+    """
+    if len(path.s) >= _FEW:
+        return path
+    parts = max(2, round(200 / len(path.s)))
+    h = path.h[:, None, None]
+    f = (np.arange(parts) / parts)[:, None]
+    d0, d1 = path.d[:-1, None] * h, path.d[1:, None] * h
+    chord = np.diff(path.q, axis=0)[:, None]
+    c2, c3 = 3 * chord - 2 * d0 - d1, d0 + d1 - 2 * chord
+    q = path.q[:-1, None] + f * (d0 + f * (c2 + f * c3))
+    d = (d0 + f * (2 * c2 + 3 * f * c3)) / h
+    s = path.s[:-1, None] + path.h[:, None] * f[:, 0]
+    n = path.q.shape[1]
+    return Knots(
+        np.append(s.ravel(), path.s[-1]),
+        np.concatenate([q.reshape(-1, n), path.q[-1:]]),
+        np.concatenate([d.reshape(-1, n), path.d[-1:]]),
+    )
+
+
 @dataclass(frozen=True)
 class _Motion:
     """What is bounded along the intervals: joints, and motors that turn several of them; k of them in all."""
@@ -161,7 +186,7 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     if len(cap) < 2:
         return np.asarray(cap)
     motion = _motion(path, accel, rows)
-    inside: list[Array | float] = [0.0, 0.5, 1.0] if len(cap) < _FEW else [0.0, 1.0]
+    inside: list[Array | float] = [0.0, 1.0]
     for _ in range(_ROUNDS):
         x = _fastest(cap.copy(), motion, inside)
         over, where = motion.excess(x)
@@ -200,21 +225,19 @@ def _rows(motion: _Motion, inside: Sequence[Array | float]) -> tuple[Array, Arra
 
 
 def _meeting(cap: Array, slope: Array, level: Array) -> Array:
-    """The largest x, up to cap, at which some u keeps to all rows: Newton on the least of affine functions."""
-    x = cap.copy()
-    open_ = np.arange(len(x))
-    for _ in range(50):
-        sl, lv, here = slope[open_], level[open_], x[open_]
-        moved = sl * here[:, None]
-        low, high = -lv - moved, lv - moved
-        top = high.min(axis=1)
-        wrong = np.flatnonzero(low.max(axis=1) > top + 1e-12 * np.abs(top))
-        if not len(wrong):
-            break
-        open_, i = open_[wrong], np.arange(len(wrong))
-        sl, lv, j, k = sl[wrong], lv[wrong], low[wrong].argmax(axis=1), high[wrong].argmin(axis=1)
-        x[open_] = np.minimum((lv[i, k] + lv[i, j]) / (sl[i, k] - sl[i, j]), here[wrong])
-    return x
+    """The largest x, up to cap, at which some u keeps to all rows: where the first two of them exclude each other.
+
+    u is at least -level_i - slope_i x and at most level_j - slope_j x, for all i and j.
+    """
+    i, j = np.triu_indices(slope.shape[1], 1)
+    out = cap.copy()
+    for begin in range(0, len(cap), _AT_ONCE):
+        part = slice(begin, begin + _AT_ONCE)
+        sl, lv = slope[part], level[part]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            met = (lv[:, i] + lv[:, j]) / np.abs(sl[:, i] - sl[:, j])
+        out[part] = np.fmin(out[part], np.fmin.reduce(met, axis=1, initial=np.inf))
+    return out
 
 
 class _Least(NamedTuple):

@@ -6,12 +6,14 @@ It is said in joints and seconds and knows no board: counts, clock cycles and wh
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -151,7 +153,15 @@ class Trajectory:
         out = np.tile(self.start if order == 0 else np.zeros(self.arm.n), (len(flat), 1))
         which = np.searchsorted(self.begins, flat, side="right") - 1
         which = np.clip(which, 0, max(len(self.stretches) - 1, 0))
-        for k in np.unique(which) if self.stretches else ():
-            here = which == k
+        for k, here in grouped(which) if self.stretches else ():
             out[here] = self.stretches[k].at(flat[here] - self.begins[k], order)
         return out.reshape(*when.shape, self.arm.n)
+
+
+def grouped(which: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Numbers (N,) that occur, each once, and where it stands: in time that grows with N alone."""
+    order = np.argsort(which, kind="stable")
+    edges = [0, *(np.flatnonzero(np.diff(which[order])) + 1).tolist(), len(which)]
+    for a, b in pairwise(edges):
+        if b > a:
+            yield int(which[order[a]]), order[a:b]

@@ -81,8 +81,6 @@ def path(
     """
     if start is not None and port is not None and not dry_run:
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
-    if port is not None and lock:
-        raise UsageError("--lock plans only: leave --port out")
     if plot is not None:
         from armkin.plot import canvas
 
@@ -90,15 +88,16 @@ def path(
         canvas.require()
     import numpy as np
 
-    arm = inputs.load(robot)
-    held = lock_and_sweep.locks(arm, lock)
-    if held:
-        import armkin
+    import armkin
 
-        arm = armkin.lock(arm, {n: v if arm.prismatic[arm.joint_names.index(n)] else v * units.DEGREE
-                                for n, v in held.items()})  # fmt: skip
-    moves = _moves(arm, file, via, task)
+    arm = inputs.load(robot)
+    held = {
+        name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
+        for name, value in lock_and_sweep.locks(arm, lock).items()
+    }
+    moves = _moves(armkin.lock(arm, held) if held else arm, file, via, task)
     options: dict[str, Any] = {
+        "held": held,
         "branch": branch,
         "task": task,
         "tolerance": _positive(tolerance, "--tolerance", 1e-6),
@@ -120,7 +119,7 @@ def path(
             options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--start"))
         plan = _planned(arm, moves, options, json=json)
         _files(plan, out, plot)
-        found = _found(plan, _rehearsed(plan) if not held else None)
+        found = _found(plan, _rehearsed(plan))
         _print(plan, found, json=json)
         return
     _carried_out(
@@ -236,7 +235,12 @@ def _planned(arm: Arm, moves: Any, options: dict[str, Any], *, json: bool) -> Pa
     """The plan; of a path that is not carried, what is known of it is printed first."""
     import armkin
 
+    held = options.pop("held", None)
     try:
+        if held:
+            from armkin.motion.held import path_held
+
+            return path_held(arm, moves, held, **options)
         return armkin.path(arm, moves, **options)
     except NoSolutionError as error:
         plan: PathPlan | None = getattr(error, "plan", None)

@@ -1,0 +1,101 @@
+"""Paths of arms with joints held at fixed values: planned for the joints that are free, told and moved for all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import NoSolutionError
+from armkin.formula.arrays import Array
+from armkin.model.lock import lock, unlock
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.path import path
+from armkin.motion.path_plan import PathPlan
+from armkin.motion.plan import check_limits, check_rates, straight
+from armkin.motion.time_optimal import Knots
+from armkin.motion.trajectory import Straight, Stretch
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def path_held(
+    arm: Arm,
+    moves: Any,
+    held: Mapping[str, float],
+    *,
+    start: ArrayLike | None = None,
+    near: ArrayLike | None = None,
+    jerk: Array | None = None,
+    **options: Any,
+) -> PathPlan:
+    """`armkin.path` with joints held: joint name -> value [rad | mm]. The plan is one of the whole arm.
+
+    start, near, jerk: (n,) of all joints, options as in `armkin.path`. The held joints go to their values first, by a
+    joint move. Raises as `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
+    """
+    check_rates(arm)
+    free = lock(arm, held)
+    kept = [k for k, name in enumerate(arm.joint_names) if name not in held]
+    here = arm.home if start is None else np.asarray(start, dtype=float)
+    ready = unlock(arm, held, here[kept])
+    check_limits(arm, ready[None])
+    parts: dict[str, Any] = {
+        name: np.asarray(value)[kept] for name, value in (("near", near), ("jerk", jerk)) if value is not None
+    }
+    try:
+        plan = path(free, moves, start=here[kept], **parts, **options)
+    except NoSolutionError as error:
+        if (refused := getattr(error, "plan", None)) is not None:
+            error.plan = _of_all(refused, arm, held)  # type: ignore[attr-defined]
+        raise
+    whole = _of_all(plan, arm, held)
+    first = straight(arm, here, ready, options.get("speed", 1.0), options.get("accel", 1.0), jerk)
+    before: list[Stretch] = [first] if first.duration else []
+    made = [_widened(one, arm, held) for one in plan.motion.stretches]
+    moved = len(before)
+    for k, (_, base) in plan.on_path.items():
+        whole.along(k + moved, made[k], base)
+    return whole.finished(here, before + made, [replace(m, before=m.before + moved) for m in plan.markers])
+
+
+def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
+    """What is known of a plan's branches, with the values of all joints; without its motion."""
+
+    def whole(q: Array) -> Array:
+        return unlock(arm, held, q)
+
+    worst = plan.nearest_singularity
+    return replace(
+        plan,
+        arm=arm,
+        runs=[replace(r, start_joints=whole(r.start_joints), end_joints=whole(r.end_joints)) for r in plan.runs],
+        branches=[replace(b, start_joints=whole(b.start_joints)) for b in plan.branches],
+        reconfigurations=[
+            replace(r, index=None if r.joint is None else arm.joint_names.index(r.joint)) for r in plan.reconfigurations
+        ],
+        nearest_singularity=None if worst is None else (*worst[:2], whole(worst[2])),
+        markers=[],
+        trajectory=None,
+        on_path={},
+    )
+
+
+def _widened(stretch: Stretch, arm: Arm, held: Mapping[str, float]) -> Stretch:
+    """The same motion with the held joints at rest."""
+    if isinstance(stretch, Smoothed):
+        return replace(stretch, curve=_curve(stretch.curve, arm, held))
+    if isinstance(stretch, Curve):
+        return _curve(stretch, arm, held)
+    assert isinstance(stretch, Straight)
+    return replace(stretch, start=unlock(arm, held, stretch.start), end=unlock(arm, held, stretch.end))
+
+
+def _curve(curve: Curve, arm: Arm, held: Mapping[str, float]) -> Curve:
+    still = dict.fromkeys(held, 0.0)
+    way = curve.path
+    return Curve(Knots(way.s, unlock(arm, held, way.q), unlock(arm, still, way.d)), curve.x)

@@ -1,0 +1,82 @@
+"""`armkin path --lock`: planned for the joints that are free, moved and told for all; joint moves need no task."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from command_line import ROOT, run
+
+MOVES = "moves:\n  - point: [450, 200]\n  - line: [350, 300]\n"
+
+
+@pytest.fixture
+def planar(tmp_path: Path) -> Path:
+    """The planar arm of three servos, with rates."""
+    text = (ROOT / "robots/planar_3dof.yaml").read_text()
+    arm = tmp_path / "planar.yaml"
+    arm.write_text(
+        text.replace("    drive:", "    limits: [-90, 90]\n    max_speed: 60\n    max_accel: 120\n    drive:")
+    )
+    return arm
+
+
+def test_a_held_joint_goes_to_its_value_first_and_stays(planar: Path, tmp_path: Path) -> None:
+    path = tmp_path / "way.yaml"
+    path.write_text(MOVES)
+    out = tmp_path / "way.csv"
+    done = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--port", "sim", "--json", "--out", out)
+    assert done.code == 0, done.err
+    arm = armkin.load(planar)
+    assert done.json["task"] == "xy"
+    assert done.json["joints"][2] == pytest.approx(20, abs=0.1)  # what the servo makes of it
+    assert done.json["pulses"] == armkin.pulses(arm, np.deg2rad(done.json["joints"])).tolist()
+    assert list(done.json["limits"]["speed"]) == ["q1", "q2", "q3"]
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    q = np.deg2rad([[float(row[name]) for name in ("q1", "q2", "q3")] for row in rows])
+    on = np.array([float(row["s_mm"]) for row in rows]) > 0
+    assert q[0, 2] == 0
+    assert np.allclose(q[on, 2], np.deg2rad(20))
+    tips = armkin.fk(arm, q[on])[:, :2, 3]
+    assert np.abs(tips.sum(axis=1) - 650).max() < 0.05 * np.sqrt(2)  # on the line
+    assert tips[-1] == pytest.approx([350, 300], abs=1e-6)
+    planned = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json").json
+    assert planned["duration_s"] == pytest.approx(done.json["duration_s"], abs=0.01)
+    there = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--start", "0,0,20", "--json").json
+    assert there["duration_s"] < planned["duration_s"]
+
+
+def test_a_held_joint_outside_its_limits_or_a_way_beyond_the_reach_moves_nothing(planar: Path, tmp_path: Path) -> None:
+    path = tmp_path / "way.yaml"
+    path.write_text(MOVES)
+    done = run("path", planar, path, "--lock", "q3=120", "--task", "xy", "--port", "sim")
+    assert done.code == 3
+    assert "q3 = 120 deg is outside -90 to 90 deg: nothing was moved" in done.err
+    path.write_text("moves:\n  - point: [450, 200]\n  - line: [850, 200]\n")
+    done = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json")
+    assert done.code == 3
+    assert [len(branch["start_joints"]) for branch in done.json["branches"]] == [3, 3]
+
+
+def test_joint_moves_need_no_task(tmp_path: Path) -> None:
+    arm = tmp_path / "head.yaml"
+    text = (ROOT / "robots/pan_tilt.yaml").read_text()
+    arm.write_text("\n".join(
+        f"{line}\n    max_speed: 60\n    max_accel: 120" if line.startswith("    dh:") else line
+        for line in text.splitlines()
+    ))  # fmt: skip
+    path = tmp_path / "look.yaml"
+    path.write_text("moves:\n  - joint: [30, 20]\n  - wait: 0.5\n  - joint: {q1: -30}\n  - joint: home\n")
+    done = run("path", arm, path, "--json")
+    assert done.code == 0, done.err
+    assert done.json["task"] is None
+    assert done.json["joints"] == [0, 0]
+    assert done.json["duration_s"] == pytest.approx(1.0 + 0.5 + 1.5 + 1.0)
+    path.write_text("moves:\n  - joint: [30, 20]\n  - line: [1000, 1000, 0]\n")
+    done = run("path", arm, path)
+    assert done.code == 2
+    assert "no task fits its 2 joints" in done.err

@@ -1,0 +1,30 @@
+"""The law of time with few samples: nearly as fast as with many, and within all limits between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+
+
+def way(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A sum of a few waves: smooth, and known wherever it is asked for."""
+    rng = np.random.default_rng(seed)
+    size, phase = rng.normal(size=(4, n)) / 3, rng.uniform(0, 2 * np.pi, (4, n))
+    s = np.linspace(0.0, 1.0, samples)
+    waves = np.sin(np.arange(1, 5)[:, None, None] * 2 * s[:, None] + phase[:, None])
+    return s, (size[:, None] * waves).sum(axis=0)
+
+
+@pytest.mark.parametrize("samples", [60, 100, 200])
+@pytest.mark.parametrize("seed", range(3))
+def test_few_samples_cost_little_time_and_no_limit(seed: int, samples: int) -> None:
+    arm = armkin.load("three_dof")
+    s, q = way(seed, samples, arm.n)
+    law = armkin.time_law(arm, q, s)
+    s, q = way(seed, 3000, arm.n)
+    assert law.duration <= (1 + 0.36 / samples) * armkin.time_law(arm, q, s).duration
+    t = np.linspace(0.0, law.duration, 20_000)
+    assert np.abs(law.qd(t) / arm.max_speed).max() <= 1.002
+    assert np.abs(law.qdd(t) / arm.max_accel).max() <= 1.002
