@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.forward import condition, fk
+from armkin.forward import fk
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -125,22 +125,13 @@ class _Walk:
     ) -> None:
         self.arm, self.file, self.pace = arm, file, pace
         with _told(file, "task"):
-            self.plan = PathPlan(arm, self._task(task or file.task), pace.tolerance)
+            self.plan = PathPlan(arm, _task(arm, file, task or file.task), pace.tolerance)
         self.blend = file.blend if blend is None else blend
         self.q = here  # where the joints are when all so far is done
         self.near = near
         self.made: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
         self._clear(None)
-
-    def _task(self, name: str | None) -> Task | None:
-        """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
-        try:
-            return task_for(self.arm, name)
-        except UsageError:
-            if name is None and all(move.kind in _OF_JOINTS for move in self.file.moves):
-                return None
-            raise
 
     @property
     def task(self) -> Task:
@@ -338,13 +329,7 @@ class _Walk:
             self.made.append(curve)
             self.q = curve.end
             self.plan.deviation = max(self.plan.deviation, deviation(self.arm, carried.route, path_))
-            self._singularity(path_.q, path_.s)
-
-    def _singularity(self, q: Array, s: Array) -> None:
-        worst = condition(self.arm, q)
-        k = int(np.argmax(worst))
-        if self.plan.nearest_singularity is None or worst[k] > self.plan.nearest_singularity[1]:
-            self.plan.nearest_singularity = (self.plan.length + float(s[k]), float(worst[k]), q[k])
+            self.plan.nearer_singularity(path_.q, path_.s)
 
     # Joint moves
 
@@ -369,6 +354,16 @@ class _Walk:
                 return np.asarray(found.q[b])
         what = f" on branch '{wanted}'" if wanted else ""
         raise NoSolutionError(f"a point has no solution within the limits{what}: nothing was moved")
+
+
+def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
+    """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
+    try:
+        return task_for(arm, name)
+    except UsageError:
+        if name is None and all(move.kind in _OF_JOINTS for move in file.moves):
+            return None
+        raise
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.formula.arrays import Array
+from armkin.forward import condition
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.trajectory import Stretch, Trajectory, grouped
 
@@ -87,6 +88,13 @@ class PathPlan:
     def along(self, number: int, stretch: Stretch, base: float) -> None:
         """Note that a stretch is on the tool's way."""
         self.on_path[number] = (stretch, base)
+
+    def nearer_singularity(self, q: Array, s: Array) -> None:
+        """Note where joint values (N, n) at lengths s (N,) behind the present end come nearest to a singularity."""
+        worst = condition(self.arm, q)
+        k = int(np.argmax(worst))
+        if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
+            self.nearest_singularity = (self.length + float(s[k]), float(worst[k]), q[k])
 
     def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """The same with its motion."""
