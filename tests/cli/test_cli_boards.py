@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import armkin
@@ -62,7 +63,8 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         lost = run("send", grbl, -3, 85, -85, "--port", pty.name)
         assert (lost.code, "position is lost" in lost.err) == (5, True)
         moved = run("send", grbl, -3, 85, -85, "--port", pty.name, "--assume-home", "--json")
-        assert moved.json["pulses"] == board.steps[:3] == armkin.pulses(armkin.load(grbl), _rad(-3, 85, -85)).tolist()
+        planned = armkin.pulses(armkin.load(grbl), np.deg2rad([-3, 85, -85])).tolist()
+        assert moved.json["pulses"] == board.steps[:3] == planned
         assert "GRBL has no checksum" in moved.err
         again = run("status", grbl, "--port", pty.name, "--json").json
         assert (again["position"], again["pulses"]) == ("known", moved.json["pulses"])
@@ -72,10 +74,6 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
 
 def _wanted(robot: str) -> dict[int, tuple[str, float]]:
     return wanted(axes_of(armkin.load(robot)))
-
-
-def _rad(*degrees: float) -> list[float]:
-    return [value * 3.141592653589793 / 180 for value in degrees]
 
 
 def test_bus_servos_move_jog_grip_and_tell(bus: str) -> None:
