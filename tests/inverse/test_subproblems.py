@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armkin.formula.arrays import Array
-from armkin.inverse.closed.subproblems import quadratic, trig_quadratic
+from armkin.inverse.closed.subproblems import Pair, quadratic, trig_quadratic
 
 
 def values(e: Array, q: Array) -> Array:
@@ -42,13 +42,16 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     e = forms(kind, np.random.default_rng(1), 4000)
     grid = np.linspace(-np.pi, np.pi, 1001)[:, None]
     vanishing = np.abs(values(e, grid)).max(axis=0) < 1e-9
-    assert trig_quadratic(list(e[:, vanishing]), 1.0)[1].edge.any(axis=(0, 1, 2)).all()
+    nothing = trig_quadratic(list(e[:, vanishing]), 1.0)[1]
+    assert nothing.edge.any(axis=(0, 1, 2)).all()
+    assert np.all(nothing.free)
     e = e[:, ~vanishing]
     scale = np.abs(e).sum(axis=0)
     pair, told = trig_quadratic(list(e), 1.0)
     q = np.arctan2(pair.s, pair.c).reshape(4, -1)
     doubt = np.asarray(told.edge.reshape(-1, e.shape[1]).any(axis=0))
     on_circle = np.abs(pair.c**2 + pair.s**2 - 1).reshape(4, -1) < 1e-12
+    assert not np.any(told.free)
     root = on_circle & (np.abs(values(e, q)) < 1e-12 * scale)
     assert not (on_circle & ~root & ~doubt).any()
     at = values(e, grid)
@@ -64,6 +67,18 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     assert np.where(root[:, n], away, np.inf).min(axis=0)[~doubt[n]].max() < 1e-9
     assert away.min(axis=0).max() < 5e-3  # a root of fourth order is known to the fourth root of rounding
     assert doubt.mean() < {"random": 0.01, "sizes": 0.02}.get(kind, 0.7)
+
+
+def test_a_conic_that_vanishes_on_the_circle_leaves_the_angle_free() -> None:
+    """cos^2 + sin^2 - 1, in rounded multiples, beside one that is off by a little."""
+    k = np.array([0.5, 1.0, 0.1, 7.3e-3, 0.7, 0.7])
+    none = np.zeros(6)
+    off = np.array([0.0, 1e-16, 0.0, 0.0, 1e-9, 1e-3])
+    pair, told = trig_quadratic([-k, none, off, k + off, none, k], 1.0, Pair(0.6, 0.8))
+    assert told.free.tolist() == [True] * 4 + [False] * 2
+    assert np.asarray(told.edge.any(axis=(0, 1, 2)))[:5].all()
+    assert (pair.c[..., :4] == 0.6).all()
+    assert (pair.s[..., :4] == 0.8).all()
 
 
 def test_quadratic() -> None:

@@ -132,6 +132,7 @@ def test_compound_singularities(name: str, q: list[float]) -> None:
         (4, [180, 90, 180, -90, 180, 90]),
         (4, [0, 90, -90, 90, 90, 180]),  # and these are roots of sixth order, which it only approaches
         (4, [0, -90, -90, 90, 90, -90]),
+        (80, [0, 90, 0, -90, -90, 0]),  # a self-motion of which a target moved a little shows nothing
     ],
 )
 def test_singular_pencils_of_right_angled_arms(seed: int, q: list[float]) -> None:
@@ -145,6 +146,37 @@ def test_singular_pencils_of_right_angled_arms(seed: int, q: list[float]) -> Non
         verdict = truth.judge(arm, screw, "pose", joints, target, near)
         truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 60, 1)
         assert verdict, verdict
+
+
+def test_a_pose_that_only_a_moved_target_settled_is_not_complete() -> None:
+    arm, screw, *_ = case(right_angles(np.random.default_rng(80)), "pose")
+    task, _ = solver(arm, "pose")
+    s = armkin.ik(arm, goal(task, screw, np.radians([[0, 90, 0, -90, -90, 0]])).array(), "pose")
+    assert s.status[0] == Status.SINGULAR
+    assert s.free[0].tolist() == [False, True, True, True, False, True]
+    assert s.valid.sum() == 3
+    assert not s.complete[0]
+
+
+@pytest.mark.parametrize("twist", [90.0, -90.0])
+def test_a_quartic_that_says_nothing_leaves_its_joint_free(twist: float) -> None:
+    """Joint 3 in one line with joint 1: any value will do."""
+    rows = [(90.0, 100.0, 50.0), (twist, 100.0, 0.0), (0.0, 200.0, 0.0)]
+    joints = [{"dh": {"alpha": alpha, "a": a, "d": d, "theta": 0.0}} for alpha, a, d in rows]
+    arm, screw, *_ = case({"convention": "standard", "joints": joints}, "xyz")
+    task, geometry = solver(arm, "xyz")
+    assert geometry.why == "RRR: a quartic gives joint 3"
+    q = np.radians([[20.0, 180.0, 70.0], [-100.0, 180.0, -130.0]])
+    target = goal(task, screw, q).array()
+    for near in (None, q):
+        verdict = truth.judge(arm, screw, "xyz", q, target, near)
+        assert verdict, verdict
+        s = verdict.solutions
+        assert (s.status == Status.SINGULAR).all()
+        assert s.free.tolist() == [[True, False, True]] * 2
+        assert (s.valid.sum(axis=1) == 1).all()
+    s = armkin.ik(arm, target, near=np.radians([40.0, 170.0, 50.0]))
+    np.testing.assert_allclose(np.degrees(s.q[:, 0, 1:]), [[180.0, 50.0]] * 2, atol=1e-9)
 
 
 def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -207,21 +207,22 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     known = here < 1e-6 + np.minimum(1e-9 / np.maximum(weak, 1e-300), 1e-3)
     held = np.nan_to_num(np.where(s.free[:, None], 0.0, d).max(axis=2), nan=np.inf)
     on_curve = (s.status == Status.SINGULAR) & (np.where(s.valid, held, np.inf).min(axis=1, initial=np.inf) < 1e-4)
-    for k in np.flatnonzero(reached & ~none & ~known & ~on_curve):
+    k = np.flatnonzero(reached & ~none & ~known & ~on_curve)
+    if len(k):
         # one with a branch further away, if the postures between them solve the target, too
-        b = int(np.nan_to_num(d[k].max(axis=1), nan=np.inf).argmin())
+        b = np.nan_to_num(d[k].max(axis=2), nan=np.inf).argmin(axis=1)
         # a longer valley is a self-motion, which the answer has to report
-        long = d[k, b].max() > CLOSE and s.status[k] != Status.SINGULAR
-        if long or not _in_one_valley(arm, screw, goals.take([k]), asked[k], s.q[k, b]):
-            verdict.lost.append(int(k))
-    B = s.q.shape[1]
-    for i in range(B):
+        long = (d[k, b].max(axis=1) > CLOSE) & (s.status[k] != Status.SINGULAR)
+        verdict.lost = k[long | ~_in_one_valley(arm, screw, goals.take(k), asked[k], s.q[k, b])].tolist()
+    pairs = [np.zeros((3, 0), int)]
+    for i in range(s.q.shape[1]):
         for j in range(i):
             with np.errstate(invalid="ignore"):
-                pair = np.flatnonzero(apart(s.q[:, i], s.q[:, j]).max(axis=1) < CLOSE)
-            for k in pair:
-                if _joined(arm, screw, goals.take([k]), s.q[k, i], s.q[k, j]):
-                    verdict.twice.append(int(k))
+                k = np.flatnonzero(apart(s.q[:, i], s.q[:, j]).max(axis=1) < CLOSE)
+            pairs.append(np.stack([k, np.full_like(k, i), np.full_like(k, j)]))
+    k, i, j = np.concatenate(pairs, axis=1)
+    if len(k):
+        verdict.twice = k[_joined(arm, screw, goals.take(k), s.q[k, i], s.q[k, j])].tolist()
     if near is not None:
         there = np.broadcast_to(near, q.shape)
         solves = miss_of(arm, screw, goals, there) < 0.5 * SOLVES
@@ -232,9 +233,9 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     return verdict
 
 
-def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> bool:
-    """Whether the posture between two solves the target."""
-    return bool(miss_of(arm, screw, goals, (a + 0.5 * _way(screw, a, b))[None])[0] < 0.9 * SOLVES)
+def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+    """Whether the posture between two (M, n) solves the target: (M,)."""
+    return np.asarray(miss_of(arm, screw, goals, a + 0.5 * _way(screw, a, b)) < 0.9 * SOLVES)
 
 
 def _way(screw: Screws, a: Array, b: Array) -> Array:
@@ -242,30 +243,30 @@ def _way(screw: Screws, a: Array, b: Array) -> Array:
     return np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
 
 
-def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> bool:
-    """Whether three postures between two solve the target: on the chord, or beside it where a valley is curved.
+def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+    """Whether three postures between two (M, n) solve the target: on the chord, or beside it where a valley is curved.
 
     Beside it means within a tenth of its length: that reaches neither of the two, so that what is found is a third
     solution. Isolated branches have none.
     """
-    d = _way(screw, a, b)
+    d, one = _way(screw, a, b), np.ones(len(a), bool)
     for part in (0.25, 0.5, 0.75):
-        q = (a + part * d)[None]
+        q = a + part * d
         there = across(screw, goals, q)
-        if miss_of(arm, screw, goals, q)[0] >= 0.9 * SOLVES and (
-            np.abs(there - q).max() > 0.1 * np.abs(d).max() or miss_of(arm, screw, goals, there)[0] >= 0.9 * SOLVES
-        ):
-            return False
-    return True
+        beside = np.abs(there - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
+        beside &= miss_of(arm, screw, goals, there) < 0.9 * SOLVES
+        one &= beside | (miss_of(arm, screw, goals, q) < 0.9 * SOLVES)
+    return one
 
 
 def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
-    """A posture (1, n) after two Newton steps that go nowhere along directions of singular values below `weak`."""
+    """Postures (M, n) after two Newton steps that go nowhere along directions of singular values below `weak`."""
     unit = np.where(screw.prismatic, screw.size, 1.0)
     for _ in range(2):
         r, J = oracle._residual(screw, goals, q)
-        U, S, Vt = np.linalg.svd(J[0] * unit, full_matrices=False)
-        q = q + unit * (Vt.T @ (np.where(weak < S, 1 / np.maximum(S, weak), 0.0) * (U.T @ r[0])))
+        U, S, Vt = np.linalg.svd(J * unit, full_matrices=False)
+        gain = np.where(weak < S, 1 / np.maximum(S, weak), 0.0)
+        q = q + unit * np.einsum("mki,mk,mrk,mr->mi", Vt, gain, U, r, optimize=True)
     return q
 
 

@@ -71,7 +71,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return Rows(
             np.take_along_axis(own, order[:, :, None], axis=1),
             (hit.sum(axis=1) > count) | shaken,
-            settled & prepared.complete,
+            settled & prepared.complete & ~shaken,
             shaken,
             guesses[:, :, :n],
         )
@@ -86,10 +86,12 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
 
 
 def _six(prepared: method.Elimination, T: Array) -> Rows:
-    """Branches of six joints; complete where the elimination settled the pose and the arm has a regular pencil."""
+    """Branches of six joints; complete where the elimination settled the pose as it stands, by a regular pencil.
+
+    Of a target that had to be moved, self-motions and double roots are not where they were.
+    """
     q, doubt, settled, shaken, guesses = method.solve(prepared, T)
-    nothing = np.isnan(q[:, :, 0]).all(axis=1)  # of a target that had to be moved, that is no proof
-    return Rows(q, doubt | shaken, settled & prepared.complete & ~(shaken & nothing), shaken, guesses)
+    return Rows(q, doubt | shaken, settled & prepared.complete & ~shaken, shaken, guesses)
 
 
 def _with_wrist(arm: Arm, task: Task) -> Geometry | None:

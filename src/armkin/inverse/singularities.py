@@ -42,6 +42,7 @@ GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it 
 NO_GROWTH = 1e-12  # residual that stays as it is
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
+PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
 
@@ -265,7 +266,7 @@ def _onto(
     some = np.flatnonzero((size < seed) & ~own.ravel())
     if len(some):
         steps = 40  # towards a root of third order each step goes a third of the way
-        flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=steps)
+        flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=steps, patience=PATIENCE)
     flat[own.ravel() & (size > SOLUTION)] = np.nan
     return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)
 

@@ -213,12 +213,13 @@ def half_tangent(pair: Pair) -> Entry:
     return np.where(far, 1e9, above / np.where(far, 1.0, below))
 
 
-def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Doubt]:
+def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> tuple[Pair, Doubt]:
     """All real roots of ``e0 + ec c + es s + ecc c^2 + ecs c s + ess s^2 = 0``, c = cos q, s = sin q.
 
-    e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have. Returns the four
-    roots on branch axes (2, 2, 1, N), and doubt: roots that touch, complex ones that miss the real
-    line by less than `TOUCHING`, or a vanishing equation. Without a real root the pair is
+    e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have; prefer: the angle to give where
+    the equation holds for all. Returns the four roots on branch axes (2, 2, 1, N), and doubt: roots that touch,
+    complex ones that miss the real line by less than `TOUCHING`, or an equation that says nothing: one that
+    vanishes or, as cos^2 + sin^2 - 1, does so on the circle. Without a real root the pair is
     that of the closest angle, not normalised, as in `linear`.
 
     The unit circle and a conic meet where the circle meets a pair of lines, a degenerate conic of
@@ -234,6 +235,9 @@ def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Doubt]:
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
     w = (e0 + 0.5 * (ecc + ess)) * inverse
+    rest = abs(a)
+    for value in (b, u, v, w):
+        rest = arrays.add(rest, abs(value))
     x, triple = _line_pair(a, b, u, v, w)
     M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
     # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
@@ -266,8 +270,8 @@ def trig_quadratic(e: list[Entry], scale: Entry) -> tuple[Pair, Doubt]:
         shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
     merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
-    free = size < 1e-12 * scale
-    return Pair(c, s), Doubt(merging | triple | free, free)
+    free = rest * size < 1e-12 * scale
+    return _prefer(Pair(c, s), free, prefer), Doubt(merging | triple | free, free)
 
 
 def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:

@@ -154,7 +154,7 @@ class Position:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-_six(self.across)).tolist()
         if not self.prismatic[2]:
-            third, doubt = _turn(_sum(across, *(_product(six, six) for six in g)), size)
+            third, doubt = _turn(_sum(across, *(_product(six, six) for six in g)), size, prefer[2])
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
@@ -175,7 +175,10 @@ class Position:
                 ecc = 0.25 * (k4 + k0 - k2)
                 form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
                 turn, doubt = trig_quadratic(form, size * size)
-                third = Pair(size * half_tangent(turn), None)
+                d = size * half_tangent(turn)
+                if prefer[2] is not None and np.any(doubt.free):
+                    d = np.where(doubt.free, prefer[2].c, d)
+                third = Pair(d, None)
         gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
         y = self._tip(third)
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
@@ -240,7 +243,7 @@ class Position:
             d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
             third = Pair(d, None)
         else:
-            third, doubt = _turn(six, size)
+            third, doubt = _turn(six, size, prefer[2])
         return third, Pair(_at(d2, third), None), doubt
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
@@ -254,12 +257,12 @@ class Position:
         return normalised(third), doubt
 
 
-def _turn(six: list[Entry], size: Entry) -> tuple[Pair, Doubt]:
+def _turn(six: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Pair, Doubt]:
     """Joint 3, revolute, from a quadratic equation of its cosine and sine.
 
     Pairs of complex roots stay off the unit circle, no longer than 2: normalised they may be a real root once more.
     """
-    pair, doubt = trig_quadratic(six, size * size)
+    pair, doubt = trig_quadratic(six, size * size, prefer)
     shorter = 1.0 / np.maximum(1.0, 0.5 * np.sqrt(pair.c * pair.c + pair.s * pair.s))
     return Pair(pair.c * shorter, pair.s * shorter), doubt
 

@@ -20,9 +20,10 @@ measures it on random poses, and only roles that give their generating joints ba
 (v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
 rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
 roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none.
-Such a pose is solved again, with another offset, other hidden joints, and moved by 1e-6 to 1e-3: an isolated
+Such a pose is solved again, with another offset and other hidden joints, then moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
-longer.  This goes on until a pass shows none of these, or seven are done; all passes' answers count.
+longer.  This goes on until a pass shows none of these, or nine are done; all passes' answers count.  A self-motion
+goes when the pose is moved, so that of a pose settled by none of the first four passes nothing is claimed.
 Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
 the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
 self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
@@ -52,7 +53,7 @@ CHUNK = 256  # poses worked on at once: more of them leave the cache
 BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
-SHAKES = (0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
+SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
 GUESSES = 8  # postures close to answers that are kept of a pose
 SAMPLES = 11  # random poses on which roles are compared
 # log10 of a role's raw error: nothing better needed, good enough, unfit
