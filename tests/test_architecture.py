@@ -44,9 +44,10 @@ MAY_IMPORT: dict[str, str] = {
     "board/backend": "formula model motion motors board/ports",
     "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
+    "board/klipper": "errors formula model motors motion board/ports board/backend",
     "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
     "board": "errors board_kinds formula robot_file model forward motors motion board/ports board/backend"
-    " board/firmware board/grbl board/feetech board/sim",
+    " board/firmware board/grbl board/feetech board/klipper board/sim",
     "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/sim",
 }

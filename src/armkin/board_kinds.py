@@ -89,7 +89,7 @@ class ForeignBoard(NamedTuple):
 
     kind: str
     motors: str  # the kind of drive that it takes: stepper or bus
-    gripper: str  # the kind of drive of a gripper that it moves: spindle or bus
+    gripper: str  # the kind of drive of a gripper that it moves: spindle or bus; none
     axes: tuple[str, ...]  # names of its axes; a bus goes by ids
     baud: int
 
@@ -99,6 +99,7 @@ FOREIGN = {
     for board in (
         ForeignBoard("grbl", "stepper", "spindle", ("X", "Y", "Z", "A", "B", "C"), 115_200),
         ForeignBoard("feetech", "bus", "bus", (), 1_000_000),
+        ForeignBoard("klipper", "stepper", "none", ("A", "B", "C", "D", "H", "I", "J", "K", "L"), 250_000),
     )
 }
 

@@ -62,7 +62,7 @@ def test_no_reset_leaves_dtr_low_before_the_port_opens(
     fake = FakeSerial()
     monkeypatch.setattr(serial, "serial_for_url", lambda name, **_: fake)
     monkeypatch.setattr("armkin.board.ports.serial_port.sys.platform", platform)
-    monkeypatch.setattr(serial_port, "_Lock", FakeLock)
+    monkeypatch.setattr(serial_port, "Lock", FakeLock)
     SerialPort(name, reset=reset).close()
     assert fake.done == [*done, "close"]
 
@@ -89,7 +89,7 @@ def test_every_command_that_opens_a_port_takes_no_reset(monkeypatch: pytest.Monk
 def test_a_holder_is_known_by_its_birth_too(tmp_path: Path) -> None:
     """A process number that was given to another process since is not taken for the holder."""
     name = str(tmp_path / "ttyX")
-    lock = serial_port._Lock(name)
+    lock = serial_port.Lock(name)
     try:
         assert holder(name) == os.getpid()
         note = Path(serial_port._path(name, "pid"))

@@ -93,6 +93,7 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Send, ("send", BUS, 10, -5, "--port", "sim")),
     (answers.GripOfServo, ("grip", BUS, "closed", "--port", "sim")),
     (answers.Setup, ("setup", GRBL, "--port", "sim")),
+    (answers.SetupOfKlipper, ("setup", "tests/robots/three_dof_klipper.yaml")),
     (answers.Zero, ("zero", BUS, "--port", "sim")),
     *((answers.Info, ("info", path.stem)) for path in sorted((ROOT / "robots").glob("*.yaml"))),
 ]

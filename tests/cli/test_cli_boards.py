@@ -112,7 +112,7 @@ def test_zero_writes_counts_and_leaves_the_rest_of_the_file(bus: str, tmp_path: 
     [
         (("home", "{bus}", "--port", "sim"), 2, "bus servos know their position"),
         (("home", "{grbl}", "--port", "sim"), 2, "joints without homing: q1, q2, q3"),
-        (("setup", "{bus}", "--port", "sim"), 2, "setup is for board: {kind: grbl}"),
+        (("setup", "{bus}", "--port", "sim"), 2, "setup is for board: {kind: grbl} and {kind: klipper}"),
         (("relax", "{grbl}", "--port", "sim"), 2, "no bus servos"),
         (("zero", "{grbl}", "--port", "sim"), 2, "zero is for arms whose joints have a bus servo"),
         (("grip", "{grbl}", "open", "--port", "sim"), 2, "no gripper that a board of kind grbl moves"),

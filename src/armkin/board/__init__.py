@@ -7,5 +7,5 @@ ports/      what every port can do; serial ports, and the lock that keeps two pr
 backend/    what every kind of board can do
 firmware/   our own firmware's protocol, sessions, configuration, motion
 sim/        a board inside the process that speaks the same bytes
-grbl/, feetech/  boards that others made; a new kind: `../board_kinds.py` FOREIGN, a package beside these, `foreign.py`
+grbl/, feetech/, klipper/  of others; a new kind: `../board_kinds.py` FOREIGN, a package here, `foreign.py`
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
     from armkin.board.feetech.machine import ServoMachine
     from armkin.board.grbl.machine import GrblMachine
+    from armkin.board.klipper.machine import KlipperMachine
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
@@ -45,6 +47,10 @@ class Foreign:
             from armkin.board.grbl.gcode import job
 
             return job(trajectory, counts)
+        if self.board.kind == "klipper":
+            from armkin.board.klipper.machine import job as timed
+
+            return timed(trajectory, counts)
         from armkin.board.feetech.machine import job as positions
 
         return positions(trajectory, counts)
@@ -61,6 +67,12 @@ class Foreign:
             settings = {number: value for number, (_, value) in wanted(axes).items()}
             count = max(axis.index for axis in axes) + 1
             return Grbl(axes=count, settings=settings, ends=dict.fromkeys(range(count), 0))
+        if self.board.kind == "klipper":
+            from armkin.board.klipper.axes import axes_of as extra
+            from armkin.board.klipper.axes import settings_of
+            from armkin.board.sim.klipper import Klipper
+
+            return Klipper(settings_of(extra(self.arm)))
         from armkin.board.feetech.machine import servo_ids
         from armkin.board.sim.servo_bus import Servo, ServoBus
 
@@ -73,12 +85,16 @@ class Foreign:
     def home(self, machine: Backend) -> None:
         """Find the limit switches by the board's own cycle.
 
-        Raises UsageError, before anything moves, for a bus, which needs none, and for joints without `homing` or
-        whose switch is that of no single motor.
+        Raises UsageError, before anything moves, for a bus, which needs none, for Klipper, and for joints without
+        `homing` or whose switch is that of no single motor.
         """
         from armkin.board.grbl.machine import GrblMachine
 
         arm = self.arm
+        if self.board.kind == "klipper":
+            raise UsageError(
+                "armkin homes no joints through Klipper: put the arm in its home pose by hand, or by jog, and say so"
+            )
         if not isinstance(machine, GrblMachine):
             raise UsageError("bus servos know their position: there is nothing to home")
         lacks = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
@@ -98,10 +114,13 @@ class Foreign:
         """The arm's gripper. Raises UsageError if it has none that this kind of board moves."""
         gripper, board = self.arm.gripper, self.board
         if gripper is None or gripper.kind != board.gripper:
-            like = {"spindle": "{kind: spindle, open: 0, closed: 200}, S words of M3", "bus": "{kind: bus, id: 6, ...}"}
+            takes = {
+                "spindle": "it takes gripper: {kind: spindle, open: 0, closed: 200}, S words of M3",
+                "bus": "it takes gripper: {kind: bus, id: 6, ...}",
+                "none": "it moves none",
+            }
             raise UsageError(
-                f"{self.arm.name} has no gripper that a board of kind {board.kind} moves; it takes gripper: "
-                + like[board.gripper]
+                f"{self.arm.name} has no gripper that a board of kind {board.kind} moves; {takes[board.gripper]}"
             )
         return gripper
 
@@ -125,11 +144,9 @@ class Foreign:
     def answers(
         self, name: str, baud: int | None = None, stop: Callable[[], bool] = lambda: False, *, reset: bool = True
     ) -> bool:
-        """Whether such a board answers at a port: GRBL to a status request, or every servo of the arm to its id."""
-        from armkin.board.ports import SerialPort
-
+        """Whether such a board answers at a port: GRBL and Klipper to a question, every servo of the arm to its id."""
         try:
-            link = SerialPort(name, baud or self.board.baud, reset=reset)
+            link = self.open(name, baud, reset=reset)
         except LinkError:
             return False
         try:
@@ -138,6 +155,10 @@ class Foreign:
 
                 Session(link).open()
                 return True
+            if self.board.kind == "klipper":
+                from armkin.board.klipper.api import Api
+
+                return "state" in Api(link).ask("info")
             from armkin.board.feetech import registers
             from armkin.board.feetech.bus import Bus
             from armkin.board.feetech.machine import servo_ids
@@ -151,6 +172,27 @@ class Foreign:
         finally:
             link.close()
 
+    def open(self, name: str, baud: int | None = None, *, reset: bool = True) -> Port:
+        """The port of that name; `sim`: a board of this kind in this process."""
+        from armkin.board.ports import SIM, SerialPort, SocketPort
+
+        if name == SIM:
+            return self.simulated()
+        if self.board.kind == "klipper" and "://" not in name:
+            return SocketPort(name)
+        return SerialPort(name, baud or self.board.baud, reset=reset)
+
+    def likely(self) -> list[str]:
+        """Names of the ports where such a board may be."""
+        if self.board.kind == "klipper":
+            from armkin.board.klipper.axes import SOCKETS
+            from armkin.board.ports import is_socket
+
+            return [path for path in map(os.path.expanduser, SOCKETS) if is_socket(path)]
+        from armkin.board.firmware.find_boards import others
+
+        return list(others())
+
     def jog(self, machine: Backend, joint: int, rate: float, seconds: float) -> None:
         """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most."""
         machine.prepare()
@@ -161,8 +203,12 @@ class Foreign:
         share = float(abs(rate) / arm.max_speed[joint])
         machine.run([self.plan(machine.counts(), goal[None], min(share, 1.0))])
 
-    def machine(self, port: Port, stop: Callable[[], bool]) -> GrblMachine | ServoMachine:
+    def machine(self, port: Port, stop: Callable[[], bool]) -> GrblMachine | ServoMachine | KlipperMachine:
         """The arm on the board behind an open port."""
+        if self.board.kind == "klipper":
+            from armkin.board.klipper.machine import KlipperMachine
+
+            return KlipperMachine(port, self.arm, stop)
         if self.board.kind == "grbl":
             from armkin.board.grbl.machine import GrblMachine
 
@@ -194,6 +240,10 @@ def foreign(arm: Arm) -> Foreign | None:
         from armkin.board.grbl.axes import axes_of
 
         axes_of(arm)
+    elif board.kind == "klipper":
+        from armkin.board.klipper.axes import axes_of as extra
+
+        extra(arm)
     else:
         from armkin.board.feetech.machine import servo_ids
 

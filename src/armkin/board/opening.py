@@ -58,7 +58,7 @@ def open_backend(
         with open_machine(arm, board, port, baud=baud or BAUD, stop=stop, reset=reset) as machine:
             yield machine
         return
-    link = board.simulated() if port == SIM else SerialPort(port, baud or board.board.baud, reset=reset)
+    link = board.open(port, baud, reset=reset)
     try:
         yield board.machine(link, stop)
     finally:

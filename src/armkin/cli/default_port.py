@@ -61,13 +61,12 @@ def _only(found: Sequence[str], kind: str) -> str:
 def foreign_port(given: str | None, board: Foreign, baud: int | None, *, reset: bool = True) -> str:
     """The port given (or ARMKIN_PORT), else the only one where a board of the robot file's kind answers.
 
-    GRBL is asked for its status, a bus for its servos' numbers: nothing moves.
+    GRBL and Klipper are asked for their status, a bus for its servos' numbers: nothing moves.
     """
     if given is not None:
         return given
-    from armkin.board.firmware.find_boards import others
     from armkin.board.stopping import stoppable
 
     with stoppable() as stop:
-        found = [name for name in others() if board.answers(name, baud, stop, reset=reset)]
+        found = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
     return _only(found, f"a {board.board.kind} board")

@@ -20,7 +20,7 @@ Triple = tuple[float, float, float]
 Convention = Literal["standard", "modified", "screws"]
 JointType = Literal["revolute", "prismatic"]
 Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_roll", "xyz_axis", "pose"]
-BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "pico6", "grbl", "feetech"]
+BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "pico6", "grbl", "feetech", "klipper"]
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 
 # Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
@@ -216,7 +216,9 @@ class Homing(_Model):
 class Board(_Model):
     """The controller that drives the motors."""
 
-    kind: BoardKind = Field(description="One with armkin's firmware; grbl: GRBL 1.1 and its kin; feetech: a servo bus.")
+    kind: BoardKind = Field(
+        description="One with armkin's firmware; grbl: GRBL 1.1 and its kin; feetech: a servo bus; klipper: Klipper."
+    )
     driver: Driver | None = Field(None, description="Stepper driver: it sets the pulse timing.")
     enable: Literal["low", "high"] | None = Field(
         None, description="Level of the ENABLE pin that switches the drivers on; low for the listed ones."

@@ -38,3 +38,10 @@ class Job:
     def top_rate(self) -> Array:
         """Greatest rate of every motor: (motors,) [counts/s]."""
         return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
+
+
+def braking(trajectory: Trajectory) -> float:
+    """Seconds in which the whole motion can be slowed down to a stop within the joints' max_accel."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        needed = trajectory.top_speed / trajectory.arm.max_accel
+    return float(np.nanmax(needed, initial=0.0))

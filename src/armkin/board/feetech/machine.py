@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job
+from armkin.board.backend.job import Job, braking
 from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
 from armkin.errors import LinkError, PositionKnownError, UsageError
@@ -196,7 +196,7 @@ class ServoMachine:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
         begin = last = self.port.now()
         watched, t, pace, stopping = begin, 0.0, 1.0, False
-        ramp = _ramp(trajectory)
+        ramp = max(braking(trajectory), PERIOD)
         while t < trajectory.duration and pace > 0.0:
             now = self.port.now()
             if now - last < PERIOD - 1e-4:
@@ -292,11 +292,3 @@ class ServoMachine:
 
 def _tell(progress: Progress, done: float, total: float, t: float) -> None:
     progress(done + t, total)
-
-
-def _ramp(trajectory: Trajectory) -> float:
-    """Seconds in which the whole motion can be slowed down to a stop within the joints' max_accel."""
-    arm = trajectory.arm
-    with np.errstate(invalid="ignore", divide="ignore"):
-        needed = trajectory.top_speed / arm.max_accel
-    return max(float(np.nanmax(needed, initial=0.0)), PERIOD)

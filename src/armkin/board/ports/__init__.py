@@ -2,9 +2,11 @@
 
 port.py         what every port can do
 serial_port.py  serial ports, and the lock that keeps two programs from one arm
+socket_port.py  the Unix socket of a program on this computer
 """
 
 from armkin.board.ports.port import BAUD, SIM, Port
 from armkin.board.ports.serial_port import Found, SerialPort, holder, list_ports, note_path
+from armkin.board.ports.socket_port import SocketPort, is_socket
 
-__all__ = ["BAUD", "SIM", "Found", "Port", "SerialPort", "holder", "list_ports", "note_path"]
+__all__ = ["BAUD", "SIM", "Found", "Port", "SerialPort", "SocketPort", "holder", "is_socket", "list_ports", "note_path"]

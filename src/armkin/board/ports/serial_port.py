@@ -42,7 +42,7 @@ class SerialPort:
 
     def __init__(self, name: str, baud: int = BAUD, *, reset: bool = True) -> None:
         self.name, self.baud = name, baud
-        self._lock = _Lock(name)
+        self._lock = Lock(name)
         try:
             self._serial = _open_serial(name, baud, reset)
         except BaseException:
@@ -240,7 +240,7 @@ def list_ports() -> list[Found]:
     return sorted(found, key=lambda f: (not f.board, f.device))
 
 
-class _Lock:
+class Lock:
     """The right to a port, held as long as this process lives; a file beside it says which process that is."""
 
     def __init__(self, name: str) -> None:

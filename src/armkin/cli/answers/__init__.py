@@ -37,6 +37,7 @@ from armkin.cli.answers.moving import GripOfServo as GripOfServo
 from armkin.cli.answers.moving import Home as Home
 from armkin.cli.answers.moving import LostSteps as LostSteps
 from armkin.cli.answers.moving import NearestSingularity as NearestSingularity
+from armkin.cli.answers.moving import Option as Option
 from armkin.cli.answers.moving import Path as Path
 from armkin.cli.answers.moving import PathBranch as PathBranch
 from armkin.cli.answers.moving import PathMoved as PathMoved
@@ -45,6 +46,7 @@ from armkin.cli.answers.moving import Reconfiguration as Reconfiguration
 from armkin.cli.answers.moving import Send as Send
 from armkin.cli.answers.moving import Servo as Servo
 from armkin.cli.answers.moving import Setup as Setup
+from armkin.cli.answers.moving import SetupOfKlipper as SetupOfKlipper
 from armkin.cli.answers.moving import Stands as Stands
 from armkin.cli.answers.moving import StatusOfBoard as StatusOfBoard
 from armkin.cli.answers.moving import StatusOfGrbl as StatusOfGrbl
@@ -67,7 +69,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "jog": (Stands,),
     "grip": (Grip, GripOfServo),
     "calibrate": (Calibrate, Suggested),
-    "setup": (Setup,),
+    "setup": (Setup, SetupOfKlipper),
     "zero": (Zero,),
     "ports": (Ports,),
 }

@@ -145,12 +145,12 @@ class StatusOfBoard(Stands):
 
 
 class StatusOfGrbl(Stands):
-    """`status` of a board of kind grbl."""
+    """`status` of a board of kind grbl or klipper."""
 
     board: Annotated[str, "its kind"]
     firmware: str
-    state: Annotated[str, "as GRBL says it: idle, run, hold, alarm, ..."]
-    inputs: Annotated[str, "letters of the active ones: limits X Y Z A B C, probe P, door D"]
+    state: Annotated[str, "as the board says it: idle, run, hold, alarm, ...; ready, shutdown, ..."]
+    inputs: Annotated[str, "letters of the active ones: limits X Y Z A B C, probe P, door D; Klipper tells none"]
     settings: Annotated[list[str], "those that differ from the robot file, in words"]
 
 
@@ -191,6 +191,23 @@ class Setup(Head):
     firmware: str
     differences: Annotated[list[Difference], "as found, before anything was written"]
     written: bool
+
+
+class Option(TypedDict):
+    """An option of Klipper's printer.cfg that is not as the robot file wants it."""
+
+    setting: Annotated[str, "its section and name"]
+    found: str | None
+    wanted: str
+
+
+class SetupOfKlipper(Head):
+    """`setup` of a board of kind klipper: the sections of printer.cfg."""
+
+    port: Annotated[str | None, "null: nothing was compared"]
+    firmware: str | None
+    differences: Annotated[list[Option] | None, "null: nothing was compared"]
+    printer_cfg: Annotated[str, "the sections that the arm needs, pins left open"]
 
 
 class Zero(Head):

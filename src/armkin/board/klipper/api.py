@@ -1,0 +1,91 @@
+"""Klipper's API server: requests and answers as JSON, each ended by the byte 0x03 (Klipper's docs/API_Server.md)."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+
+END = b"\x03"
+_ANSWER = 5.0  # [s] a question may take
+_LONGEST = 4_000_000  # [bytes] of one answer
+
+
+class KlipperError(LinkError):
+    """Klipper has refused a request."""
+
+
+class Api:
+    """The API server behind an open port."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._last = 0
+        self._text = b""
+        self._answers: dict[int, dict[str, Any]] = {}
+        self._waiting: set[int] = set()
+
+    def ask(self, method: str, params: dict[str, Any] | None = None, patience: float = _ANSWER) -> dict[str, Any]:
+        """A request and its result. Raises KlipperError if it is refused, LinkError if nothing comes."""
+        number = self.send(method, params)
+        end = self._port.now() + patience
+        while number in self._waiting:
+            if self._port.now() > end:
+                self._waiting.discard(number)
+                raise LinkError(f"Klipper on {self._port.name} did not answer {method} within {patience:g} s")
+            self.pump(0.02)
+        return self._result(number)
+
+    def query(self, **objects: list[str]) -> dict[str, Any]:
+        """Fields of printer objects: object -> field -> value. An object that is not there is left out."""
+        status = self.ask("objects/query", {"objects": objects}).get("status")
+        return status if isinstance(status, dict) else {}
+
+    def run(self, script: str, patience: float = _ANSWER) -> None:
+        """Run lines of G-code, and wait until they are done."""
+        self.ask("gcode/script", {"script": script}, patience)
+
+    def send(self, method: str, params: dict[str, Any] | None = None) -> int:
+        """A request whose answer is not waited for; its number."""
+        self._last += 1
+        request = {"id": self._last, "method": method, "params": params or {}}
+        self._waiting.add(self._last)
+        self._port.write(json.dumps(request).encode() + END)
+        return self._last
+
+    def waiting(self) -> int:
+        """Requests without an answer. Raises KlipperError for those that were refused since."""
+        for number in list(self._answers):
+            self._result(number)
+        return len(self._waiting)
+
+    def pump(self, timeout: float) -> None:
+        """Read what has come, or comes in so many seconds."""
+        self._text += self._port.read(timeout)
+        *whole, self._text = self._text.split(END)
+        if len(self._text) > _LONGEST:
+            raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
+        for part in whole:
+            try:
+                found = json.loads(part)
+            except ValueError:
+                found = None
+            if not isinstance(found, dict):
+                raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
+            number = found.get("id")
+            if number in self._waiting:
+                self._waiting.discard(number)
+                self._answers[number] = found
+
+    def _result(self, number: int) -> dict[str, Any]:
+        found = self._answers.pop(number)
+        if "error" in found:
+            error = found["error"]
+            said = error.get("message", error) if isinstance(error, dict) else error
+            raise KlipperError(f"Klipper: {str(said).splitlines()[0] if str(said) else 'an error'}")
+        result = found.get("result")
+        return result if isinstance(result, dict) else {}

@@ -1,0 +1,187 @@
+"""An arm's motors as Klipper's extra axes, and the sections of printer.cfg that they need.
+
+Klipper's millimetre is a degree (or mm) of what the motor turns. Source: Klipper's documentation, Config_Reference.md
+([printer], [manual_stepper], [idle_timeout]) and G-Codes.md (MANUAL_STEPPER ... GCODE_AXIS).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.motors import motor_accel, motor_names
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+LETTERS = tuple("ABCDHIJKL")  # of the letters that Klipper leaves to extra axes: none that begins a G-code
+SOCKETS = "~/printer_data/comms/klippy.sock", "/tmp/klippy_uds"  # where Klipper's API server mostly is
+RATE = 10.0  # [units/s] of the virtual axis X that carries the time: see gcode.py
+PIECE = 0.01  # [s] of one line
+MAX_ACCEL = 1000.0  # [units/s2] of X
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A motor as one of Klipper's manual steppers, in degrees or mm of what it turns."""
+
+    letter: str
+    name: str  # the motor's
+    steps: float  # [steps a unit]
+    at_home: float  # [units] where the motor's count is 0
+    full_steps: int
+    microsteps: int
+    invert: bool
+    max_speed: float  # [units/s]
+    max_accel: float  # [units/s2]
+
+    @property
+    def section(self) -> str:
+        """The name after `manual_stepper`."""
+        return f"axis_{self.letter.lower()}"
+
+    @property
+    def turn(self) -> float:
+        """rotation_distance [units a turn of the motor]."""
+        return self.full_steps * self.microsteps / self.steps
+
+    @property
+    def corner(self) -> float:
+        """[units/s] that the speed may change from one line to the next: what its acceleration makes of PIECE."""
+        return 1.5 * self.max_accel * PIECE + 1.0 / self.steps / PIECE
+
+
+@dataclass(frozen=True)
+class Difference:
+    """An option of printer.cfg that is not as the robot file wants it."""
+
+    setting: str
+    found: str | None
+    wanted: str
+
+    def __str__(self) -> str:
+        """For people."""
+        found = "is not there" if self.found is None else f"is {self.found}"
+        return f"{self.setting} {found}: the robot file wants {self.wanted}"
+
+
+def axes_of(arm: Arm) -> list[Axis]:
+    """One axis a motor, in the arm's order. Raises UsageError, naming the motor, for what Klipper cannot drive so."""
+    where = arm.path or arm.name
+    if not arm.motors:
+        raise UsageError(f"{where}: no joint has a drive")
+    speed = np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed)  # [counts/s] all joints at once
+    accel = motor_accel(arm)
+    home = arm.motor_gain @ arm.home  # [counts] of the motors at the home pose, if 0 is where all joint values are 0
+    found: list[Axis] = []
+    for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
+        if motor.kind != "stepper":
+            raise UsageError(f"{where}: motor {name} is a {motor.kind}; armkin drives steppers alone through Klipper")
+        if motor.axis not in LETTERS or motor.axis in (axis.letter for axis in found):
+            raise UsageError(
+                f"{where}: motor {name} is on axis {motor.axis}; for Klipper it is one of {', '.join(LETTERS)}, "
+                "one motor on each"
+            )
+        steps = motor.pulses_per_unit()
+        rates = float(np.nan_to_num(speed[k] / steps)), float(np.nan_to_num(accel[k] / steps, posinf=0.0))
+        found.append(
+            Axis(
+                motor.axis,
+                name,
+                steps,
+                float(home[k] / steps),
+                motor.full_steps or 0,
+                motor.microsteps or 0,
+                motor.invert,
+                *rates,
+            )
+        )
+    return found
+
+
+def printer_cfg(axes: Sequence[Axis]) -> str:
+    """The sections that an arm needs, pins left open."""
+    text = [
+        "[printer]",
+        "kinematics: none",
+        f"max_velocity: {RATE:g}",
+        f"max_accel: {MAX_ACCEL:g}",
+        "",
+        "[idle_timeout]",
+        "# Motors that are switched off lose the arm's position.",
+        "timeout: 31536000",
+        "gcode: G4 P0",
+    ]
+    for axis in axes:
+        text += [
+            "",
+            f"[manual_stepper {axis.section}]",
+            f"# {axis.name}",
+            "step_pin: ?",
+            f"dir_pin: {'' if axis.invert else '!'}?",
+            "enable_pin: !?",
+            f"rotation_distance: {axis.turn:.12g}",
+            f"full_steps_per_rotation: {axis.full_steps}",
+            f"microsteps: {axis.microsteps}",
+            f"velocity: {axis.max_speed:.6g}",
+            f"accel: {axis.max_accel:.6g}",
+        ]
+    return "\n".join(text) + "\n"
+
+
+def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
+    """Those sections as Klipper tells them: section -> option -> value."""
+    found: dict[str, dict[str, Any]] = {"printer": {"kinematics": "none", "max_velocity": RATE, "max_accel": MAX_ACCEL}}
+    for axis in axes:
+        found[f"manual_stepper {axis.section}"] = {
+            "rotation_distance": axis.turn,
+            "full_steps_per_rotation": axis.full_steps,
+            "microsteps": axis.microsteps,
+        }
+    return found
+
+
+def differences(axes: Sequence[Axis], found: Mapping[str, Any]) -> list[Difference]:
+    """What does not fit in `configfile.settings`: section -> option -> value, as Klipper has read its file.
+
+    Pins are not compared: no program can know them. Ratios of `gear_ratio` count.
+    """
+    printer = found.get("printer", {})
+    wrong = []
+    kinematics = printer.get("kinematics")
+    if kinematics != "none":
+        wrong.append(Difference("[printer] kinematics", _said(kinematics), "none"))
+    for option, least in (("max_velocity", RATE), ("max_accel", MAX_ACCEL)):
+        value = printer.get(option)
+        if not isinstance(value, int | float) or value < least:
+            wrong.append(Difference(f"[printer] {option}", _said(value), f"at least {least:g}"))
+    for axis in axes:
+        name = f"[manual_stepper {axis.section}]"
+        section = found.get(name[1:-1])
+        if section is None:
+            wrong.append(Difference(name, None, f"one for motor {axis.name}"))
+            continue
+        steps = _steps(section)
+        if steps is None or not math.isclose(steps, axis.steps, rel_tol=1e-9):
+            said = None if steps is None else f"{steps:.9g}"
+            wrong.append(Difference(f"{name} steps a unit", said, f"{axis.steps:.9g}"))
+    return wrong
+
+
+def _steps(section: Mapping[str, Any]) -> float | None:
+    """Steps a unit of a section, None if it does not tell."""
+    try:
+        ratio = math.prod(float(a) / float(b) for a, b in section.get("gear_ratio") or ())
+        full = float(section.get("full_steps_per_rotation", 200))
+        return full * float(section["microsteps"]) * ratio / float(section["rotation_distance"])
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+        return None
+
+
+def _said(value: object) -> str | None:
+    return None if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,93 @@
+"""A trajectory as G1 lines of Klipper's extra axes.
+
+Klipper stops between moves of extra axes alone, for its look-ahead knows X, Y and Z (toolhead.py, `calc_junction`: both
+moves must be kinematic). So X carries the time: with `kinematics: none` no motor hangs on it, it goes on by RATE a
+second, and the other axes follow it in proportion. What Klipper's planner makes of that is the plan's own time law, in
+pieces of constant speed, 100 a second; when lines run out it brakes within the axes' LIMIT_ACCEL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.klipper.axes import PIECE, RATE, Axis
+from armkin.motors import places, pulses
+
+if TYPE_CHECKING:
+    from armkin.board.backend.job import Job
+    from armkin.formula.arrays import Array
+    from armkin.motion.trajectory import Trajectory
+
+HEAD = "G90\nM220 S100\nG92 X0"  # absolute values, no override of the speed, the time begins
+_ROWS = 256  # lines that are worked out at once
+_SHORT = 1e-4  # [s] of a piece that joins the next one: X has five decimals
+
+
+def segments(trajectory: Trajectory) -> int:
+    """Lines that a trajectory is sent in."""
+    return len(_times(trajectory))
+
+
+class Lines:
+    """The lines of a job, one a piece of its time; after `brake` they go on ever slower along the same way.
+
+    Intermediate places are not rounded to whole steps, the last one is: the arm rests on its counts.
+    """
+
+    def __init__(self, job: Job, axes: Sequence[Axis]) -> None:
+        self._job, self._axes = job, axes
+        self._slower: float | None = None  # of the pace, a line
+        self.sent = 0.0  # [s] that all lines so far take
+
+    def brake(self, seconds: float) -> None:
+        """Come to rest in so many seconds from here."""
+        self._slower = PIECE / max(seconds, PIECE)
+
+    def __iter__(self) -> Iterator[str]:
+        times, t = _times(self._job.trajectory), 0.0
+        for begin in range(0, len(times), _ROWS):
+            some = times[begin : begin + _ROWS]
+            for now, values in zip(some.tolist(), self._units(some), strict=True):
+                if self._slower is not None:
+                    break
+                t = now
+                yield self._line(t, self._rest(t) if t == self._job.duration else values)
+        pace = 1.0
+        while self._slower is not None and t < self._job.duration and pace > 0.0:
+            pace = max(0.0, pace - self._slower)
+            t = min(self._job.duration, t + PIECE * pace)
+            rests = t == self._job.duration or pace == 0.0
+            yield self._line(self.sent + PIECE, self._rest(t) if rests else self._units(np.array([t]))[0])
+
+    def _units(self, t: Array) -> list[list[float]]:
+        """Where the axes are at times (T,) of the plan: T rows of axes, in Klipper's units."""
+        return self._scaled(places(self._job.trajectory.arm, self._job.trajectory.q(t)))
+
+    def _rest(self, t: float) -> list[float]:
+        """Where the axes come to rest at a time of the plan: on whole steps."""
+        return self._scaled(pulses(self._job.trajectory.arm, self._job.trajectory.q([t])))[0]
+
+    def _scaled(self, counts: Array | NDArray[np.int64]) -> list[list[float]]:
+        steps, home = (np.array([getattr(axis, name) for axis in self._axes]) for name in ("steps", "at_home"))
+        values: list[list[float]] = (home + counts / steps).tolist()
+        return values
+
+    def _line(self, x: float, values: Sequence[float]) -> str:
+        """The line to these places, which X reaches at second x."""
+        self.sent = x
+        words = " ".join(f"{axis.letter}{value:.6f}" for axis, value in zip(self._axes, values, strict=True))
+        return f"G1 X{RATE * x:.5f} {words} F{60 * RATE:g}"
+
+
+def _times(trajectory: Trajectory) -> Array:
+    """Ends of the pieces [s]: every stretch in equal ones of PIECE at most."""
+    found = [np.zeros(0)]
+    for stretch, began in zip(trajectory.stretches, trajectory.begins, strict=False):
+        count = max(int(np.ceil(stretch.duration / PIECE)), 1)
+        found.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
+    times = np.concatenate(found)
+    return np.asarray(times[np.append(np.diff(times) > _SHORT, np.ones(len(times[:1]), dtype=bool))])

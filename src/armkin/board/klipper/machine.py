@@ -1,0 +1,236 @@
+"""An arm whose steppers Klipper drives.
+
+Klipper plans on its host and tells what it has commanded; between host and boards it counts and checks every byte.
+Where the arm stands is kept by Klipper itself: the axes are registered, and given their place, when somebody has
+vouched for it, and a restart forgets both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.backend import Position, Progress, StoppedError
+from armkin.board.backend.job import Job, braking
+from armkin.board.klipper import gcode
+from armkin.board.klipper.api import Api
+from armkin.board.klipper.axes import Difference, axes_of, differences
+from armkin.errors import LinkError, PositionKnownError, PositionLostError
+from armkin.model.units import joints_out
+from armkin.motion.plan import plan as plan_joints
+from armkin.motors import joints as joints_of
+from armkin.motors import pulses
+
+if TYPE_CHECKING:
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
+
+_CHUNK = 10  # lines in one request
+_PENDING = 8  # requests that may wait: Klipper answers when it has taken them
+_SPARE = 0.75  # [s] sent ahead besides what braking takes: Klipper drains its queue when it holds less than 0.25 s
+_REST = 30.0  # [s] until what was sent must be done
+
+
+def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    """A trajectory from counts `start` (motors,) on, for Klipper."""
+    return Job(trajectory, start, gcode.segments(trajectory))
+
+
+class KlipperMachine:
+    """An arm behind the socket of Klipper's API server."""
+
+    differences = (
+        "Klipper tells the position that it was commanded; a restart, a shutdown and motors switched off lose it",
+        "a stop takes effect when Klipper has carried out what it holds, about a second later; M112 stops at once, "
+        "and loses the position",
+    )
+
+    def __init__(self, port: Port, arm: Arm, stop: Callable[[], bool] = lambda: False) -> None:
+        self.arm, self.port, self._stop = arm, port, stop
+        self.axes = axes_of(arm)
+        self.api = Api(port)
+        told = self.api.ask("info")
+        self.version, self.state = str(told.get("software_version", "")), str(told.get("state", ""))
+        self._message = str(told.get("state_message", "")).partition("\n")[0]
+        self._known, self._counts = False, np.zeros(len(self.axes), dtype=np.int64)
+        self.settings: dict[str, Any] = {}
+        self._read()
+
+    # Where it stands
+
+    def position(self) -> Position:
+        """Known while Klipper is ready, the axes are registered and their motors on."""
+        return "known" if self._known else "lost"
+
+    def counts(self) -> tuple[int, ...]:
+        """Counts of the arm's motors, as last read."""
+        return tuple(int(count) for count in self._counts)
+
+    def joints(self) -> Array:
+        """Joint values where it stands, as last read: (n,) [rad | mm]."""
+        return joints_of(self.arm, self._counts)
+
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self._read()
+
+    def standing(self) -> str:
+        """Where the arm has come to rest, and what that means for the next command."""
+        if not self._known:
+            return "the arm's position is lost: put it in its home pose and say so"
+        names = zip(self.arm.joint_names, joints_out(self.arm, self.joints()).tolist(), strict=True)
+        where = ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in names)
+        return f"the arm stands at {where}, its position is known: the next command starts there"
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""
+        settings = [str(difference) for difference in self.wrong()]
+        return {"firmware": f"Klipper {self.version}", "state": self.state, "inputs": "", "settings": settings}
+
+    def wrong(self) -> list[Difference]:
+        """Options of printer.cfg that are not as the robot file wants them."""
+        return differences(self.axes, self.settings)
+
+    # Getting ready
+
+    def prepare(self, *, assume: Array | None = None) -> bool:
+        """Check printer.cfg and position; True if the position was lost: the arm stands at `assume` from now on."""
+        self._read()
+        if self.state != "ready":
+            raise LinkError(f"Klipper is not ready, it says {self.state}: {self._message}")
+        if wrong := self.wrong():
+            more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+            raise LinkError(f"printer.cfg does not fit {self.arm.name}: {wrong[0]}{more}; armkin setup prints it")
+        self._settle()
+        if assume is not None and self._known:
+            joints = joints_out(self.arm, self.joints()).tolist()
+            raise PositionKnownError("the position is known", joints=joints)
+        if self._known:
+            return False
+        if assume is None and not self.port.simulated:
+            raise PositionLostError(
+                "the arm's position is lost", robot_file=self.arm.path, port=self.port.name, homing=False
+            )
+        self.vouch(pulses(self.arm, self.arm.home if assume is None else assume).tolist())
+        return True
+
+    def vouch(self, counts: Sequence[int]) -> None:
+        """Take somebody's word that the motors stand at these counts: register the axes there, motors on."""
+        for axis, count in zip(self.axes, counts, strict=True):
+            begin = f"MANUAL_STEPPER STEPPER={axis.section}"
+            place = f"{begin} ENABLE=1 SET_POSITION={axis.at_home + count / axis.steps:.9f}"
+            limits = f"LIMIT_VELOCITY={axis.max_speed * 1.001:.6f} LIMIT_ACCEL={axis.max_accel:.6f}"
+            corner = f"INSTANTANEOUS_CORNER_VELOCITY={axis.corner:.6f}"
+            self.api.run(f"{begin} GCODE_AXIS=\n{place}\n{begin} GCODE_AXIS={axis.letter} {limits} {corner}")
+        self._read()
+        if not self._known or self.counts() != tuple(counts):
+            raise LinkError("Klipper did not take the arm's position: is it older than November 2025? Update it")
+
+    # Moving
+
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        counts = np.asarray(start, dtype=np.int64)
+        return job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
+
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+        """A trajectory that starts at counts (motors,)."""
+        return job(trajectory, start)
+
+    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
+        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
+        total = done = 0.0
+        for one in plans:
+            if one is None:
+                if self._stop():
+                    raise StoppedError
+                self.port.read(0.01)
+                continue
+            total += one.duration
+            try:
+                whole = self._follow(one, lambda t, done=done, total=total: progress(done + t, total))  # type: ignore[misc]
+                self._settle()
+            except LinkError as error:
+                raise self._explain(error) from None
+            if not whole or self._stop():
+                raise StoppedError
+            if self.counts() != tuple(one.end.tolist()) or not self._known:
+                raise LinkError(
+                    f"Klipper stands at {list(self.counts())} steps, the plan ends at {one.end.tolist()}: another "
+                    f"program has moved it\n{self.standing()}"
+                )
+            done = total
+            progress(done, total)
+
+    def hold(self) -> None:
+        """Wait until what was sent is done: Klipper takes nothing of it back."""
+        self._settle()
+
+    def _follow(self, one: Job, tell: Callable[[float], None]) -> bool:
+        """Send a job's lines a little ahead of their time; False if a stop was asked for and the arm brakes."""
+        ramp = braking(one.trajectory)
+        lines = gcode.Lines(one, self.axes)
+        source = iter(lines)
+        self.api.run(gcode.HEAD)
+        began, stopping = self.port.now(), False
+        while chunk := [line for _, line in zip(range(_CHUNK), source, strict=False)]:
+            self.api.send("gcode/script", {"script": "\n".join(chunk)})
+            ahead = began + lines.sent - _SPARE - ramp
+            while self.api.waiting() > _PENDING or (not stopping and self.port.now() < ahead):
+                if not stopping and self._stop():
+                    stopping = True
+                    lines.brake(ramp)
+                self.api.pump(0.01)
+                tell(min(self.port.now() - began, one.duration))
+                if self.port.now() - began > lines.sent + _REST:
+                    raise LinkError(f"Klipper on {self.port.name} has left {self.api.waiting()} requests unanswered")
+        return not stopping
+
+    def _settle(self) -> None:
+        """Wait until all that Klipper holds is done, and read where the arm stands."""
+        self.api.run("M400", _REST)
+        self.api.waiting()
+        self._read()
+
+    def _explain(self, error: LinkError) -> LinkError:
+        """The same error, with where the arm has come to rest if Klipper still tells."""
+        try:
+            self._settle()
+        except LinkError:
+            try:
+                self._read()
+            except LinkError:
+                return error
+        return LinkError(f"{error}\n{self.standing()}")
+
+    def _read(self) -> None:
+        """Read Klipper's state, its configuration and where it stands."""
+        found = self.api.query(
+            webhooks=["state", "state_message"],
+            configfile=["settings"],
+            toolhead=["position"],
+            gcode_move=["axis_map"],
+            stepper_enable=["steppers"],
+        )
+        hooks = found.get("webhooks", {})
+        self.state = str(hooks.get("state", self.state))
+        self._message = str(hooks.get("state_message", self._message)).partition("\n")[0]
+        self.settings = found.get("configfile", {}).get("settings", {})
+        position = found.get("toolhead", {}).get("position", [])
+        places = found.get("gcode_move", {}).get("axis_map", {})
+        on = found.get("stepper_enable", {}).get("steppers", {})
+        there = [places.get(axis.letter) for axis in self.axes]
+        self._known = (
+            self.state == "ready"
+            and all(isinstance(k, int) and k < len(position) for k in there)
+            and all(on.get(f"manual_stepper {axis.section}") for axis in self.axes)
+        )
+        if self._known:
+            values = [position[k] for k in there]
+            steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
+            self._counts = np.rint(steps).astype(np.int64)

@@ -1,0 +1,256 @@
+"""A stand-in for Klipper behind its API server, in simulated time, written from Klipper's public documentation.
+
+It keeps what armkin relies on: requests and answers (API_Server.md), MANUAL_STEPPER with its axes, limits and places
+(G-Codes.md), status fields (Status_Reference.md), a queue that is one second long. Moves go on at their feed, without
+ramps; LIMIT_VELOCITY slows them down, and a jump of speed beyond INSTANTANEOUS_CORNER_VELOCITY is counted.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+END = b"\x03"
+STEP = 0.004  # [s] of simulated time
+AHEAD = 1.0  # [s] that the queue holds
+
+
+class Refused(Exception):  # noqa: N818
+    """A command that Klipper answers with an error."""
+
+
+@dataclass
+class Stepper:
+    """A manual stepper."""
+
+    place: float = 0.0  # as commanded
+    on: bool = False
+    letter: str = ""  # of the G-code axis that it is
+    velocity: float = math.inf
+    corner: float = 1.0
+
+
+@dataclass
+class Move:
+    """A move of X and extra axes, by their names; X stands under its own letter."""
+
+    start: dict[str, float]
+    end: dict[str, float]
+    seconds: float
+    done: float = 0.0
+
+
+@dataclass
+class Klipper:
+    """The port of a simulated Klipper."""
+
+    settings: Mapping[str, Mapping[str, Any]]  # of printer.cfg: section -> option -> value
+    name: str = "sim"
+    simulated: bool = True
+    baud: int = 0
+
+    _now: float = 0.0
+    _heard: bytes = b""
+    _said: bytearray = field(default_factory=bytearray)
+
+    def __post_init__(self) -> None:
+        self.dead = False  # unplugged
+        self.restart()
+
+    def restart(self) -> None:
+        """FIRMWARE_RESTART: axes, places and the queue are gone."""
+        names = [name.partition(" ")[2] for name in self.settings if name.startswith("manual_stepper ")]
+        self.steppers = {name: Stepper() for name in names}
+        self.axes: list[str] = []  # names of steppers that are G-code axes, in their order
+        self.state = "ready"
+        self.at = {"X": 0.0, **dict.fromkeys(names, 0.0)}  # where the motors are
+        self.x, self.x_base = 0.0, 0.0
+        self.feed = 1500.0
+        self.jumps = 0  # changes of speed beyond the corner's
+        self._speeds: dict[str, float] = {}
+        self._moves = deque[Move]()
+        self._requests = deque[dict[str, Any]]()
+        self._lines: deque[str] | None = None  # of the script that is run
+
+    # The port
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._heard += b"" if self.dead else data
+        *whole, self._heard = self._heard.split(END)
+        for part in whole:
+            self._requests.append(json.loads(part))
+
+    def read(self, timeout: float) -> bytes:
+        """What Klipper has said; simulated time passes while it says nothing."""
+        end = self._now + timeout
+        self.advance(0.0)
+        while not self._said and self._now < end:
+            self.advance(STEP)
+        data, self._said = bytes(self._said), bytearray()
+        return data
+
+    def now(self) -> float:
+        """Simulated seconds."""
+        return self._now
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        self._now += seconds
+        if self.dead:
+            return
+        self._run(seconds)
+        while self._requests and self._serve(self._requests[0]):
+            self._requests.popleft()
+
+    def shutdown(self) -> None:
+        """An MCU error: all motion ends at once."""
+        self.state = "shutdown"
+        self._moves.clear()
+
+    # Requests
+
+    def _serve(self, request: dict[str, Any]) -> bool:
+        """Answer a request; False while it has to wait."""
+        try:
+            if request["method"] == "gcode/script":
+                if self._lines is None:
+                    self._lines = deque(request["params"]["script"].splitlines())
+                while self._lines:
+                    if self.state != "ready":
+                        raise Refused("Printer is shutdown" if self.state == "shutdown" else "Printer is not ready")
+                    if not self._room(self._lines[0]):
+                        return False
+                    self._obey(self._lines.popleft())
+                self._lines = None
+                result: dict[str, Any] = {}
+            elif request["method"] == "objects/query":
+                status = self._status()
+                result = {
+                    "eventtime": self._now,
+                    "status": {k: status.get(k, {}) for k in request["params"]["objects"]},
+                }
+            elif request["method"] == "info":
+                result = {"state": self.state, "state_message": f"Printer is {self.state}", "software_version": "sim"}
+            else:
+                raise Refused("webhooks: No registered callback")
+        except Refused as error:
+            self._lines = None
+            self._say({"id": request["id"], "error": {"error": "CommandError", "message": str(error)}})
+            return True
+        self._say({"id": request["id"], "result": result})
+        return True
+
+    def _say(self, message: dict[str, Any]) -> None:
+        self._said += json.dumps(message).encode() + END
+
+    def _status(self) -> dict[str, Any]:
+        letters = {self.steppers[name].letter: 4 + k for k, name in enumerate(self.axes)}
+        return {
+            "webhooks": {"state": self.state, "state_message": f"Printer is {self.state}"},
+            "configfile": {"settings": self.settings},
+            "toolhead": {"position": [self.x, 0.0, 0.0, 0.0, *(self.steppers[name].place for name in self.axes)]},
+            "gcode_move": {"axis_map": {"X": 0, "Y": 1, "Z": 2, "E": 3, **letters}},
+            "stepper_enable": {"steppers": {f"manual_stepper {n}": one.on for n, one in self.steppers.items()}},
+        }
+
+    # G-code
+
+    def _room(self, line: str) -> bool:
+        """Whether a line can be run now: M400 waits for the queue, a move for room in it."""
+        if line.startswith(("M400", "MANUAL_STEPPER", "M84")):
+            return not self._moves
+        return sum(move.seconds - move.done for move in self._moves) <= AHEAD
+
+    def _obey(self, line: str) -> None:
+        head, *words = line.split()
+        if head == "MANUAL_STEPPER":
+            self._manual({key: value for key, _, value in (word.partition("=") for word in words)})
+        elif head == "G92":
+            if words != ["X0"]:
+                raise Refused(f"the stand-in knows no {line}")
+            self.x_base = self.x
+        elif head == "M84":
+            for one in self.steppers.values():
+                one.on = False
+        elif head in ("G1", "G0"):
+            self._move({word[0]: float(word[1:]) for word in words})
+        elif head not in ("G90", "M220", "M400"):
+            raise Refused(f'Unknown command:"{head}"')
+
+    def _manual(self, given: dict[str, str]) -> None:
+        if given.get("STEPPER") not in self.steppers:
+            raise Refused(f"The value '{given.get('STEPPER')}' is not valid for STEPPER")
+        name = given["STEPPER"]
+        one = self.steppers[name]
+        if "GCODE_AXIS" in given:
+            letter = given["GCODE_AXIS"]
+            if not letter:
+                self.axes = [other for other in self.axes if other != name]
+                one.letter = ""
+                return
+            if one.letter:
+                raise Refused("Must unregister axis first")
+            if not re.fullmatch("[A-Z]", letter) or letter in "XYZEFN":
+                raise Refused("Not a valid GCODE_AXIS")
+            if letter in (self.steppers[other].letter for other in self.axes):
+                raise Refused(f"Axis '{letter}' already registered")
+            one.letter = letter
+            one.velocity = float(given.get("LIMIT_VELOCITY", 999_999.9))
+            one.corner = float(given.get("INSTANTANEOUS_CORNER_VELOCITY", 1.0))
+            self.axes.append(name)
+            return
+        if one.letter:
+            raise Refused("Must unregister from gcode axis first")
+        if "ENABLE" in given:
+            one.on = given["ENABLE"] == "1"
+        if "SET_POSITION" in given:
+            one.place = self.at[name] = float(given["SET_POSITION"])
+
+    def _move(self, words: dict[str, float]) -> None:
+        self.feed = words.pop("F", self.feed)
+        letters = {self.steppers[name].letter: name for name in self.axes}
+        if unknown := words.keys() - letters.keys() - {"X"}:
+            raise Refused(f"the stand-in has no axis {', '.join(sorted(unknown))}")
+        start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
+        end = start | {letters.get(letter, "X"): value for letter, value in words.items()}
+        end["X"] = self.x_base + words["X"] if "X" in words else self.x
+        way = {key: end[key] - start[key] for key in end}
+        along = abs(way["X"]) or max(map(abs, way.values()))
+        if along < 1e-9:
+            return
+        speed = self.feed / 60
+        for name in self.axes:
+            if way[name]:
+                speed = min(speed, self.steppers[name].velocity * along / abs(way[name]))
+        seconds = along / speed
+        speeds = {name: way[name] / seconds for name in self.axes}
+        if way["X"] and self._moves:
+            self.jumps += sum(abs(v - self._speeds.get(k, 0.0)) > self.steppers[k].corner for k, v in speeds.items())
+        self._speeds = speeds if way["X"] else {}
+        self._moves.append(Move(start, end, seconds))
+        self.x = end["X"]
+        for name in self.axes:
+            self.steppers[name].place = end[name]
+            self.steppers[name].on = True
+
+    def _run(self, seconds: float) -> None:
+        while self._moves and seconds > 0.0:
+            move = self._moves[0]
+            part = min(seconds, move.seconds - move.done)
+            move.done += part
+            seconds -= part
+            share = move.done / move.seconds
+            for key, a in move.start.items():
+                self.at[key] = a + share * (move.end[key] - a)
+            if move.done >= move.seconds - 1e-12:
+                self.at |= move.end
+                self._moves.popleft()

@@ -1,0 +1,175 @@
+"""An arm on Klipper: exact positions, and the truth when something goes wrong.
+
+The other side is a stand-in written from Klipper's public documentation, not Klipper itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.board import path_run
+from armkin.board.backend import StoppedError
+from armkin.board.backend.job import Job
+from armkin.board.klipper.axes import axes_of, differences, printer_cfg, settings_of
+from armkin.board.klipper.gcode import Lines
+from armkin.board.klipper.machine import KlipperMachine
+from armkin.board.sim.klipper import Klipper
+from armkin.errors import LinkError, PositionLostError, UsageError
+from armkin.model.build import build
+from armkin.robot_file import parse
+from command_line import ROOT
+
+FILE = ROOT / "tests/robots/three_dof_klipper.yaml"
+ARM = armkin.load(FILE)
+AXES = axes_of(ARM)
+
+
+def opened(stop: Callable[[], bool] = lambda: False) -> tuple[Klipper, KlipperMachine]:
+    """The arm at home, as somebody has said."""
+    port = Klipper(settings_of(AXES))
+    port.simulated = False  # so that nobody vouches for the position by itself
+    one = KlipperMachine(port, ARM, stop)
+    assert one.prepare(assume=ARM.home)
+    return port, one
+
+
+def pins(port: Klipper) -> list[int]:
+    """Steps that the motors stand at, counted from home."""
+    return [round((port.at[axis.section] - axis.at_home) * axis.steps) for axis in AXES]
+
+
+def test_200_random_moves_are_read_back_exact_and_keep_their_time() -> None:
+    port, one = opened()
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        goal = rng.uniform(ARM.lower, ARM.upper)
+        plan, began = one.plan(one.counts(), goal), port.now()
+        one.run([plan])
+        assert list(one.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+        assert plan.duration <= port.now() - began < plan.duration + 0.3
+    assert port.jumps == 0  # no corner for which Klipper would slow down
+
+
+def test_a_curve_goes_on_without_a_stop() -> None:
+    """All lines move X, which carries the time: else Klipper would stop between them."""
+    port, one = opened()
+    moves = [{"joint": [0, 80, -80]}, {"wait": 0.5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
+    plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
+    began = port.now()
+    for part in path_run.parts(plan, one.counts(), one.lay):
+        assert isinstance(part, Job)
+        one.run([part])
+        x = [float(line.split()[1][1:]) for line in Lines(part, AXES)]
+        assert (np.diff([0, *x]) > 0).all()
+        assert x[-1] == pytest.approx(10 * part.duration, abs=1e-4)
+    assert pins(port) == [0, 0, 0]
+    assert port.now() - began == pytest.approx(plan.duration, abs=0.6)
+    assert port.jumps == 0
+
+
+@pytest.mark.parametrize("after", [3, 40, 90, 140])
+def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> None:
+    asked = iter(range(100_000))
+    port, one = opened(lambda: next(asked) > after)
+    plan = one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.4)
+    with pytest.raises(StoppedError):
+        one.run([plan])
+    assert one.position() == "known"
+    assert list(one.counts()) == pins(port)
+    share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True)]
+    assert max(share) - min(share) < 2e-3
+    assert port.jumps == 0
+    again = KlipperMachine(port, ARM)
+    assert (again.position(), again.counts()) == ("known", one.counts())
+    assert not again.prepare()
+    again.run([again.plan(again.counts(), np.deg2rad([60, 20, -60]))])
+    assert pins(port) == plan.end.tolist()
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        (lambda port: port.shutdown(), "Printer is shutdown"),
+        (lambda port: port.restart(), "has no axis"),
+        (lambda port: setattr(port, "dead", True), "unanswered|did not answer"),
+    ],
+)
+def test_what_loses_the_position_is_told(fault: Callable[[Klipper], None], message: str) -> None:
+    asked = iter(range(100_000))
+
+    def stop() -> bool:
+        if next(asked) == 40:
+            fault(port)
+        return False
+
+    port, one = opened(stop)
+    with pytest.raises(LinkError, match=message):
+        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.2)])
+    if not port.dead:
+        assert KlipperMachine(port, ARM).position() == "lost"
+
+
+def test_motors_that_are_switched_off_lose_the_position() -> None:
+    _, one = opened()
+    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+    one.api.run("M84")
+    one.refresh()
+    assert one.position() == "lost"
+    with pytest.raises(PositionLostError):
+        one.prepare()
+    assert one.prepare(assume=ARM.home)
+    assert one.counts() == (0, 0, 0)
+
+
+def test_another_program_s_move_is_found() -> None:
+    port, one = opened()
+    one.api.run("G1 A3 F600\nM400")
+    one.refresh()
+    assert list(one.counts()) == pins(port) != [0, 0, 0]
+
+    class Meddled(Klipper):
+        def _obey(self, line: str) -> None:
+            super()._obey(line)
+            if line == "M400" and self.x > 1:
+                self.steppers["axis_a"].place += 1.0
+
+    port = Meddled(settings_of(AXES))
+    one = KlipperMachine(port, ARM)
+    one.prepare()
+    with pytest.raises(LinkError, match="another program has moved it"):
+        one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+
+
+def test_printer_cfg_is_compared() -> None:
+    fits = settings_of(AXES)
+    assert differences(AXES, fits) == []
+    b = fits["manual_stepper axis_b"]
+    geared = b | {"rotation_distance": 360.0, "gear_ratio": [[26.85125, 1.0]], "full_steps_per_rotation": 200}
+    assert differences(AXES, fits | {"manual_stepper axis_b": geared}) == []
+    wrong = fits | {"printer": {"kinematics": "cartesian"}, "manual_stepper axis_b": b | {"microsteps": 16}}
+    del wrong["manual_stepper axis_c"]
+    assert [str(one) for one in differences(AXES, wrong)] == [
+        "[printer] kinematics is cartesian: the robot file wants none",
+        "[printer] max_velocity is not there: the robot file wants at least 10",
+        "[printer] max_accel is not there: the robot file wants at least 1000",
+        "[manual_stepper axis_b] steps a unit is 238.677778: the robot file wants 119.338889",
+        "[manual_stepper axis_c] is not there: the robot file wants one for motor q3",
+    ]
+    port = Klipper(wrong)
+    with pytest.raises(LinkError, match=r"printer\.cfg does not fit three_dof_klipper: .*, and 4 more"):
+        KlipperMachine(port, ARM).prepare()
+    text = printer_cfg(AXES)
+    assert "[manual_stepper axis_b]\n# q2\nstep_pin: ?\ndir_pin: !?\n" in text
+    assert "rotation_distance: 13.40719" in text
+
+
+def test_arms_that_klipper_cannot_drive_are_refused() -> None:
+    text = FILE.read_text()
+    with pytest.raises(UsageError, match="motor q1 is on axis X; for Klipper it is one of A, B, C, D, H"):
+        axes_of(build(parse(text.replace("axis: A", "axis: X").replace("board: {kind: klipper}", ""))))
+    with pytest.raises(UsageError, match="armkin drives steppers alone"):
+        axes_of(armkin.load("ra02"))
