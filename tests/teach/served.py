@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import armkin
-from armkin.teach.actions import Desk
+from armkin.teach.actions import Actions
 from armkin.teach.server import Server
 from command_line import ROOT
 
@@ -25,9 +25,9 @@ MOVES = "note: Ctrl-C ends it, after the arm has been stopped\n"
 
 
 @contextmanager
-def serving(desk: Desk) -> Iterator[Server]:
-    """The server of a desk, in a thread of its own."""
-    server = Server(desk)
+def serving(actions: Actions) -> Iterator[Server]:
+    """A server of these actions, in a thread of its own."""
+    server = Server(actions)
     thread = threading.Thread(target=lambda: server.serve_forever(poll_interval=0.05))
     thread.start()
     try:
@@ -36,14 +36,14 @@ def serving(desk: Desk) -> Iterator[Server]:
         server.shutdown()
         thread.join()
         server.server_close()
-        desk.close()
+        actions.close()
 
 
 @contextmanager
 def served(robot: str | Path = "three_dof", board: str | None = None) -> Iterator[Server]:
     """The server of a robot of the project, or of a file; board: a port."""
     path = robot if isinstance(robot, Path) else ROOT / f"robots/{robot}.yaml"
-    with serving(Desk(armkin.load(str(path)), board)) as server:
+    with serving(Actions(armkin.load(str(path)), board)) as server:
         yield server
 
 
@@ -124,13 +124,13 @@ class Page:
 
     def idle(self) -> Any:
         """The board's state once it has nothing to do."""
-        board = self.server.desk.board
+        board = self.server.actions.board
         assert board is not None
         end = time.monotonic() + 40
-        while board.pilot.doing or board.pilot.stopping:
-            assert time.monotonic() < end, board.pilot.state()
+        while board.thread.doing or board.thread.stopping:
+            assert time.monotonic() < end, board.thread.state()
             time.sleep(0.005)
-        return board.pilot.state()
+        return board.thread.state()
 
     def close(self) -> None:
         """As a browser closes a page: the connection ends."""

@@ -258,15 +258,15 @@ def test_without_webgl_everything_else_works(browser: Browser) -> None:
         settled(page)
         page.click("#send")
         idle(page, "send: done")
-        assert server.desk.stands() == tuple(COUNTS)
+        assert server.actions.stands() == tuple(COUNTS)
 
 
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
     with served(board="sim") as server, opened(browser, server.address) as page:
         base = server.address.split("/#")[0]
         asked: list[str] = []
-        before = server.desk.act
-        server.desk.act = lambda name, tab, fields: asked.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
+        before = server.actions.act
+        server.actions.act = lambda name, tab, fields: asked.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
         other = page.context.browser.new_context().new_page()  # type: ignore[union-attr]
         evil = tmp_path / "evil.html"
         evil.write_text(

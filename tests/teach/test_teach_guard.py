@@ -24,14 +24,14 @@ def server() -> Iterator[Server]:
 def acted(server: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the actions that were carried out."""
     names: list[str] = []
-    desk = server.desk
-    before = desk.act
+    actions = server.actions
+    before = actions.act
 
     def noted(name: str, tab: str, fields: dict[str, Any]) -> dict[str, Any]:
         names.append(name)
         return before(name, tab, fields)
 
-    monkeypatch.setattr(desk, "act", noted)
+    monkeypatch.setattr(actions, "act", noted)
     return names
 
 

@@ -3,10 +3,10 @@
 server.py           HTTP on 127.0.0.1: files, events, actions
 request_checks.py   who may ask, and whether a request's fields are what they must be
 tabs.py             the open pages: which one holds control, what each has still to hear
-actions.py          one arm, one page: every action by its name; program_actions.py: those on its program
+actions.py          every action by its name; program_actions.py: those on the program
 program.py          moves recorded one after another, in the words of a path file
 scene.py            what the page draws: links, bodies, limits
 pose_answers.py     one pose or one target: branches, limits, pulses
-board.py            what the page may have the board do; board_thread.py: the thread that owns the port
+board.py            the actions on the board; board_thread.py: the thread that owns the port
 static/             the page itself; static/vendor/three is three.js, byte for byte
 """

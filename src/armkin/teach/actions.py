@@ -1,4 +1,4 @@
-"""One arm and its pages: every action by its name."""
+"""Every action of the page, by its name."""
 
 from __future__ import annotations
 
@@ -8,56 +8,57 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import request_checks
-from armkin.teach.program_actions import Rehearsal
+from armkin.teach.program_actions import ProgramActions
 from armkin.teach.request_checks import RefusedError
 from armkin.teach.scene import first_lock, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.teach.board import Board
+    from armkin.teach.board import BoardActions
 
 
-class Desk:
-    """What the pages of one run share: the arm, the pose they show, who holds control."""
+class Actions:
+    """The actions of one run of `armkin teach`, and what its pages share: the arm, its pose, who holds control."""
 
     def __init__(self, arm: Arm, port: str | None = None, baud: int | None = None) -> None:
         """port: of a board, as `armkin send` takes it. Raises UsageError if the robot file says too little for it."""
         self.arm = arm
-        self.board: Board | None = None
+        self.board: BoardActions | None = None
         self.tabs = Tabs(self._abandoned)
         self._solving = threading.Lock()  # one question at a time: two cores are not many
         self._shown: dict[str, Any] = {}
-        # Name -> what it does, for the page in control; and what every page may do.
-        self.rehearsal = Rehearsal(arm, self.stands, lambda state: self.tabs.tell("program", state))
-        self.actions: dict[str, Action] = {"look": self._look, **self.rehearsal.actions()}
-        self.free: dict[str, Action] = {"take": self._take, "stop": self._stop}
+        self.program_actions = ProgramActions(arm, self.stands, lambda state: self.tabs.tell("program", state))
+        self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # by name
         if port is not None:
-            from armkin.teach.board import Board
-            from armkin.teach.board_thread import Pilot
+            from armkin.teach.board import BoardActions
+            from armkin.teach.board_thread import BoardThread
 
-            pilot = Pilot(arm, port, baud, lambda state: self.tabs.tell("board", state))
-            self.board = Board(pilot, self.rehearsal.program.plan)
-            self.actions |= self.board.actions()
+            thread = BoardThread(arm, port, baud, lambda state: self.tabs.tell("board", state))
+            self.board = BoardActions(thread, self.program_actions.program.plan)
+            self.for_control |= self.board.actions()
 
     def close(self) -> None:
         """Stop the arm, give the port back."""
         if self.board is not None:
-            self.board.pilot.close()
+            self.board.thread.close()
 
     def act(self, name: str, tab_id: str, fields: Fields) -> dict[str, Any]:
         """Carry out an action for a page. Raises RefusedError, or an ArmkinError that says what is wrong."""
         if name == "open":
             return self._open()
-        if name == "stop":
-            return self.free["stop"](Tab(), fields)  # whoever holds the key may stop the arm
+        if name == "stop":  # whoever holds the key may stop the arm
+            if self.board is not None:
+                self.board.stop()
+            return {}
         tab = self.tabs.find(tab_id)
-        if name in self.free:
-            return self.free[name](tab, fields)
-        if name not in self.actions:
+        if name == "take":
+            self.tabs.take(tab)
+            return {}
+        if name not in self.for_control:
             raise RefusedError(404, f"there is no action {name[:40]!r}")
         self.tabs.check_control(tab)
-        return self.actions[name](tab, fields)
+        return self.for_control[name](tab, fields)
 
     def warm(self) -> None:
         """Have the first page's answer ready, while its browser still loads the files."""
@@ -71,12 +72,12 @@ class Desk:
     def _open(self) -> dict[str, Any]:
         tab = self.tabs.open()
         self.warm()
-        board = None if self.board is None else self.board.pilot.state()
+        board = None if self.board is None else self.board.thread.state()
         return {
             "tab": tab.id,
             "scene": scene(self.arm),
             "look": self._shown,
-            "program": self.rehearsal.program.state(),
+            "program": self.program_actions.program.state(),
             "board": board,
         }
 
@@ -112,17 +113,8 @@ class Desk:
 
     def stands(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if nothing is known of it."""
-        return None if self.board is None else self.board.pilot.stands()
+        return None if self.board is None else self.board.thread.stands()
 
     def _abandoned(self) -> None:
         if self.board is not None:
             self.board.abandoned()
-
-    def _take(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        self.tabs.take(tab)
-        return {}
-
-    def _stop(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        if self.board is not None:
-            self.board.stop()
-        return {}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Backend
     from armkin.formula.arrays import Array
     from armkin.motion.path_plan import PathPlan
-    from armkin.teach.board_thread import Pilot
+    from armkin.teach.board_thread import BoardThread
     from armkin.teach.tabs import Action, Fields, Tab
 
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
@@ -38,12 +38,12 @@ FOREIGN_JOG = 0.3  # [s] of one piece of a jog on a board that cannot be told to
 _LONGEST_JOG = 60.0  # [s]
 
 
-class Board:
-    """The page's actions on a board."""
+class BoardActions:
+    """The actions on a board, and how each is carried out."""
 
-    def __init__(self, pilot: Pilot, program: Callable[[Array, float], PathPlan]) -> None:
+    def __init__(self, thread: BoardThread, program: Callable[[Array, float], PathPlan]) -> None:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
-        self.pilot, self.arm, self.program = pilot, pilot.arm, program
+        self.thread, self.arm, self.program = thread, thread.arm, program
         self.follows = False
         self._alive = 0.0  # until when a jog goes on
         self._jogging: tuple[int, float] | None = None
@@ -67,16 +67,16 @@ class Board:
     def stop(self) -> None:
         """STOP: follows no more, and holds the arm."""
         self.follows, self._alive = False, 0.0
-        self.pilot.stop()
+        self.thread.stop()
 
     def abandoned(self) -> None:
         """The page in control is gone."""
         self.follows, self._alive = False, 0.0
-        self.pilot.abandoned()
+        self.thread.abandoned()
 
     def connect(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Open the port again."""
-        self.pilot.submit("connect", lambda machine: None)
+        self.thread.submit("connect", lambda machine: None)
         return {}
 
     def send(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -86,14 +86,14 @@ class Board:
         speed = request_checks.number(fields, "speed", 1, 100) / 100
         check_limits(arm, q[None])
         self.check_file()
-        self.pilot.submit("send", lambda machine: self._move(machine, q, speed))
+        self.thread.submit("send", lambda machine: self.run(machine, q[None], speed))
         return {}
 
     def run_program(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Carry out the page's program from where the arm stands."""
         speed = request_checks.number(fields, "speed", 1, 100) / 100
         self.check_file()
-        self.pilot.submit("run", lambda machine: self._run_program(machine, speed))
+        self.thread.submit("run", lambda machine: self._run_program(machine, speed))
         return {}
 
     def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -105,16 +105,16 @@ class Board:
         def job(machine: Backend) -> None:
             machine.prepare(assume=self.arm.home)
 
-        self.pilot.submit("assume home", job)
+        self.thread.submit("assume home", job)
         return {}
 
     def home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Find the limit switches."""
-        board = self.pilot.board
+        board = self.thread.board
         if not isinstance(board, Foreign):
             homing.searches(self.arm, board)
         self.check_file()
-        self.pilot.submit("home", self._home)
+        self.thread.submit("home", self._home)
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -125,11 +125,11 @@ class Board:
         if percent == 0:
             raise UsageError("percent: 0 is no jog")
         wanted = (joint, percent)
-        if self.pilot.doing == "jog" and self._jogging == wanted:
+        if self.thread.doing == "jog" and self._jogging == wanted:
             self._alive = time.monotonic() + DEAD_MAN
             return {}
         self.check_file()
-        self.pilot.submit("jog", lambda machine: self._jog(machine, joint, percent))
+        self.thread.submit("jog", lambda machine: self._jog(machine, joint, percent))
         self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
         return {}
 
@@ -144,12 +144,12 @@ class Board:
         if isinstance(value, str) and value not in ("open", "closed"):
             raise UsageError("value: expected open, closed or a number")
         wanted = value if isinstance(value, str) else request_checks.number(fields, "value", -1e6, 1e6)
-        board = self.pilot.board
+        board = self.thread.board
         if not isinstance(board, Foreign):
             gripping.count_of(gripping.gripper_of(self.arm.name, board), wanted)
         assume = request_checks.flag(fields, "assume")
         self.check_file()
-        self.pilot.submit("grip", lambda machine: self._grip(machine, wanted, assume))
+        self.thread.submit("grip", lambda machine: self._grip(machine, wanted, assume))
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -164,11 +164,11 @@ class Board:
             return
         with self._lock:
             self._goal = q
-            if self.pilot.doing:
+            if self.thread.doing:
                 return
             self.check_file()
             with suppress(RefusedError):  # busy with something else since
-                self.pilot.submit("follow", self._follow)
+                self.thread.submit("follow", self._follow)
 
     def check_file(self) -> None:
         """Raise FileError if the robot file is not the one that the page was made of."""
@@ -198,13 +198,13 @@ class Board:
         """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
-        path_run.check_gripper(plan, self.pilot.board)
+        path_run.check_gripper(plan, self.thread.board)
         laid = path_run.parts(plan, machine.counts(), machine.lay)
         path_run.follow(machine, plan, laid, self._progress)
 
     def _home(self, machine: Backend) -> None:
-        if isinstance(self.pilot.board, Foreign):
-            self.pilot.board.home(machine)
+        if isinstance(self.thread.board, Foreign):
+            self.thread.board.home(machine)
         else:
             assert isinstance(machine, Machine)
             homing.home(machine)
@@ -219,7 +219,7 @@ class Board:
             )
             return
         if not isinstance(machine, Machine):
-            raise UsageError(f"a gripper needs a board with armkin's firmware, not {self.pilot.board.board.kind}")
+            raise UsageError(f"a gripper needs a board with armkin's firmware, not {self.thread.board.board.kind}")
         grip = gripping.gripper_of(self.arm.name, machine.configuration)
         known = gripping.known(machine, grip)
         if not known and not assume and not machine.port.simulated:
@@ -230,17 +230,14 @@ class Board:
         gripping.prepare(machine, grip, grip.open if assume and not known else None)
         gripping.grip(machine, grip, gripping.count_of(grip, value))
 
-    def _move(self, machine: Backend, q: Array, speed: float) -> None:
-        self.run(machine, q[None], speed)
-
     def _jog(self, machine: Backend, joint: int, percent: float) -> None:
         share = percent / 100
         top = float(self.arm.max_speed[joint])
-        if isinstance(self.pilot.board, Foreign):
+        if isinstance(self.thread.board, Foreign):
             while time.monotonic() < self._alive:
                 end = time.monotonic() + FOREIGN_JOG
-                self.pilot.board.jog(machine, joint, share * top, FOREIGN_JOG)
-                while time.monotonic() < min(end, self._alive) and not self.pilot.stopping:
+                self.thread.board.jog(machine, joint, share * top, FOREIGN_JOG)
+                while time.monotonic() < min(end, self._alive) and not self.thread.stopping:
                     time.sleep(0.01)  # a simulated one is there at once
             return
         assert isinstance(machine, Machine)
@@ -264,4 +261,4 @@ class Board:
                     self._goal = None
 
     def _progress(self, done: float, total: float) -> None:
-        self.pilot.done = (round(done, 1), round(total, 1))
+        self.thread.done = (round(done, 1), round(total, 1))

@@ -36,8 +36,8 @@ _POLL = 0.25  # [s] between two looks at a board that stands
 _TELL = 0.08  # [s] between two positions of an arm that moves: what a page can draw
 
 
-class Pilot:
-    """An arm's board; `tell` hears its state whenever that changes."""
+class BoardThread:
+    """The thread that owns the port of an arm's board; `tell` gets its state whenever that changes."""
 
     def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
@@ -56,7 +56,7 @@ class Pilot:
         self._ended_jobs = (0, "")  # how many, and the last one's name: a page may miss how a short one began
         self._told: dict[str, Any] = {}
         self._told_at = 0.0
-        self._thread = threading.Thread(target=self._run, name="pilot")
+        self._thread = threading.Thread(target=self._run, name="board")
         self._thread.start()
 
     # What pages ask for, in threads of theirs

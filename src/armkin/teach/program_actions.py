@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armkin.teach.tabs import Action, Fields, Tab
 
 
-class Rehearsal:
+class ProgramActions:
     """One program that all pages show; `tell` hears it whenever it changes."""
 
     def __init__(

@@ -20,7 +20,7 @@ from typing import Any
 
 from armkin.errors import ArmkinError, LinkError
 from armkin.teach import request_checks
-from armkin.teach.actions import Desk
+from armkin.teach.actions import Actions
 from armkin.teach.request_checks import Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
@@ -36,9 +36,9 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 128
 
-    def __init__(self, desk: Desk, port: int = 0) -> None:
+    def __init__(self, actions: Actions, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), _Handler)
-        self.desk = desk
+        self.actions = actions
         self.guard = Guard(self.server_address[1])
         self._strangers: OrderedDict[int, socket.socket] = OrderedDict()
         self._lock = threading.Lock()
@@ -132,7 +132,9 @@ class _Handler(BaseHTTPRequestHandler):
             raise RefusedError(404, "there is no such action")
         fields = request_checks.body(self.rfile.read(request_checks.length(headers)))
         try:
-            answer = self.server.desk.act(self.path.removeprefix("/api/"), headers.get(request_checks.TAB, ""), fields)
+            answer = self.server.actions.act(
+                self.path.removeprefix("/api/"), headers.get(request_checks.TAB, ""), fields
+            )
         except ArmkinError as error:
             status = 502 if isinstance(error, LinkError) else 422
             self._json(status, {"error": error.message, "kind": error.kind})
@@ -145,8 +147,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _events(self, query: str) -> None:
         """Tell a page what happens, until it is closed: its connection ends, which is looked at all the time."""
-        tab = self.server.desk.tabs.find(query.removeprefix("tab="))
-        self.server.desk.tabs.enter(tab)
+        tab = self.server.actions.tabs.find(query.removeprefix("tab="))
+        self.server.actions.tabs.enter(tab)
         self.server.known(self.connection)
         self.close_connection = True
         try:
@@ -166,7 +168,7 @@ class _Handler(BaseHTTPRequestHandler):
                     silent = 0.0
                 self.wfile.flush()
         finally:
-            self.server.desk.tabs.leave(tab)
+            self.server.actions.tabs.leave(tab)
 
     def _gone(self) -> bool:
         ready, _, _ = select.select([self.connection], [], [], 0)

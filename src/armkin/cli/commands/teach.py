@@ -27,7 +27,7 @@ def teach(
     """
     import threading
 
-    from armkin.teach.actions import Desk
+    from armkin.teach.actions import Actions
     from armkin.teach.server import Server
 
     arm = inputs.load(robot)
@@ -35,17 +35,17 @@ def teach(
         from armkin.board.ports.serial_port import check
 
         check(port)
-    desk = Desk(arm, port, baud)
+    actions = Actions(arm, port, baud)
     try:
-        with Server(desk) as server:
+        with Server(actions) as server:
             with output.destination(None) as write:
                 write(f"{server.address}\n")
             output.note("Ctrl-C ends it" + (", after the arm has been stopped" if port is not None else ""))
-            threading.Thread(target=desk.warm, daemon=True).start()
+            threading.Thread(target=actions.warm, daemon=True).start()
             if open:
                 import webbrowser
 
                 webbrowser.open(server.address)
             server.serve_forever(poll_interval=0.2)
     finally:
-        desk.close()  # a moving arm is stopped first
+        actions.close()  # a moving arm is stopped first
