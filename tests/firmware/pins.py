@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
+
+import numpy as np
 from emulator import CLOCK_HZ, EmulatedBoard
 
 
@@ -9,6 +13,26 @@ def net(board: EmulatedBoard) -> list[int]:
     """Net steps on the pins of X, Y, Z."""
     found = board.net()
     return [found[axis] for axis in "XYZ"]
+
+
+def at_rest(board: EmulatedBoard) -> list[int]:
+    """Net steps once they have not changed for 0.15 s."""
+    end = time.monotonic() + 10
+    before = net(board)
+    while time.monotonic() < end:
+        board.wait(0.15)
+        now = net(board)
+        if now == before:
+            return now
+        before = now
+    raise AssertionError("the arm does not come to rest")
+
+
+def on_the_line(now: Sequence[int], start: Sequence[int], end: Sequence[int]) -> bool:
+    """Within two steps of the straight line between two counts."""
+    far = int(np.argmax(np.abs(np.subtract(end, start))))
+    share = (now[far] - start[far]) / (end[far] - start[far])
+    return 0 <= share <= 1 and all(abs(n - a - share * (b - a)) <= 2 for n, a, b in zip(now, start, end, strict=True))
 
 
 def rests_within(board: EmulatedBoard, seconds: float) -> None:

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from emulator import EmulatedBoard
-from pins import net
+from pins import at_rest, net, on_the_line
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import plan as plan_moves
@@ -25,26 +25,6 @@ from armkin.model import build as arms
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, run
 
 KILLS = 50
-
-
-def at_rest(board: EmulatedBoard) -> list[int]:
-    """Net steps once they have not changed for 0.15 s."""
-    end = time.monotonic() + 10
-    before = net(board)
-    while time.monotonic() < end:
-        board.wait(0.15)
-        now = net(board)
-        if now == before:
-            return now
-        before = now
-    raise AssertionError("the arm does not come to rest")
-
-
-def on_the_line(now: Sequence[int], start: Sequence[int], end: Sequence[int]) -> bool:
-    """Within two steps of the straight line between two counts."""
-    far = int(np.argmax(np.abs(np.subtract(end, start))))
-    share = (now[far] - start[far]) / (end[far] - start[far])
-    return 0 <= share <= 1 and all(abs(n - a - share * (b - a)) <= 2 for n, a, b in zip(now, start, end, strict=True))
 
 
 def moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
