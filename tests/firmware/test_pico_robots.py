@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 import pytest
 from emulator import PICO, EmulatedBoard
+from numpy.typing import NDArray
 
 import armkin
 from command_line import ROOT, run
@@ -19,9 +21,28 @@ ARMS = {
 }
 
 
+def wire(board: EmulatedBoard, arm: armkin.Arm, edges: Sequence[int]) -> None:
+    """Limit switches that close (open) after so many net steps."""
+    for axis, switch, steps in zip("XYZABC", arm.homing, edges, strict=True):
+        if switch is not None:
+            contact = "nc" if switch.normally == "closed" else "no"
+            # an edge at the very place where the arm is switched on is met from the other side
+            above = steps > 0 or (steps == 0 and switch.direction > 0)
+            board.control(f"set-switch {axis} at {steps} {'above' if above else 'below'} {contact}")
+
+
+def edges(arm: armkin.Arm) -> NDArray[np.int64]:
+    """Pulses at the switches, from home; 0 where there is none."""
+    at = [
+        np.radians(switch.at) if switch is not None else home for switch, home in zip(arm.homing, arm.home, strict=True)
+    ]
+    return armkin.pulses(arm, at)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
     robot = ROOT / "robots" / f"{name}.yaml"
+    arm = armkin.load(robot)
     pose = ARMS[name]
     # at 0.4 of real time neither a busy host nor a busy emulator runs into the other's time-outs
     by: Literal["uart", "usb"] = "usb" if name == "parol6_pico6" else "uart"
@@ -30,11 +51,11 @@ def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
     rehearsed = run("send", robot, *pose, "--port", "sim", "--json")
     assert rehearsed.code == 0, rehearsed.err
     with EmulatedBoard(PICO, speed=0.4, trace=True, driver="tmc2209", by=by) as board:
+        wire(board, arm, edges(arm).tolist())
         sent = run("send", robot, *pose, "--port", board.port, "--assume-home", "--json")
         assert sent.code == 0, sent.err
         assert sent.json["pulses"] == rehearsed.json["pulses"] == planned.json["pulses"]
         assert list(board.net().values()) == sent.json["pulses"]
-        arm = armkin.load(robot)
         goal = armkin.pulses(arm, np.radians(pose))
         assert list(board.net().values()) == goal.tolist()
         # on the straight line in counts, every axis within two steps, and none ever turns round
@@ -52,3 +73,27 @@ def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
         assert set(board.net().values()) == {0}
         status = run("status", robot, "--port", board.port, "--json").json
         assert (status["position"], status["board"]) == ("known", PICO)
+
+
+@pytest.mark.parametrize("name", ["ar4_pico6", "parol6_pico6"])
+def test_a_six_axis_arm_finds_its_switches(name: str, pytestconfig: pytest.Config) -> None:
+    """A degree off each switch it takes itself to be at home; homing tells how wrong that was, to the step.
+
+    The wrist's three joints, which home fast; with --long all six.
+    """
+    robot = ROOT / "robots" / f"{name}.yaml"
+    arm = armkin.load(robot)
+    wanted = range(6) if pytestconfig.getoption("--long") else range(3, 6)
+    step = np.radians([switch.direction for switch in arm.homing if switch is not None])
+    away = armkin.pulses(arm, arm.home + step)
+    with EmulatedBoard(PICO) as board:
+        wire(board, arm, away.tolist())
+        assert run("send", robot, "home", "--port", board.port, "--assume-home").code == 0
+        names = [arm.joint_names[j] for j in wanted]
+        done = run("home", robot, *names, "--port", board.port, "--stay", "--json")
+        assert done.code == 0, done.err
+        found = np.subtract(done.json["pulses"], list(board.net().values()))
+        wrong = np.where(np.isin(np.arange(6), wanted), edges(arm) - away, 0)
+        assert found.tolist() == wrong.tolist()
+        lost = {one["joint"]: abs(one["steps"]) for one in done.json["lost_steps"]}
+        assert lost == dict(zip(names, np.abs(wrong[list(wanted)]).tolist(), strict=True))
