@@ -121,3 +121,35 @@ def test_a_value_beyond_the_gripper_is_refused_while_planning(tmp_path: Path) ->
     for value in ("30", "120", "75.5", "open", "closed"):
         file.write_text(START + f"  - grip: {value}\n")
         assert run("path", THREE_DOF, file).code == 0, value
+
+
+def test_a_grip_without_a_gripper_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    text = (ROOT / THREE_DOF).read_text()
+    bare, slow = tmp_path / "bare.yaml", tmp_path / "slow.yaml"
+    bare.write_text(text[: text.index("gripper:")] + text[text.index("board: {kind") :])
+    slow.write_text(text.replace(", max_speed: 120, max_accel: 480}", "}"))
+    file = tmp_path / "g.yaml"
+    file.write_text(START + "  - grip: closed\n")
+    for words in (("path", bare, file), ("path", bare, file, "--dry-run"), ("send", bare, "--path", file, "--dry-run")):
+        done = run(*words)
+        assert (done.code, done.out) == (2, ""), words
+        assert done.err == f"error: {file}:3: move 2: grip: three_dof has no gripper; add gripper: to its robot file\n"
+    assert run("path", slow, file).code == 0  # a plan needs no board, a rehearsal does
+    for words in (("path", slow, file, "--dry-run"), ("send", slow, "--path", file, "--dry-run")):
+        done = run(*words)
+        assert (done.code, done.out) == (2, ""), words
+        assert "the gripper has no max_speed" in done.err
+
+
+def test_an_arm_on_a_board_of_others_is_planned_without_a_port(tmp_path: Path) -> None:
+    robot = "tests/robots/three_dof_grbl.yaml"
+    corners = ("--via", "390,80,300", "--via", "390,100,300")
+    done = run("path", robot, *corners, "--json")
+    assert done.code == 0, done.err
+    assert done.json["segments"] > 5
+    assert run("path", robot, *corners, "--dry-run").code == 0
+    file = tmp_path / "g.yaml"
+    file.write_text(START + "  - grip: closed\n")
+    done = run("send", robot, "--path", file, "--dry-run")
+    assert done.code == 2
+    assert "has no gripper that a board of kind grbl moves" in done.err

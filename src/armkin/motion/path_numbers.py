@@ -85,8 +85,10 @@ def place(task: Task, value: Sequence[float]) -> Array:
 
 
 def check_grip(arm: Arm, value: str | float) -> None:
-    """Raise UsageError for a value of the gripper's drive that is beyond open and closed of the robot file."""
-    if arm.gripper is None or isinstance(value, str):
+    """Raise UsageError for an arm without a gripper, and for a value beyond open and closed of its robot file."""
+    if arm.gripper is None:
+        raise UsageError(f"grip: {arm.name} has no gripper; add gripper: to its robot file")
+    if isinstance(value, str):
         return
     low, high = sorted((arm.gripper.open, arm.gripper.closed))
     if not low <= value <= high:

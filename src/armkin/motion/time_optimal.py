@@ -15,7 +15,7 @@ points keeps to the limits, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -32,6 +32,7 @@ _TINY = 1e-300
 _MOST = 1e18  # of x, where nothing bounds it
 _EXCESS = 1.001  # of an acceleration, between grid points
 _ROUNDS = 6
+_AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _FEW = 400  # samples of a way: the law needs more grid points
 _AT_ONCE = 4096  # grid points that are looked at together
 
@@ -139,6 +140,10 @@ class _Motion:
     h: Array  # (M, 1)
     accel: Array  # (M, k) greatest acceleration
 
+    def part(self, some: slice) -> _Motion:
+        """The same of some of the intervals."""
+        return _Motion(self.first[some], self.left[some], self.right[some], self.h[some], self.accel[some])
+
     def row(self, f: Array | float) -> tuple[Array, Array]:
         """P and R of the acceleration P u + R x at fractions f of the intervals, x at the left end: (M, k) each.
 
@@ -149,6 +154,11 @@ class _Motion:
 
     def excess(self, x: Array) -> tuple[Array, Array]:
         """Greatest share of the acceleration inside every interval, and at which fraction: (M, k) each."""
+        found = [self.part(some)._excess(x[some.start : some.stop + 1]) for some in _parts(len(self.h))]
+        share, where = (np.concatenate(each) for each in zip(*found, strict=True))
+        return share, where
+
+    def _excess(self, x: Array) -> tuple[Array, Array]:
         u = np.diff(x)[:, None] / (2 * self.h)
         bend = self.right - self.left
         a = u * self.first + self.left * x[:-1, None]  # a + b f + c f^2
@@ -196,22 +206,39 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     return np.asarray(x / most)
 
 
+def _parts(intervals: int) -> list[slice]:
+    """The intervals in parts that are worked on at once."""
+    return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
+
+
 def _fastest(cap: Array, motion: _Motion, inside: Sequence[Array | float]) -> Array:
     """The fastest x (N,) within cap, the accelerations kept at fractions `inside` of the intervals."""
+    parts = _parts(len(motion.h))
+
+    def made(some: slice) -> tuple[Array, Array]:
+        return _affine(motion.part(some), [f if isinstance(f, float) else f[some] for f in inside])
+
+    kept = made(parts[0]) if len(parts) == 1 else None  # of a long path they are made anew for each of three passes
+
+    def rows(some: slice) -> tuple[Array, Array]:
+        return made(some) if kept is None else kept
+
+    for some in parts:
+        slope, level = rows(some)
+        h = motion.h[some]
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            # x + 2 h u >= 0 must leave room below the upper bounds of u
+            steep = slope - 0.5 / h
+            room = np.where(steep > 0, level / steep, np.inf).min(axis=1)
+        cap[some] = _meeting(np.minimum(cap[some], room), slope, level)
+    return _forward(_backward(cap, motion.h, rows, parts), motion.h, rows, parts)
+
+
+def _affine(motion: _Motion, inside: Sequence[Array | float]) -> tuple[Array, Array]:
+    """Slope and level of the bounds of u, which is between -level - slope x and level - slope x: (M, k) each."""
     P, R, C = _rows(motion, inside)
-    h = motion.h
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        slope, level = R / P, C / P  # u between -level - slope x and level - slope x
-        # x + 2 h u >= 0 must leave room below the upper bounds of u
-        steep = slope - 0.5 / h
-        room = np.where(steep > 0, level / steep, np.inf).min(axis=1)
-    cap[:-1] = np.minimum(cap[:-1], room)
-    cap[:-1] = _meeting(cap[:-1], slope, level)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        keep, gain = 1.0 - 2 * h * slope, 2 * h * level
-        e = np.where(keep > 0, 1.0 / keep, 0.0)
-        f = np.where(keep > 0, gain * e, np.inf)
-    return _forward(_backward(cap, e, f), keep, gain)
+        return R / P, C / P
 
 
 def _rows(motion: _Motion, inside: Sequence[Array | float]) -> tuple[Array, Array, Array]:
@@ -270,31 +297,54 @@ def _least(a: Array, b: Array, top: Array) -> _Least:
     return _Least(a0.tolist(), b0.tolist(), a1.tolist(), b1.tolist(), more)
 
 
-def _backward(cap: Array, e: Array, f: Array) -> Array:
+Rows = Callable[[slice], tuple[Array, Array]]
+
+
+def _backward(cap: Array, h: Array, rows: Rows, parts: Sequence[slice]) -> Array:
     """The largest x at every point from which the end can be reached: beta[i] = min(cap, e beta[i+1] + f)."""
-    return _scan(cap[::-1], _least(e[::-1], f[::-1], cap[:0:-1]))[::-1]
+
+    def functions() -> Iterator[_Least]:
+        for some in reversed(parts):
+            keep, gain = _ahead(h[some], *rows(some))
+            with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+                e = np.where(keep > 0, 1.0 / keep, 0.0)
+                f = np.where(keep > 0, gain * e, np.inf)
+            yield _least(e[::-1], f[::-1], cap[some.start + 1 : some.stop + 1][::-1])
+
+    return _scan(cap[::-1], functions())[::-1]
 
 
-def _forward(beta: Array, keep: Array, gain: Array) -> Array:
+def _forward(beta: Array, h: Array, rows: Rows, parts: Sequence[slice]) -> Array:
     """The fastest x within beta: x[i+1] = min(beta[i+1], keep x[i] + gain)."""
-    return _scan(beta, _least(keep, gain, beta[:-1]))
+    return _scan(beta, (_least(*_ahead(h[some], *rows(some)), beta[some]) for some in parts))
 
 
-def _scan(most: Array, least: _Least) -> Array:
+def _ahead(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
+    """`keep` and `gain` of every row: x[i+1] <= keep x[i] + gain."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        return 1.0 - 2 * h * slope, 2 * h * level
+
+
+def _scan(most: Array, functions: Iterable[_Least]) -> Array:
     """y[0] = most[0], y[i+1] = min(most[i+1], least_i(y[i])), not below 0."""
     y = float(most[0])
-    out = [y]
-    for top, a0, b0, a1, b1, more in zip(most[1:].tolist(), *least, strict=True):
-        value, other = a0 * y + b0, a1 * y + b1
-        if other < value:
-            value = other
-        for a, b in more:
-            other = a * y + b
+    out, at = np.empty(len(most)), 1
+    out[0] = y
+    for least in functions:
+        found = []
+        for top, a0, b0, a1, b1, more in zip(most[at : at + len(least.a0)].tolist(), *least, strict=True):
+            value, other = a0 * y + b0, a1 * y + b1
             if other < value:
                 value = other
-        y = top if top < value else value if value > 0.0 else 0.0
-        out.append(y)
-    return np.array(out)
+            for a, b in more:
+                other = a * y + b
+                if other < value:
+                    value = other
+            y = top if top < value else value if value > 0.0 else 0.0
+            found.append(y)
+        out[at : at + len(found)] = found
+        at += len(found)
+    return out
 
 
 def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
@@ -306,6 +356,17 @@ def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     forward and the hold slows it down they take from each other. At x = 0 the first is at most max_accel, so that
     what is kept at x is kept on the whole way down to rest.
     """
+    parts = [
+        _hold_cap(arm, Knots(path.s[a : b + 1], path.q[a : b + 1], path.d[a : b + 1]), share)
+        for a, b in ((some.start, some.stop) for some in _parts(len(path.s) - 1))
+    ]
+    for before, after in pairwise(parts):
+        after[0] = min(before[-1], after[0])
+    return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
+
+
+def _hold_cap(arm: Arm, path: Knots, share: float) -> Array:
+    """`hold_cap` of a part of the way."""
     gain = arm.motor_gain
     brakes = motor_accel(arm)
     ends = path.second()

@@ -119,7 +119,7 @@ def path(
             options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--start"))
         plan = _planned(arm, moves, options, json=json)
         _files(plan, out, plot)
-        found = _found(plan, _rehearsed(plan))
+        found = _found(plan, _rehearsed(plan, rehearsal=dry_run))
         _print(plan, found, json=json)
         return
     _carried_out(
@@ -249,19 +249,28 @@ def _planned(arm: Arm, moves: Any, options: dict[str, Any], *, json: bool) -> Pa
         raise
 
 
-def _rehearsed(plan: PathPlan) -> list[Planned] | None:
-    """The plan on the robot file's board, or on one that is made up; None without drives."""
+def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | None:
+    """The plan on the robot file's board, or on one that is made up; None without drives.
+
+    rehearsal: a gripper that could not do its part is refused, too.
+    """
     from functools import partial
 
     from armkin.board import path_run
     from armkin.board.firmware.cutting import cut
+    from armkin.board.foreign import Foreign
     from armkin.motors import pulses
 
     try:
-        board = board_link.configured(plan.arm, rehearsal=True).board
+        there = board_link.board_of(plan.arm, rehearsal=True)
     except UsageError:
         return None
+    if rehearsal:
+        path_run.check_gripper(plan, there)
     start = pulses(plan.arm, plan.motion.start).tolist()
+    if isinstance(there, Foreign):
+        return path_run.parts(plan, start, there.lay)
+    board = there.board
     return path_run.parts(plan, start, partial(cut, clock=board.clock, min_interval=board.min_interval))
 
 
