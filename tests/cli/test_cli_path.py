@@ -141,4 +141,5 @@ def test_send_follows_a_path_file_and_rounds_waypoints(pick: Path, tmp_path: Pat
     assert flows.code == 0, flows.err
     assert flows.json["pulses"] == stops["pulses"] == [0, 0, 0]  # a closed way
     assert flows.json["duration_s"] < 0.8 * stops["duration_s"]
+    assert flows.json["waypoints"] == stops["waypoints"] == 4
     assert run("send", THREE_DOF, 1, 2, 3, "--blend", 8, "--dry-run").code == 2

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import armkin
+from armkin.board.firmware.cutting import cut
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.corners import rounded
@@ -60,3 +63,30 @@ def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
     with pytest.raises(NoSolutionError, match="q2 = 130 deg"):
         rounded(three_dof, three_dof.home, np.deg2rad([[0, 130, 0]]), 5.0)
     assert rounded(three_dof, three_dof.home, three_dof.home, 5.0).duration == 0
+
+
+def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = wander(three_dof, 60, 20.0)
+    whole = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    monkeypatch.setattr("armkin.motion.time_optimal._AT_ONCE", 50)
+    monkeypatch.setattr("armkin.board.firmware.curves._SAMPLES", 700)
+    parts = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
+    [[one], [other]] = ([*map(list, (move.segments for move in laid.moves()))] for laid in (whole, parts))
+    assert len(one) == len(other) > 500
+    assert [s.ticks for s in one] == [s.ticks for s in other]
+
+
+def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The way has 24 points of 7 numbers a waypoint: 1.3 kB. All rows of all points at once took 22."""
+    monkeypatch.setattr("armkin.motion.time_optimal._AT_ONCE", 1000)
+
+    def peak(count: int) -> int:
+        rows = wander(three_dof, count, 20.0)
+        tracemalloc.start()
+        rounded(three_dof, rows[0], rows[1:], 2.0, hold=1.5)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    assert peak(300) - peak(100) < 200 * 6000

@@ -18,6 +18,7 @@ from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
 from armkin.motion.corners import rounded
+from armkin.motion.curve import Curve
 from armkin.motion.path import HOLD
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
@@ -92,7 +93,7 @@ class Total:
         """One more plan."""
         self.first = self.first or made.start.tolist()
         self.last = made.end.tolist()
-        self.waypoints += len(made.trajectory.stretches)
+        self.waypoints += sum(one.waypoints if isinstance(one, Curve) else 1 for one in made.trajectory.stretches)
         self.segments += made.segments
         self.duration += made.duration
         self.speed = np.maximum(self.speed, made.trajectory.top_speed)

@@ -60,7 +60,8 @@ def rounded(
     if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = hold_cap(arm, path, hold)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
-    return Trajectory(arm, first, (Curve(path, optimal(path, bounds, coupled(arm, accel))),))
+    x = optimal(path, bounds, coupled(arm, accel))
+    return Trajectory(arm, first, (Curve(path, x, len(goals)),))
 
 
 def _grid(corners: Array, blend: float) -> Knots:

@@ -138,16 +138,31 @@ class CurveSegments:
         """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
         whole = self.stretch.duration
         t = np.linspace(0.0, whole, max(int(whole / _FINE), 16))
-        parts = [self._spans(part) for part in np.array_split(t, max(len(t) // _SAMPLES, 1))]
-        span, stop = (np.concatenate(x) for x in zip(*parts, strict=True))
-        span = np.minimum(span, _GROWTH * np.minimum(t, whole - t))
-        span = np.maximum(np.clip(span, _LEAST, _MOST), _reaching(stop, float(t[1])))
-        density = 1.0 / span
-        level = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(t))])
+        level = self._density(t)  # segments a second, then segments since the beginning
+        level[1:] += level[:-1].copy()
+        level[0] = 0.0
+        level /= 2
+        level[1:] *= np.diff(t)
+        np.cumsum(level, out=level)
         number = max(int(level[-1]), 1)
         out = np.interp(np.linspace(0.0, level[-1], number + 1), level, t)
         out[-1] = whole
         return np.asarray(out)
+
+    def _density(self, t: Array) -> Array:
+        """How many segments a second are wanted at times t, which cover the stretch evenly: (T,)."""
+        whole, step = self.stretch.duration, float(t[1])
+        out, at = np.empty(len(t)), 0
+        behind = np.zeros(0)  # times to a stop just before a part, as many as may reach into it
+        for part in np.array_split(t, max(len(t) // _SAMPLES, 1)):
+            span, stop = self._spans(part)
+            span = np.minimum(span, _GROWTH * np.minimum(part, whole - part))
+            known = np.concatenate([behind, stop])
+            span = np.maximum(np.clip(span, _LEAST, _MOST), _reaching(known, step)[len(behind) :])
+            out[at : at + len(part)] = 1.0 / span
+            at += len(part)
+            behind = known[-int(known.max() / step) - 1 :]
+        return out
 
     def _spans(self, t: Array) -> tuple[Array, Array]:
         """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest."""
