@@ -57,37 +57,39 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
         q = rng.uniform(-np.pi, np.pi, (k, arm.n))
         return np.where(arm.prismatic, q / np.pi * arm.reach / 2, q)
 
-    found = {}
-    for joint in range(arm.n):
-        if arm.prismatic[joint]:
-            continue
-        for value in (0.0, 90.0, 180.0, -90.0):
-            q = anywhere(count)
-            q[:, joint] = np.radians(value)
-            if weak(q[:20]).max() < 1e-12:
-                found[f"{arm.joint_names[joint]} = {value:g}"] = q
+    found: dict[str, Array] = {}
+    valleys: list[tuple[int, Array, Array]] = []  # joint, postures, how far a minimum is along it
+    for joint in np.flatnonzero(~arm.prismatic).tolist():
+        values = np.array([0.0, 90.0, 180.0, -90.0])
+        q = anywhere(4 * count).reshape(4, count, arm.n)
+        q[:, :, joint] = np.radians(values)[:, None]
+        on = weak(q[:, :20].reshape(-1, arm.n)).reshape(4, -1).max(axis=1) < 1e-12
+        found |= {f"{arm.joint_names[joint]} = {value:g}": q[k] for k, value in enumerate(values) if on[k]}
         # from random postures on to the nearest minimum of the smallest singular value along this joint
-        q = anywhere(3 * count)
+        q1 = anywhere(3 * count)
         line = np.linspace(-0.3, 0.3, 13)
-        grid = np.repeat(q[:, None], len(line), axis=1)
+        grid = np.repeat(q1[:, None], len(line), axis=1)
         grid[:, :, joint] += line
-        size = weak(grid.reshape(-1, arm.n)).reshape(len(q), -1)
+        size = weak(grid.reshape(-1, arm.n)).reshape(len(q1), -1)
         k = size.argmin(axis=1)
         inside = (k > 0) & (k < len(line) - 1) & (size.min(axis=1) < 0.5 * size.max(axis=1))
-        q, centre = q[inside], line[k[inside]]
-        low, high = centre - 0.05, centre + 0.05
-        for _ in range(60):  # golden section; the minimum of |x| is found to rounding
-            a, b = high - 0.618034 * (high - low), low + 0.618034 * (high - low)
-            qa, qb = q.copy(), q.copy()
-            qa[:, joint] += a
-            qb[:, joint] += b
-            sizes = weak(np.concatenate([qa, qb]))  # in one call
-            left = sizes[: len(q)] < sizes[len(q) :]
-            low, high = np.where(left, low, a), np.where(left, b, high)
-        q[:, joint] += 0.5 * (low + high)
-        on = weak(q) < 1e-7
-        if on.sum() >= 5:
-            found[f"{arm.joint_names[joint]} moved"] = q[on][:count]
+        valleys.append((joint, q1[inside], line[k[inside]]))
+    if not valleys:
+        return found
+    q, centre = (np.concatenate([valley[part] for valley in valleys]) for part in (1, 2))
+    along = np.eye(arm.n)[np.repeat([joint for joint, *_ in valleys], [len(rows) for _, rows, _ in valleys])]
+    low, high = centre - 0.05, centre + 0.05
+    for _ in range(60):  # golden section, of all at once; the minimum of |x| is found to rounding
+        a, b = high - 0.618034 * (high - low), low + 0.618034 * (high - low)
+        sizes = weak(np.concatenate([q + a[:, None] * along, q + b[:, None] * along]))
+        left = sizes[: len(q)] < sizes[len(q) :]
+        low, high = np.where(left, low, a), np.where(left, b, high)
+    q = q + 0.5 * (low + high)[:, None] * along
+    on = weak(q) < 1e-7
+    for joint, *_ in valleys:
+        mine = on & (along[:, joint] > 0)
+        if mine.sum() >= 5:
+            found[f"{arm.joint_names[joint]} moved"] = q[mine][:count]
     return found
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 STARTS = 64
-STEPS = 25
+STEPS, PATIENCE = 25, 8
 SLOW = (
     1e-11  # residual above which a root was not reached: one of high order, to which each step goes a part of the way
 )
@@ -34,7 +34,7 @@ def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     out = np.full((len(target), STARTS, arm.n), np.nan)
     if not len(row):
         return out
-    q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS)
+    q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
     slow = np.flatnonzero((size > SLOW) & (size < SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
