@@ -17,7 +17,6 @@ from armkin.model import units
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, Progress
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.machine import Machine
     from armkin.board.foreign import Foreign
     from armkin.board.resuming import Note
     from armkin.formula.arrays import Array
@@ -77,7 +76,10 @@ def backend(
     simulated: str = AT_HOME,
     reset: bool = True,
 ) -> Iterator[Backend]:
-    """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first."""
+    """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first.
+
+    simulated: what to say of a board in this process.
+    """
     from armkin.board.backend import StoppedError
     from armkin.board.foreign import Foreign
     from armkin.board.opening import open_backend
@@ -135,16 +137,12 @@ def held(machine: Backend, resume: bool) -> Note | None:
     return resuming.recall(machine)
 
 
-def foreign(arm: Arm) -> Foreign | None:
-    """The arm's board if it does not run armkin's firmware."""
+def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
+    """The arm's board: one with armkin's firmware, or a foreign one; rehearsal: see `configure`."""
+    from armkin.board.firmware.configuration import configure
     from armkin.board.foreign import foreign
 
-    return foreign(arm)
-
-
-def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
-    """The arm's board: one with our firmware, or a foreign one."""
-    return foreign(arm) or configured(arm, rehearsal=rehearsal)
+    return foreign(arm) or configure(arm, rehearsal=rehearsal)
 
 
 def simulated(assume: str | None) -> str:
@@ -173,46 +171,8 @@ def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) 
         output.note(f"the board takes the arm to stand {where}")
 
 
-@contextmanager
-def machine(
-    arm: Arm,
-    configuration: Configuration,
-    port: str | None,
-    baud: int | None,
-    *,
-    simulated: str = AT_HOME,
-    reset: bool = True,
-) -> Iterator[Machine]:
-    """The arm on the board behind a port, given back at the end; a signal stops the arm first.
-
-    simulated: what to say of a board in this process.
-    """
-    from armkin.board.backend import StoppedError
-    from armkin.board.opening import open_machine
-    from armkin.board.stopping import stoppable
-
-    baud = baud or BAUD
-    port = port_name(port, configuration, baud, reset=reset)
-    if port == SIM:
-        output.note(simulated)
-    with stoppable() as stop, open_machine(arm, configuration, port, baud=baud, stop=stop, reset=reset) as one:
-        try:
-            yield one
-        except StoppedError as error:
-            if error.status is not None:
-                output.warn(f"stopped: {one.standing()}")
-            raise
-
-
-def configured(arm: Arm, *, rehearsal: bool = False) -> Configuration:
-    """The arm's board and configuration; rehearsal: any board will do."""
-    from armkin.board.firmware.configuration import configure
-
-    return configure(arm, rehearsal=rehearsal)
-
-
 def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
-    """The same for people."""
+    """What `armkin.board.planner.where` has found, as tables."""
     from armkin.motors import motor_names, pulse_units
 
     if found["joints"] is None:

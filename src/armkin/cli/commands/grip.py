@@ -42,16 +42,19 @@ def grip(
 ) -> None:
     """Open or close the gripper."""
     from armkin.board.firmware import gripping
+    from armkin.board.firmware.machine import Machine
+    from armkin.board.foreign import Foreign
 
     arm = inputs.load(robot)
-    if (other := board_link.foreign(arm)) is not None:
-        _grip_other(arm, other, value, port, baud, not no_reset, json)
+    board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
+    if isinstance(board, Foreign):
+        _grip_other(arm, board, value, port, baud, not no_reset, json)
         return
-    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
-    gripper = gripping.gripper_of(arm.name, configuration)
+    gripper = gripping.gripper_of(arm.name, board)
     target = _count(gripper, value, "VALUE")
     start = None if assume is None else _count(gripper, assume, "--assume")
-    with board_link.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
+    with board_link.backend(arm, board, port, baud, reset=not no_reset) as machine:
+        assert isinstance(machine, Machine)
         gripping.prepare(machine, gripper, start)
         at = gripping.grip(machine, gripper, target)
     if at != target:
@@ -59,7 +62,7 @@ def grip(
         raise LinkError(f"the gripper stands at {there} instead of {wanted}: please report this as a bug")
     found: Answer = {
         **render.head(arm),
-        "port": machine.session.port.name,
+        "port": machine.port.name,
         "gripper": gripper.value(at),
         "counts": at,
     }

@@ -16,7 +16,7 @@ from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.firmware.homing import Lost
-    from armkin.board.foreign import Foreign
+    from armkin.board.firmware.machine import Machine
     from armkin.model.arm import Arm
 
 _REHEARSAL = "the simulated arm starts in its home pose; its switches are where the robot file says"
@@ -47,41 +47,61 @@ def home(
     steps lost since are told. Keep clear of it: it moves as far as it must. With
     --port sim the switches are where the robot file says.
     """
+    from armkin.board.firmware import homing
+    from armkin.board.firmware.machine import Machine
+    from armkin.board.foreign import Foreign
+    from armkin.board.planner import where
+
     arm = inputs.load(robot)
-    other = board_link.foreign(arm)
-    if other is not None:
-        found = _of_others(arm, other, port, baud, joints, rest_at_home, stay, not no_reset)
+    board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
+    if isinstance(board, Foreign):
+        _refuse_choice(board.board.kind, joints, rest_at_home)
+        simulated = board_link.AT_HOME
     else:
-        found = _ours(arm, port, baud, joints or (), rest_at_home, stay, not no_reset)
+        homing.searches(arm, board, joints or (), rest_at_home=rest_at_home)  # refuses before a port is opened
+        simulated = _REHEARSAL
+    with board_link.backend(arm, board, port, baud, simulated=simulated, reset=not no_reset) as machine:
+        told: dict[str, Any] = {}
+        if isinstance(board, Foreign):
+            board.home(machine)
+        else:
+            assert isinstance(machine, Machine)
+            told["lost_steps"] = _told(arm, _home(machine, joints or (), rest_at_home))
+        if not stay:
+            output.note("moving to the home pose")
+            if isinstance(board, Foreign):
+                board.go_home(machine)
+            else:
+                assert isinstance(machine, Machine)
+                homing.go_home(machine)
+        found = {**render.head(arm), "port": machine.port.name, **where(machine), **told}
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
 
 
-def _ours(
-    arm: Arm, port: str | None, baud: int | None, joints: Sequence[str], rest_at_home: bool, stay: bool, reset: bool
-) -> dict[str, Any]:
-    """Home the arm on a board with armkin's firmware."""
-    from armkin.board.firmware import homing
-    from armkin.board.planner import where
+def _refuse_choice(kind: str, joints: Sequence[str] | None, rest_at_home: bool) -> None:
+    """Raise UsageError for joints or --rest-at-home on a board that homes by itself, all joints at once."""
+    if extra := [*(joints or ()), *["--rest-at-home"] * rest_at_home]:
+        raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(extra)} out")
 
-    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
-    homing.searches(arm, configuration, joints, rest_at_home=rest_at_home)  # refuses before a port is opened
-    with board_link.machine(arm, configuration, port, baud, simulated=_REHEARSAL, reset=reset) as machine:
-        steps = homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
-        lost = homing.lost_joints(machine)
-        if lost:
-            done = [name for name in arm.joint_names if name not in lost]
-            raise HomingIncompleteError(
-                f"homed {', '.join(done) or 'nothing'}; the position of {', '.join(lost)} is still lost",
-                advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
-                joints=lost,
-                homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
-                robot_file=arm.path,
-            )
-        if not stay:
-            output.note("moving to the home pose")
-            homing.go_home(machine)
-        return {**render.head(arm), "port": machine.port.name, **where(machine), "lost_steps": _told(arm, steps)}
+
+def _home(machine: Machine, joints: Sequence[str], rest_at_home: bool) -> list[Lost]:
+    """Home joints on a board with armkin's firmware. Raises HomingIncompleteError if others are still lost."""
+    from armkin.board.firmware import homing
+
+    arm = machine.arm
+    steps = homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
+    lost = homing.lost_joints(machine)
+    if lost:
+        done = [name for name in arm.joint_names if name not in lost]
+        raise HomingIncompleteError(
+            f"homed {', '.join(done) or 'nothing'}; the position of {', '.join(lost)} is still lost",
+            advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
+            joints=lost,
+            homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
+            robot_file=arm.path,
+        )
+    return steps
 
 
 def _told(arm: Arm, found: Sequence[Lost]) -> list[dict[str, Any]]:
@@ -95,29 +115,3 @@ def _told(arm: Arm, found: Sequence[Lost]) -> list[dict[str, Any]]:
             off = f"({difference:.3f} {'mm' if slides else 'deg'})"
             output.warn(f"{one.joint}: {abs(one.steps)} steps were lost since its position was last set {off}")
     return told
-
-
-def _of_others(
-    arm: Arm,
-    other: Foreign,
-    port: str | None,
-    baud: int | None,
-    joints: Sequence[str] | None,
-    rest_at_home: bool,
-    stay: bool,
-    reset: bool,
-) -> dict[str, Any]:
-    """Home the arm on a board that homes by itself, all joints at once."""
-    from armkin.board.planner import where
-
-    kind = other.board.kind
-    if joints:
-        raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(joints)} out")
-    if rest_at_home:
-        raise UsageError(f"boards of kind {kind} home all joints at once: leave --rest-at-home out")
-    with board_link.backend(arm, other, port, baud, reset=reset) as backend:
-        other.home(backend)
-        if not stay:
-            output.note("moving to the home pose")
-            other.go_home(backend)
-        return {**render.head(arm), "port": backend.port.name, **where(backend)}

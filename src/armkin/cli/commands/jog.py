@@ -33,11 +33,13 @@ def jog(
     itself when this command falls silent, and before the joint limits if the position is known.
     """
     from armkin.board.firmware import jogging
+    from armkin.board.firmware.machine import Machine
+    from armkin.board.foreign import Foreign
     from armkin.board.planner import where
     from armkin.model.lock import joint_index
 
     arm = inputs.load(robot)
-    other = board_link.foreign(arm)
+    board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")
@@ -46,25 +48,17 @@ def jog(
     top = float(units.joints_out(arm, arm.max_speed)[j])
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
-    if other is not None:
-        with board_link.backend(arm, other, port, baud, reset=not no_reset) as backend:
-            other.jog(backend, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
-            told = {**render.head(arm), "port": backend.port.name, **where(backend)}
-        with output.destination(None) as write:
-            write(render.to_json(told) + "\n" if json else board_link.where_text(arm, told))
-        return
-    configuration = board_link.configured(arm, rehearsal=port == board_link.SIM)
-    with board_link.machine(arm, configuration, port, baud, reset=not no_reset) as machine:
-        jogging.prepare(machine)
-        slow = top / jogging.SLOW
-        if machine.position() == "lost" and abs(rate) > slow:
-            rate = slow if rate > 0 else -slow
-            output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
-        jogging.jog(machine, jogging.rates(machine, j, rate), time)
-        found = where(machine)
+    with board_link.backend(arm, board, port, baud, reset=not no_reset) as machine:
+        if isinstance(board, Foreign):
+            board.jog(machine, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
+        else:
+            assert isinstance(machine, Machine)
+            jogging.prepare(machine)
+            slow = top / jogging.SLOW
+            if machine.position() == "lost" and abs(rate) > slow:
+                rate = slow if rate > 0 else -slow
+                output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
+            jogging.jog(machine, jogging.rates(machine, j, rate), time)
+        found = {**render.head(arm), "port": machine.port.name, **where(machine)}
     with output.destination(None) as write:
-        write(
-            render.to_json({**render.head(arm), "port": machine.session.port.name, **found}) + "\n"
-            if json
-            else board_link.where_text(arm, found)
-        )
+        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))

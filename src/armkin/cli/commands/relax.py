@@ -35,9 +35,10 @@ def relax(
     for --seconds; `armkin send ROBOT --batch FILE` plays them back.
     """
     from armkin.board.feetech.machine import ServoMachine
+    from armkin.board.foreign import foreign
 
     arm = inputs.load(robot)
-    other = board_link.foreign(arm)
+    other = foreign(arm)
     if other is None or other.board.kind != "feetech":
         raise UsageError(f"{arm.name} has no bus servos: other motors cannot be moved by hand and read")
     time = number(seconds, "--seconds")

@@ -34,8 +34,10 @@ def setup(
     the sections that printer.cfg needs. armkin's own firmware takes its settings from the robot file at every command,
     and bus servos have none that matter here.
     """
+    from armkin.board.foreign import foreign
+
     arm = inputs.load(robot)
-    other = board_link.foreign(arm)
+    other = foreign(arm)
     if other is None or other.board.kind not in ("grbl", "klipper"):
         raise UsageError(
             f"{arm.name}'s board has no settings to compare: setup is for board: {{kind: grbl}} and {{kind: klipper}}"

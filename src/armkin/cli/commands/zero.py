@@ -42,6 +42,7 @@ def zero(
 
     from armkin.board.feetech import gripping
     from armkin.board.feetech.machine import ServoMachine
+    from armkin.board.foreign import foreign
     from armkin.model import units
     from armkin.motors import motor_names
     from armkin.robot_file import parse
@@ -49,7 +50,7 @@ def zero(
     from armkin.robot_file.edit import replaced
 
     arm = inputs.load(robot)
-    other = board_link.foreign(arm)
+    other = foreign(arm)
     if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
     q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
