@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,9 @@ from exported import agreement
 
 import armkin
 from armkin.export.c.program import identifier, program
+from armkin.inverse.recognise import solver
+from armkin.model.build import build
+from armkin.robot_file import parse
 from command_line import run as run_armkin
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -135,3 +139,67 @@ def test_what_cannot_be_exported_is_refused_in_words(words: list[str], said: str
     assert done.code == 2
     assert said in done.err
     assert not done.out
+
+
+def built(folder: Path, arm: armkin.Arm) -> str:
+    """What the test program of an arm says."""
+    texts = program(arm, "arm.c")
+    for name, text in (("arm.c", texts.source), ("arm.h", texts.header), ("arm_test.c", texts.test)):
+        (folder / name).write_text(text)
+    run("gcc", *WARNINGS, "-O1", "arm.c", "arm_test.c", "-lm", "-o", "test", folder=folder)
+    return run("./test", folder=folder)
+
+
+def test_the_test_program_of_a_calibrated_arm_passes(tmp_path: Path) -> None:
+    arm = replace(armkin.load("three_dof"), ratio=np.array([1.01, 0.99, 1.002]))
+    assert built(tmp_path, arm) == "8 postures, 0 failed\n"
+
+
+def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_path: Path) -> None:
+    """A calibrated AR4: its wrist's axes miss each other by some tenths of a millimetre."""
+    text = (ROBOTS / "ar4.yaml").read_text()
+    arm = build(parse(text.replace("a: 0,", "a: 0.3,").replace("alpha: 90,", "alpha: 90.2,")))
+    assert "named after that class" in solver(arm, None)[1].why
+    assert built(tmp_path, arm) == "8 postures, 0 failed\n"
+    assert '"branch 1"' in (tmp_path / "arm.c").read_text()
+    told = agreement(arm, tmp_path, 100)
+    assert told.different == []
+    assert told.largest < 1e-8
+
+
+CROOKED = [(70, 20, 100), (30, 200, 10), (-50, 150, 20), (80, 50, 60), (40, 10, 80), (0, 10, 80)]
+
+
+def crooked(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.Arm:
+    """An arm of no class, of so many joints."""
+    rows = [
+        f"  - {{name: j{k}, {'type: prismatic, limits: [0, 500], ' if k in slides else ''}"
+        f"dh: {{alpha: {alpha}, a: {a}, d: {d}}}}}"
+        for k, (alpha, a, d) in enumerate(CROOKED[:count])
+    ]
+    return build(parse("\n".join(["name: crooked", "convention: standard", task, "joints:", *rows])))
+
+
+def off_its_class(robot: str, old: str, new: str) -> armkin.Arm:
+    return build(parse((ROBOTS / f"{robot}.yaml").read_text().replace(old, new, 1)))
+
+
+def test_five_joints_and_the_tool_s_axis_have_a_form(tmp_path: Path) -> None:
+    """None of its postures is far from singular: those farthest from it are taken."""
+    assert built(tmp_path, crooked(5)) == "8 postures, 0 failed\n"
+
+
+@pytest.mark.parametrize(
+    ("arm", "why"),
+    [
+        (lambda: crooked(4, task="task: pose"), "4 joints for a full pose are searched among the branches of a longer"),
+        (lambda: crooked(6, slides=(0, 2, 4)), "three of its joints are slides; task pose is solved in Python alone"),
+        (
+            lambda: off_its_class("labvolt_5150", "alpha: 0, a: 190", "alpha: 0.003, a: 190"),
+            "class that it nearly fits",
+        ),
+    ],
+)
+def test_classes_without_a_form_say_why(arm: Callable[[], armkin.Arm], why: str) -> None:
+    with pytest.raises(armkin.UsageError, match=f"has no form in C: .*{why}"):
+        program(arm(), "arm.c")

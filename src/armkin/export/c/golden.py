@@ -17,10 +17,14 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 POSTURES = 8
+_CLEAR = 0.02  # singular value, lengths in reaches: far from singular
 
 
-def golden_test(arm: Arm, task: Task, text: str, single: bool) -> str:
-    """The test program with its values filled in; fields that it shares with the other files stay as they are."""
+def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> str:
+    """The test program with its values filled in; fields that it shares with the other files stay as they are.
+
+    named: branches are numbered as Python numbers them; else their numbers are not compared (-1).
+    """
     q = _postures(arm, task, POSTURES)
     T = fk(arm, q)
     target = targets_of(task, T, q)
@@ -33,8 +37,9 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool) -> str:
         "golden_targets": _table(target.reshape(len(q), -1), single),
         "golden_counts": ", ".join(map(str, found.valid.sum(axis=1))),
         "golden_branches": _table(np.array([values for values, _ in rows]), single),
-        "golden_indices": ", ".join(str(index) for _, index in rows),
+        "golden_indices": ", ".join(str(index if named else -1) for _, index in rows),
         "rows": str(len(rows)),
+        "turns": ", ".join(number(float(v), single) for v in np.where(arm.prismatic, 0.0, arm.ratio**2)),
         "home": ", ".join(number(float(v), single) for v in arm.home),
         # millimetres of a pose or a slide, and everything else
         "length": number((1e-5 if single else 1e-10) * arm.reach, single),
@@ -46,25 +51,27 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool) -> str:
 
 
 def _postures(arm: Arm, task: Task, count: int) -> Array:
-    """Random postures within limits whose branches all stand clear of singularities."""
+    """Random postures within limits whose branches all stand clear of singularities, or farthest from them."""
     rng = np.random.default_rng(20)
     turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
     low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
     high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
     q = rng.uniform(low, high, (50 * count, arm.n))
     found = ik(arm, targets_of(task, fk(arm, q), q), task.name)
-    return q[_clear(arm, task, found.q, found.valid)][:count]
+    sigma = _weakest(arm, task, found.q, found.valid)
+    order = np.argsort(-np.minimum(sigma, _CLEAR), kind="stable")  # clear ones as they come, then the next best
+    return q[order[sigma[order] > 0.0]][:count]
 
 
-def _clear(arm: Arm, task: Task, q: Array, valid: Bool) -> Bool:
-    """Rows (N,) whose branches (N, B, n) have a Jacobian that is far from losing rank."""
+def _weakest(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
+    """Smallest singular value (N,) of any branch's Jacobian, branches (N, B, n); 0 without branches."""
     from armkin.inverse.numeric.newton import null_space
 
     N, B, n = q.shape
     flat = np.nan_to_num(q).reshape(-1, n)
     target = targets_of(task, fk(arm, flat), flat)
     sigma = null_space(arm, task, flat, target)[0].reshape(N, B)
-    return np.asarray((valid & (sigma > 0.02) | ~valid).all(axis=1) & valid.any(axis=1))
+    return np.where(valid.any(axis=1), np.where(valid, sigma, np.inf).min(axis=1), 0.0)
 
 
 def _table(values: Array, single: bool) -> str:

@@ -13,6 +13,7 @@ from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_code import number
+from armkin.inverse import general
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.recognise import solver
 from armkin.inverse.tasks.task import LARGEST
@@ -43,7 +44,8 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
-    task, geometry = solver(turned, task_name)
+    task, named = solver(turned, task_name)
+    geometry = _plain(turned, task, named)
     solve, branches = candidates(turned, task, geometry, single)
     names = branch_names(turned, task, geometry, branches)
     stem = Path(file).stem
@@ -79,7 +81,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part("ik"),
         part("source_tail"),
     ]
-    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single))
+    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, geometry is named))
     return Program(*(_named(filled(text, fields), prefix) for text in texts))
 
 
@@ -91,10 +93,32 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     if geometry.pairs is not None:
         return kernel.candidates(arm, task, geometry, single, prefer)
     if not has_form(geometry):
-        raise UsageError(f"{arm.name}: {geometry.name} has no form in C; task {task.name} is solved in Python alone")
+        raise UsageError(
+            f"{arm.name}: {geometry.name} has no form in C: {_why_not(arm, geometry)}; task {task.name} is solved in "
+            "Python alone"
+        )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
     return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
+
+
+def _plain(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
+    """The class itself; for an arm off its class that the elimination solves, the elimination: branches by number."""
+    if has_form(geometry) or not geometry.complete or task.name != "pose" or arm.n != 6:
+        return geometry
+    found = general.recognise(arm, task)
+    return geometry if found is None or not has_form(found) else found
+
+
+def _why_not(arm: Arm, geometry: Geometry) -> str:
+    """Why a class of arms cannot be written in C."""
+    if geometry.elimination is None and geometry.name.startswith("near "):
+        return "its branches are corrected ones of the class that it nearly fits, as many rounds as each needs"
+    if geometry.elimination is None:
+        return f"{arm.n} joints for a full pose are searched among the branches of a longer arm"
+    if int(arm.prismatic.sum()) == 3:
+        return "three of its joints are slides"
+    return "the pencils that are healthy on it are none of those that the C code reads"
 
 
 def has_form(geometry: Geometry) -> bool:

@@ -29,6 +29,7 @@ int main(void)
     const arm_real length = @length@, angle = @angle@;
     static const arm_real home[ARM_JOINTS] = {@home@};
     static const int slides[ARM_JOINTS] = {@slides@};
+    static const arm_real turns[ARM_JOINTS] = {@turns@}; /* square of a joint's turn per commanded turn, 0: it slides */
     arm_solution found[ARM_BRANCHES];
     arm_real pose[16], jacobian[6 * ARM_JOINTS];
     int i, j, b, k, row = 0, failed = 0;
@@ -38,17 +39,17 @@ int main(void)
         for (k = 0; k < 16; k++)
             good &= close_to(pose[k], poses[i][k], k % 4 == 3 ? length : angle);
         arm_jacobian(joints[i], jacobian);
-        for (j = 0; j < ARM_JOINTS; j++) { /* the last rows: the axis of a joint that turns, zero of one that slides */
+        for (j = 0; j < ARM_JOINTS; j++) { /* the last rows: the axis of a joint that turns */
             const double x = (double)jacobian[3 * ARM_JOINTS + j], y = (double)jacobian[4 * ARM_JOINTS + j];
             const double z = (double)jacobian[5 * ARM_JOINTS + j];
-            good &= close_to((arm_real)(x * x + y * y + z * z), slides[j] ? 0 : 1, angle);
+            good &= close_to((arm_real)(x * x + y * y + z * z), turns[j], angle);
         }
         count = arm_ik(targets[i], home, found, &edge);
         good &= count == counts[i];
         for (b = 0; b < counts[i]; b++, row++) {
             int same = 0;
             for (k = 0; k < count; k++) {
-                int all = found[k].branch == indices[row];
+                int all = indices[row] < 0 || found[k].branch == indices[row];
                 for (j = 0; j < ARM_JOINTS; j++)
                     all &= close_to(found[k].q[j], branches[row][j], slides[j] ? length : angle);
                 same |= all;
