@@ -9,6 +9,7 @@ list of what really has to be computed, equal operations once. `numpy_code`, `py
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,16 +17,18 @@ from typing import Any
 import numpy as np
 
 BOOLEAN = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "equal"}
+COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
 
 
 class Node(np.lib.mixins.NDArrayOperatorsMixin):
     """An array that is not there yet: what numpy is asked to do with it is recorded.
 
-    axes: lengths of the branch axes in front of the batch axis, () for a plain (N,) array.
+    axes: lengths of the branch axes in front of the batch axis, () for a plain (N,) array. number: of operations
+    recorded before; inputs count from below zero.
     """
 
-    def __init__(self, trace: Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...]) -> None:
-        self.trace, self.op, self.args, self.axes = trace, op, args, axes
+    def __init__(self, trace: Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...], number: int) -> None:
+        self.trace, self.op, self.args, self.axes, self.number = trace, op, args, axes, number
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
@@ -66,8 +69,10 @@ class Trace:
                         if x == 0.0:
                             return 0.0
                         return self._signed(y, (x < 0) != (minus_a != minus_b))
-                return self._signed(self.record(op, (a, b)), minus_a != minus_b)
+                return self._signed(self._product(a, b), minus_a != minus_b)
             minus_b ^= op == "subtract"
+            if a is b and minus_a != minus_b:
+                return 0.0
             if _is_zero(b):
                 return self._signed(a, minus_a)
             if _is_zero(a):
@@ -75,18 +80,35 @@ class Trace:
             if minus_a == minus_b:
                 return self._signed(self.record("add", (a, b)), minus_a)
             return self.record("subtract", (b, a) if minus_a else (a, b))
+        if op == "power" and inputs[1] == 2:
+            return self.record("multiply", (inputs[0], inputs[0]))
         return self.record(op, inputs)
 
     def _signed(self, x: Any, minus: bool) -> Any:
         return self.simplify("negative", (x,)) if minus and isinstance(x, Node) else -x if minus else x
 
+    def _product(self, a: Any, b: Any) -> Any:
+        """The product of two factors; constant ones are multiplied now: ``k1 (k2 x)`` is one operation."""
+        for k, x in ((a, b), (b, a)):
+            if not isinstance(k, Node) and isinstance(x, Node) and x.op == "multiply":
+                for inner, y in (x.args, x.args[::-1]):
+                    if not isinstance(inner, Node):
+                        return self.simplify("multiply", (k * inner, y))
+        return self.record("multiply", (a, b))
+
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
+        if op in COMMUTING:  # equal ones have equal keys: constants first, then what was recorded first
+            inputs = sorted(inputs, key=_place)
         key = (op, *(id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs))
         if key not in self.known:
             axes = np.broadcast_shapes(*(axes_of(x) for x in inputs))
-            self.known[key] = Node(self, op, tuple(inputs), axes)
+            self.known[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
             self.nodes.append(self.known[key])
         return self.known[key]
+
+
+def _place(x: Any) -> float:
+    return x.number if isinstance(x, Node) else -math.inf
 
 
 def _is_negative(x: Any) -> bool:
@@ -124,7 +146,7 @@ class Recording:
 def record(formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> Recording:
     """Run a formula of a list of arrays once on that many symbols."""
     trace = Trace()
-    symbols = [Node(trace, "input", (), ()) for _ in range(inputs)]
+    symbols = [Node(trace, "input", (), (), k - inputs) for k in range(inputs)]
     outputs = list(formula(list(symbols)))
     return Recording(symbols, outputs, _needed(trace.nodes, outputs))
 

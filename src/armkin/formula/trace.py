@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armkin.formula import numpy_code
 
 SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
+UNCOPIED = 512  # elements of numpy's buffers: it copies operands that are repeated on a branch axis if two rows fit
 LENGTHS = 16  # of batches, for which a thread keeps buffers
 
 
@@ -49,7 +50,13 @@ class Straight:
     def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
         """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
         assert self._batch is not None  # written for the workspace
-        return self._batch[0](*inputs, *workspace)
+        if len(inputs[0]) < 2 * UNCOPIED:
+            return self._batch[0](*inputs, *workspace)
+        before = np.setbufsize(UNCOPIED)
+        try:
+            return self._batch[0](*inputs, *workspace)
+        finally:
+            np.setbufsize(before)
 
     @property
     def outputs(self) -> list[Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, linear, rotation_between, spin
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel
@@ -34,6 +34,7 @@ class Elbow:
     def __init__(self, chain: Chain, tip: Array) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
         L2 = chain.link[2]
+        self.parallel = is_parallel(L2, 1e-15)  # to rounding, so that `miss` and `turned_back` hold as they are
         sense3 = 1.0 if L2[2, 2] > 0 else -1.0
         if sense3 < 0:
             L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
@@ -64,19 +65,41 @@ class Elbow:
         if self.prismatic1:
             ahead = arrays.sub(arrays.dot(n, [x, y, z]), along + arrays.dot(n, o))
             first, doubt1 = Pair(ahead / n[2], None), Doubt(np.zeros(1, bool))
-            z = z - first.c
         else:
             a = arrays.combine(n[0], [x], n[1], [y])[0]
             b = arrays.combine(n[0], [y], -n[1], [x])[0]
             rest = arrays.sub(along + arrays.dot(n, o), arrays.mul(n[2], z))
             first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
-            c1, s1 = first
-            x, y = c1 * x + s1 * y, c1 * y - s1 * x
-        lever = [arrays.sub(x, o[0]), arrays.sub(y, o[1]), arrays.sub(z, o[2])]
-        rx = arrays.sub(arrays.dot(self.shoulder[0:3], lever), past[0])
-        ry = arrays.sub(arrays.dot(self.shoulder[3:6], lever), past[1])
+        rx, ry, _ = self._seen(first, [x, y, z])
+        rx, ry = arrays.sub(rx, past[0]), arrays.sub(ry, past[1])
         second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2], fore)
         return [first, second, third], doubt1 | doubt23
+
+    def _seen(self, first: Pair, p: list[Entry]) -> list[Entry]:
+        """A point p, seen from before joint 1, as joint 2's frame sees it."""
+        moved = [p[0], p[1], p[2] - first.c] if first.s is None else spin(first.c, -first.s, p)
+        lever = [arrays.sub(v, o) for v, o in zip(moved, self.shoulder[9:12], strict=True)]
+        return [arrays.dot(self.shoulder[k : k + 3], lever) for k in (0, 3, 6)]
+
+    def miss(self, pairs: list[Pair], p: list[Entry]) -> Entry:
+        """Squared distance of the tip from p: joint 2's frame sees p pulled back and the tip pushed there."""
+        first, second, third = pairs
+        before = pose.apply(self.from_base, p)
+        x, y, z = self._seen(first, before)
+        total = (z - self.along) ** 2
+        if first.s is not None:
+            # a pair that is off the unit circle has stretched p on its way
+            stretched = first.c * first.c + first.s * first.s - 1.0
+            total = total + stretched * stretched * (before[0] * before[0] + before[1] * before[1])
+        return distance2(spin(*second, self.two_link.reach(third)), [x, y]) + total
+
+    def turned_back(self, pairs: list[Pair], v: list[Entry]) -> list[Entry]:
+        """A direction in the base, seen from the frame after link 2 that joint 3 turns with."""
+        first, second, third = pairs
+        v = pose.turn(self.from_base, v)
+        v = pose.turn_back(self.shoulder, v if first.s is None else spin(first.c, -first.s, v))
+        c, s = together(second, third, self.two_link.sense)
+        return pose.turn_back(self.to_fore, spin(c, -s, v))
 
 
 class TwoLink:
@@ -114,6 +137,12 @@ class TwoLink:
         return [arrays.add(self.lx, x), arrays.add(self.ly, y), 0.0]
 
 
+def together(first: Pair, second: Pair, sense: float) -> Pair:
+    """Two angles about one direction: their sum, or with sense -1 their difference."""
+    s2 = arrays.mul(sense, second.s)
+    return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
+
+
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
     """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_roll, xyz_pitch, xyz_pitch_roll."""
     n = {"xyz": 3, "xyz_roll": 4, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
@@ -132,7 +161,9 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
 
         def xyz(goal: list[Entry], prefer: Prefer) -> Candidates:
-            return Candidates(*elbow.solve(goal, [0.0, 0.0, 0.0], prefer))
+            pairs, doubt = elbow.solve(goal, [0.0, 0.0, 0.0], prefer)
+            miss = arrays.mul(1.0 / arm.reach**2, elbow.miss(pairs, goal)) if elbow.parallel else None
+            return Candidates(pairs, doubt, miss)
 
         return Geometry("elbow", why, True, xyz, labels=labels)
 

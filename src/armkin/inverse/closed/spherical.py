@@ -93,9 +93,11 @@ class SphericalWrist:
         self.chain = chain
         self.labels: tuple[str, ...] = ()
         self.ordered = True
+        self.elbow: Elbow | None = None
         self.close = False  # the first three joints are almost special: see `Position`
         if not chain.prismatic[1:3].any() and is_parallel(chain.link[2], tolerance) and not chain.prismatic[0]:
             elbow = Elbow(chain, after3)
+            self.elbow = elbow if elbow.parallel else None
             self.place: Place = partial(elbow.solve, past=[0.0, 0.0, 0.0])
             self.why = "axes 2 and 3 are parallel"
             self.labels = ("shoulder", "elbow", "wrist")
@@ -125,21 +127,32 @@ class SphericalWrist:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
         centre = pose.apply(goal, self.centre)
         pairs, doubt = self.place(centre, prefer=prefer[:3])
-        P = self.links[0]
-        for i, pair in enumerate(pairs):
-            P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
-            P = pose.times(P, self.links[i + 1])
-        there = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
-        miss = arrays.mul(1.0 / self.reach**2, distance2(there, centre))
         # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
-        x = pose.turn_back(P, pose.turn(goal, self.end[0:3]))
-        z = pose.turn_back(P, pose.turn(goal, self.end[6:9]))
+        columns = [pose.turn(goal, self.end[k : k + 3]) for k in (0, 6)]
+        if self.elbow is not None:
+            miss = self.elbow.miss(pairs, centre)
+            x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
+        else:
+            miss, x, z = self._pushed(pairs, centre, columns)
+        miss = arrays.mul(1.0 / self.reach**2, miss)
         if self.mirrored:
             return self._mirrored(pairs, doubt, miss, x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc, SHARP)
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
+
+    def _pushed(
+        self, pairs: list[Pair], centre: list[Entry], columns: list[list[Entry]]
+    ) -> tuple[Entry, list[Entry], list[Entry]]:
+        """Squared distance of the wrist's centre from where it should be, and directions seen after joint 3."""
+        P = self.links[0]
+        for i, pair in enumerate(pairs):
+            P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
+            P = pose.times(P, self.links[i + 1])
+        there = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
+        x, z = (pose.turn_back(P, v) for v in columns)
+        return distance2(there, centre), x, z
 
     def _around(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer

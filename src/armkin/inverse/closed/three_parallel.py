@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array
 from armkin.formula.pose import Pose
-from armkin.inverse.closed.elbow import TwoLink
+from armkin.inverse.closed.elbow import TwoLink, together
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.inverse.numeric.tolerances import EXACT, SHARP
@@ -139,7 +139,7 @@ class ThreeParallel:
         # x = Rz(q2 +- q3 +- q4) turned
         tx, ty = self.turned
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
-        c23, s23 = _together(second, third, self.sense3)
+        c23, s23 = together(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
@@ -150,12 +150,6 @@ class ThreeParallel:
         along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         miss = miss + distance2(along, [0.0, 0.0, self.sense4])
         return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
-
-
-def _together(first: Pair, second: Pair, sense: float) -> Pair:
-    """Two angles about one direction: their sum, or with sense -1 their difference."""
-    s2 = arrays.mul(sense, second.s)
-    return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
 
 
 def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
