@@ -78,6 +78,14 @@ def jacobian(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
 
 
+def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
+    """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
+    values = as_joints(arm, q)
+    both = _batched(arm, values, (16 + 6 * arm.n,), _both)
+    lead = values.shape[:-1]
+    return both[..., :16].reshape(*lead, 4, 4), both[..., 16:].reshape(*lead, 6, arm.n)
+
+
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
     """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
 
@@ -168,6 +176,11 @@ def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
 
 def jacobian_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """The Jacobian, row by row: 6 n entries."""
+    return _both(arm, q)[16:]
+
+
+def _both(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """The tool's pose and the Jacobian, row by row: 16 + 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []
     for i in range(arm.n):
@@ -179,7 +192,7 @@ def jacobian_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
         column = [*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z]
         ratio = float(arm.ratio[i])
         columns.append(column if ratio == 1.0 else [arrays.mul(ratio, entry) for entry in column])
-    return [column[row] for row in range(6) for column in columns]
+    return [*_rows(P), *(column[row] for row in range(6) for column in columns)]
 
 
 def _rows(P: Pose) -> list[Entry]:

@@ -43,6 +43,7 @@ NO_GROWTH = 1e-12  # residual that stays as it is
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
+STALLED = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
 
@@ -305,6 +306,11 @@ def means(arm: Arm, q: Array) -> Array:
     return np.asarray(q + np.where((count > 2)[..., None], shift, 0.0) * unit)
 
 
+def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+    """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
+    return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
+
+
 def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether the joints can move while the target is kept, and which do.
 
@@ -319,7 +325,7 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
     who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
     # most candidates fall back at once
     first = STEP * (10 if len(pushes) > 1 else 1)
-    there, size = newton.correct(arm, task, q[who] + first * push * unit, target[who], steps=6, least=WEAK)
+    there, size = _follow(arm, task, q[who] + first * push * unit, target[who])
     size -= newton.missing(arm, task, q, target)[who]
     far = (np.abs(there - q[who]) / unit).max(axis=1) > 0.3 * first * np.abs(push).max(axis=1)
     some = np.flatnonzero(far & (size <= GROWTH * first))
@@ -327,7 +333,7 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
         return moving, joints
     if len(pushes) == 1:  # of these, most do not stay on a longer way
         who, push, grown = who[some], push[some], size[some]
-        there, size = newton.correct(arm, task, q[who] + 10 * STEP * push * unit, target[who], steps=6, least=WEAK)
+        there, size = _follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
         size -= newton.missing(arm, task, q, target)[who]
         far = (np.abs(there - q[who]) / unit).max(axis=1) > 3 * STEP * np.abs(push).max(axis=1)
         some = np.flatnonzero((grown <= NO_GROWTH) | (far & (size <= GROWTH * 10 * STEP)))
@@ -338,7 +344,7 @@ def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target:
     sizes, ways, parts = np.ix_(*([STEP, 10 * STEP], [1.0, -1.0], [1.0, 0.6], [0.0], [0.0]))[:3]
     start = q[who] + sizes * ways * parts * push * unit
     goal = np.concatenate([target[who]] * 8)
-    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=6, least=WEAK)
+    there, size = _follow(arm, task, start.reshape(-1, arm.n), goal)
     there, size = there.reshape(start.shape), size.reshape(start.shape[:4])
     moved = np.abs(there[:, :, 0] - q[who]) / unit  # (2, 2, m, n)
     least = 0.3 * np.array([[STEP], [10 * STEP]]) * np.abs(push).max(axis=1)  # (2, m)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, wrapped
-from armkin.forward import fk, jacobian
+from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.inverse.tasks.task import Task
@@ -22,9 +22,9 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
 
     Prismatic columns too: a joint value is then worth one radian or one reach.
     """
-    T = fk(arm, q)
+    T, slopes = tip_and_jacobian(arm, q)
     r = residual(task, T, q, target)
-    J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T)
+    J = axis_projected(task, task_jacobian(task, slopes), T)
     r[:, : task.position] /= arm.reach
     J = J * np.where(arm.prismatic, arm.reach, 1.0)
     J[:, : task.position] /= arm.reach
@@ -50,13 +50,21 @@ def _sizes(r: Array) -> Array:
 
 
 def correct(
-    arm: Arm, task: Task, q: Array, target: Array, steps: int = 6, least: float = 1e-10, patience: int = 1000
+    arm: Arm,
+    task: Task,
+    q: Array,
+    target: Array,
+    steps: int = 6,
+    least: float = 1e-10,
+    patience: int = 1000,
+    stalled: float = np.inf,
 ) -> tuple[Array, Array]:
     """Gauss-Newton with steps of least norm: q (M, n) moved onto its targets.
 
     Returns the best q met and its `missing`. Singular values below `least` are left out of a step,
     so that a singular posture is approached without running away. patience: steps in a row that take less than a
-    tenth away after which a start is given up; one at a root of sixth order takes two thirds.
+    tenth away after which a start is given up; one at a root of sixth order takes two thirds. stalled: residual
+    below which such steps count.
     """
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
@@ -73,7 +81,7 @@ def correct(
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
         # done when rounding is all that is left
         least_gain = np.isfinite(size) & (size > 1e-15) & ((size > 1e-11) | (size < 0.5 * before))
-        idle[active] = np.where(size < 0.9 * before, 0, idle[active] + 1)
+        idle[active] = np.where((size < 0.9 * before) | (size > stalled), 0, idle[active] + 1)
         going = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)
         active, r, size = active[going], r[going], size[going]
         if k == steps or not len(active):
