@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +25,7 @@ from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
+from armkin.inverse.workers import shared
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class _CompiledTask:
             pointers = (a[rows].ctypes.data for a in (flat, out, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(_shared(part, len(flat), workers, WORTH)):
+        if sum(shared(part, len(flat), workers, WORTH)):
             far = np.flatnonzero(wild)
             out[far] = python(self.arm, flat[far])
         return out.reshape(*values.shape[:-1], *shape)
@@ -229,7 +229,7 @@ class _CompiledTask:
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
         least = WORTH if self.geometry.pairs is not None else WORTH // 64
-        left = sum(_shared(part, len(target), workers, least))
+        left = sum(shared(part, len(target), workers, least))
         if left and not read and (out.state == UNREAD).any():
             return None
         out.complete[...] = self.geometry.complete
@@ -266,15 +266,3 @@ def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]
         if name is not None:
             raise
         return None, None
-
-
-def _shared(part: Callable[[slice], int], count: int, workers: int, least: int) -> list[int]:
-    """``part(rows)`` for all rows, by that many threads, `least` rows or more at once: C runs without Python's lock."""
-    if workers < 1:
-        raise UsageError(f"workers: {workers}; at least 1 thread is needed")
-    share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
-    rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
-    if workers == 1 or len(rows) < 2:
-        return [part(slice(0, count))]
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(part, rows))

@@ -63,6 +63,12 @@ class Straight:
         """What is recorded of each output: a node, an array or a number."""
         return self._recording.outputs
 
+    def axes(self) -> list[tuple[int, ...]]:
+        """Lengths of the branch axes of each output."""
+        from armkin.formula.recording import axes_of
+
+        return [axes_of(x) for x in self._recording.outputs]
+
     def numbers(self) -> Callable[..., tuple[Any, ...]]:
         """The formula for one pose in plain Python: takes numbers; an output on branch axes is a tuple of them."""
         if self._run_single is None:

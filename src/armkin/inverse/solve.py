@@ -6,46 +6,53 @@ forward kinematics -> whole turns and limits -> the few doubtful ones through `d
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse import one_target
+from armkin.formula import arrays
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse import chunks, one_target
 from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
-from armkin.inverse.branches.turns import nearest_copy, nearest_row
-from armkin.inverse.closed.candidates import entries, preferred, recorded
-from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.doubtful import decided, examined
+from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.doubtful import examined
 from armkin.inverse.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
+from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import Task, around, distance, read_targets
+from armkin.inverse.tasks.task import Task, around, distance, read_targets, shaped
+from armkin.inverse.workers import checked, shared
 from armkin.model.arm import actual
-from armkin.model.limits import SLACK
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+WORTH = 256  # poses of an elimination that are worth a thread, and of which its own chunks are
+
 
 def ik(
-    arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None, examine: bool = True
+    arm: Arm,
+    targets: ArrayLike,
+    task: str | None = None,
+    *,
+    near: ArrayLike | None = None,
+    examine: bool = True,
+    workers: int = 1,
 ) -> Solutions:
     """All real branches of inverse kinematics.
 
     targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
     arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home;
     examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
-    them: some of their branches may be missing.
+    them: some of their branches may be missing; workers: threads that share a large batch, whose results are the same.
     Raises UsageError if the task does not fit the arm or a target is malformed.
 
     >>> import armkin, numpy as np
@@ -58,21 +65,27 @@ def ik(
     if examine and values.ndim <= 2 and (alone := one_target.solve(arm, values, task, near)) is not None:
         return alone
     if (turned := actual(arm)) is not arm:
-        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine))
+        return _commanded(
+            arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine, workers=workers)
+        )
     definition, geometry = solver(arm, task)
-    target, lead, rounding = read_targets(definition, values)
+    given, lead = shaped(definition, values)
     close = arm.home if near is None else arrays.real(near, "near")
     if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
     if not np.isfinite(close).all():
         raise UsageError("near holds nan or infinity; every joint value must be finite")
-    many = close.ndim == 1 and len(target) != 1
-    each = np.broadcast_to(close, (len(target), arm.n)) if many else close.reshape(-1, arm.n)
+    many = close.ndim == 1 and len(given) != 1
+    each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count = _closed(arm, definition, geometry, target, each, one, examine)
+        out, count, target, rounding = chunks.solve(
+            arm, definition, geometry, given, each, one, examine, checked(workers)
+        )
     else:
-        out, count = _rows(arm, definition, geometry, target, each, examine)
+        target, _, rounding = read_targets(definition, values)
+        target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
+        out, count = _rows(arm, definition, geometry, target, each, examine, checked(workers))
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
@@ -83,7 +96,7 @@ def ik(
     return Solutions(
         arm=arm,
         task=definition,
-        target=target.reshape(lead + target.shape[1:]).copy(),  # the caller's arrays may change
+        target=target.reshape(lead + target.shape[1:]),
         near=np.broadcast_to(close.copy(), (*lead, arm.n)),
         q=out.q.reshape(*each_branch, arm.n),
         valid=out.valid.reshape(each_branch),
@@ -111,106 +124,12 @@ def _commanded(arm: Arm, found: Solutions) -> Solutions:
     return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
 
 
-def _closed(
-    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, one: Array | None, examine: bool
+def _rows(
+    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool, workers: int
 ) -> tuple[Batch, int]:
-    """Closed forms: chunks of poses that stay in the cache, entry by entry. Also the number of branch columns."""
-    out: Batch | None = None
-    runner = recorded(arm, task, geometry)
-    straight = runner.code.always() if len(target) == 1 else runner.code.get(len(target))
-    workspace: list[NDArray[np.generic]] = []
-    doubts = []
-    for start in range(0, max(len(target), 1), arrays.CHUNK):
-        rows = slice(start, start + arrays.CHUNK)
-        goal, close = target[rows], near[rows] if one is None else one
-        N = len(goal)
-        if straight is None:
-            *values, miss, doubt, free = runner.candidates(entries(task, goal), preferred(arm, close))
-        elif N == 1:
-            one_goal = pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()
-            *values, miss, doubt, free = straight.single(one_goal)
-        else:
-            if not workspace or workspace[-1].shape[-1] != N:
-                workspace = straight.workspace(N)
-            *values, miss, doubt, free = straight.run(entries(task, goal), workspace)
-        if runner.axes is None:
-            runner.axes = np.broadcast_shapes((1, 1, 1, N), *(np.shape(v) for v in values))[:-1]
-        shape, B = (*runner.axes, N), math.prod(runner.axes)
-        if out is None:
-            out = empty(len(target), B, arm.n)
-        if N == 0:
-            break
-        part = out.part(rows)
-        miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
-        valid = miss <= ACCEPTED**2
-        _fill(arm, part, values, valid.reshape(shape), close)
-        full = bool(valid.all())
-        doubtful = _doubtful(miss, valid, doubt, full)
-        if not full:
-            count = valid.sum(axis=0)
-            part.status[count == 0] = Status.UNREACHABLE
-            pack(part, count)
-        if len(doubtful):
-            q, loose = np.empty((*runner.axes, len(doubtful), arm.n)), np.zeros((*runner.axes, len(doubtful)), bool)
-            for i, value in enumerate(values):
-                q[..., i] = value[..., doubtful] if np.shape(value)[-1:] == (N,) else value
-            loose |= np.greater(
-                free[..., doubtful] if np.shape(free)[-1:] == (N,) else free, 0
-            )  # constants are numbers
-            q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
-            doubts.append((start + doubtful, q, valid[:, doubtful].T, loose.reshape(B, -1).any(axis=0)))
-    assert out is not None
-    if doubts and examine:
-        out = decided(arm, task, runner, out, target, near, *map(np.concatenate, zip(*doubts, strict=True)))
-    return out, B
-
-
-def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:
-    """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
-    *axes, N = valid.shape
-    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
-    within, legal = valid, []
-    for i in range(arm.n):
-        value, inside = _legal(arm, i, values[i], close)
-        legal.append(value)
-        if inside is not True:
-            within = within & inside
-    for i, value in enumerate(legal):
-        grid[..., i] = value
-    for mask, out in ((valid, part.valid), (within, part.within)):
-        out[...] = True if mask.all() else mask.reshape(-1, N).T
-    part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
-
-
-def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
-    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
-
-    miss, valid: (B, N); full: valid everywhere.
-    """
-    N = miss.shape[1]
-    if np.shape(doubt)[-1:] != (N,):
-        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
-    edge = np.flatnonzero(doubt) % N
-    if not full:  # nearly there, or not a number
-        edge = np.concatenate([edge, np.flatnonzero(~valid & ~(miss > NEARBY**2)) % N])
-    return np.unique(edge) if len(edge) else edge
-
-
-def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
-    """A joint's values at their nearest legal copies, and whether they are within limits."""
-    lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
-    if not arm.prismatic[joint]:
-        close = float(near[joint]) if near.ndim == 1 else near[:, joint]
-        return nearest_copy(value, close, lower, upper)
-    if lower == -np.inf and upper == np.inf:
-        return value, True
-    return value, (value >= lower - SLACK) & (value <= upper + SLACK)
-
-
-def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool) -> tuple[Batch, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
-    q, doubt, complete, lost, guesses = geometry.rows(target)
+    q, doubt, complete, lost, guesses = _solved(geometry.rows, target, workers)
     B = q.shape[1]
     out = empty(len(target), B, arm.n)
     out.q[...], inside = nearest_row(arm, q, near[:, None, :])
@@ -255,3 +174,30 @@ def _rows(arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, 
             np.zeros(len(target), bool) if lost is None else lost,
         )
     return out, B
+
+
+def _solved(solve: Callable[[Array], Rows], target: Array, workers: int) -> Rows:
+    """What threads find, together: columns that only some need are nan in the others."""
+    parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
+    if len(parts) == 1:
+        return parts[0]
+    columns = list(zip(*parts, strict=True))
+    q, doubt, complete, lost, guesses = (
+        None if column[0] is None else _stacked([np.asarray(part) for part in column]) for column in columns
+    )
+    assert q is not None
+    assert doubt is not None
+    assert complete is not None
+    return Rows(q, doubt, complete, lost, guesses)
+
+
+def _stacked(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """Arrays (N, ...), or (N, B, n) of unlike B, one below the other."""
+    if parts[0].ndim < 3:
+        return np.concatenate(parts)
+    out = np.full((sum(map(len, parts)), max(part.shape[1] for part in parts), *parts[0].shape[2:]), np.nan)
+    start = 0
+    for part in parts:
+        out[start : start + len(part), : part.shape[1]] = part
+        start += len(part)
+    return out

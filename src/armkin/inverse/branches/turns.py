@@ -40,7 +40,12 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     principal = value
     if not at_zero:
-        value = value + TURN * np.rint((near - value) / TURN)
+        turned = np.asarray(near - value)  # one array for all steps: it stays in the cache
+        turned /= TURN
+        np.rint(turned, out=turned)
+        turned *= TURN
+        turned += value
+        value = turned
     first, last = (-np.pi, -np.pi) if at_zero else (float(np.min(near)) - np.pi, float(np.max(near)) - np.pi)
     if lower <= first and upper >= last + TURN:
         return value, True

@@ -70,11 +70,12 @@ class Recorded:
         rng = np.random.default_rng(4)
         N, n = len(target), self.arm.n
         unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
-        round_ = np.repeat(np.linspace(-1.0, 1.0, FREED, endpoint=False)[:, None], n, axis=1)
-        offsets = np.concatenate([round_, rng.uniform(-1, 1, (FREED, n)), np.zeros((SHAKEN, n))]) * unit
+        offsets = np.repeat(np.linspace(-1.0, 1.0, FREED, endpoint=False)[:, None], n, axis=1) * unit
+        if lost.any():  # else what follows the first ones would be dropped
+            offsets = np.concatenate([offsets, rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
         goals = np.repeat(target[:, None], len(offsets), axis=1)
-        for k in range(SHAKEN):
-            goals[:, 2 * FREED + k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
+        for k in range(2 * FREED, len(offsets)):
+            goals[:, k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
         values = (near[:, None] + offsets).reshape(-1, n)
         prefer = preferred(self.arm, values)
         found = self.candidates(entries(self.task, goals.reshape(-1, *target.shape[1:])), prefer)

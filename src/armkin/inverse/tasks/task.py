@@ -82,34 +82,59 @@ def read_targets(task: Task, targets: ArrayLike) -> Targets:
     it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
     length or a matrix that is no rotation to 1e-6.
     """
+    flat, lead = shaped(task, targets)
+    rounding = np.zeros(len(flat))
+    if task.orientation == "full":
+        given = flat
+        for start in range(0, len(flat), arrays.CHUNK):
+            rows = slice(start, start + arrays.CHUNK)
+            part = given[rows]
+            near, rounding[rows], _ = read_poses(part)
+            if near is not part:
+                flat = flat.copy() if flat is given else flat
+                flat[rows] = near
+    return Targets(flat, lead, rounding)
+
+
+def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    """Targets as a flat batch (N, m), or (N, 4, 4) for poses, which are not read yet; and the batch's shape."""
     values = arrays.real(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
     if values.shape[-len(shape) :] != shape or values.ndim < len(shape):
         expected = "(..., 4, 4)" if task.orientation == "full" else f"(..., {shape[0]}): {' '.join(task.labels)}"
         raise UsageError(f"task {task.name} takes targets of shape {expected}; got {values.shape}")
-    if not (values.min(initial=0.0) >= -LARGEST and values.max(initial=0.0) <= LARGEST):
-        if not np.isfinite(values).all():
-            raise UsageError("a target holds nan or infinity; every number must be finite")
-        raise UsageError(f"a target holds a number beyond {LARGEST:g}; no arm reaches there")
-    lead = values.shape[: values.ndim - len(shape)]
     flat = values.reshape(-1, *shape)
+    if task.orientation != "full":
+        _refuse_wild(flat)
     if task.orientation == "axis":
         length = np.linalg.norm(flat[:, 3:], axis=1, keepdims=True)
         if (length < 1e-12).any():
             raise UsageError("a target's axis ax ay az has no length; give the direction of the tool's z axis")
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
-    rounding = np.zeros(len(flat))
-    if task.orientation == "full":
-        for start in range(0, len(flat), arrays.CHUNK):
-            rows = slice(start, start + arrays.CHUNK)
-            rounding[rows] = _off(flat[rows])
-        if not (rounding <= ROTATION).all():
-            raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
-        some = np.flatnonzero(rounding > ROUNDED)
-        if len(some):
-            flat = flat.copy()
-            flat[some, :3, :3] = nearest_rotation(flat[some, :3, :3])
-    return Targets(flat, lead, rounding)
+    return flat, values.shape[: values.ndim - len(shape)]
+
+
+def _refuse_wild(values: Array) -> None:
+    """Raise UsageError for numbers that are not finite or too large."""
+    if not (values.min(initial=0.0) >= -LARGEST and values.max(initial=0.0) <= LARGEST):
+        if not np.isfinite(values).all():
+            raise UsageError("a target holds nan or infinity; every number must be finite")
+        raise UsageError(f"a target holds a number beyond {LARGEST:g}; no arm reaches there")
+
+
+def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
+    """Poses (N, 4, 4) with the rotations next to those given, how far these were off (N,), and the entries."""
+    _refuse_wild(T)
+    entries = pose.read(T)
+    off = _off(T, entries)
+    if not (off <= ROTATION).all():
+        raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
+    some = np.flatnonzero(off > ROUNDED)
+    if len(some):
+        T = T.copy()
+        T[some, :3, :3] = nearest_rotation(T[some, :3, :3])
+        entries = pose.read(T)
+    return T, off, entries
 
 
 @cache
@@ -128,12 +153,12 @@ def rotation_check() -> Straight:
     return Straight(formula, 12)
 
 
-def _off(T: Array) -> Array:
+def _off(T: Array, entries: pose.Pose) -> Array:
     """How far the columns of (N, 4, 4) are from those of rotations: (N,)."""
     check = rotation_check()
     if len(T) == 1:
         return check.single(pose.read_one(T[0]))[0]
-    return np.asarray(check.run(pose.read(T), check.workspace(len(T)))[0])
+    return np.array(check.run(entries, check.workspace(len(T)))[0])
 
 
 def nearest_rotation(R: Array) -> Array:

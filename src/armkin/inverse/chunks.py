@@ -1,0 +1,188 @@
+"""Batches of closed forms: chunks of poses that stay in the cache, entry by entry."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.trace import Straight
+from armkin.inverse.batch import Batch, empty, pack
+from armkin.inverse.branches.turns import nearest_copy
+from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.doubtful import decided
+from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
+from armkin.inverse.solutions import Status
+from armkin.inverse.tasks.task import Task, read_poses
+from armkin.inverse.workers import shared
+from armkin.model.limits import SLACK
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+SHARED = 16384  # poses of a chunk where threads share a batch: longer calls of numpy wait less for each other
+
+
+class Solved(NamedTuple):
+    """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`."""
+
+    out: Batch
+    columns: int
+    target: Array
+    rounding: Array
+
+
+class _Doubts(NamedTuple):
+    """Targets of a chunk on an edge: rows (K,), candidates (K, B, n), which were accepted, and free joints (K,)."""
+
+    rows: NDArray[np.intp]
+    q: Array
+    valid: Bool
+    free: Bool
+
+
+def solve(
+    arm: Arm,
+    task: Task,
+    geometry: Geometry,
+    given: Array,
+    near: Array,
+    one: Array | None,
+    examine: bool,
+    workers: int,
+) -> Solved:
+    """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
+
+    near: (N, n), one: (n,) if it serves all; workers: threads.
+    """
+    runner, N = recorded(arm, task, geometry), len(given)
+    straight = runner.code.always() if N == 1 else runner.code.get(N)
+    if runner.axes is None:
+        runner.axes = _axes(runner, straight, given[:0])
+    out = empty(N, math.prod(runner.axes), arm.n)
+    target, rounding = np.empty_like(given), np.zeros(N)
+    threads = straight is not None and workers > 1
+    size = SHARED if threads else arrays.CHUNK
+
+    def part(rows: slice) -> list[_Doubts]:
+        """Some rows, by a thread of its own."""
+        workspace: list[NDArray[Any]] = []
+        doubts: list[_Doubts] = []
+        for start in range(rows.start, rows.stop, size):
+            some = slice(start, min(start + size, rows.stop))
+            goal, columns, close = given[some], None, near[some] if one is None else one
+            if task.orientation == "full":
+                goal, rounding[some], columns = read_poses(goal)
+            target[some] = goal
+            found, workspace = _candidates(
+                runner, straight, goal, columns, near[some] if one is None else one, workspace
+            )
+            doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close)
+        return doubts
+
+    parts = shared(part, N, workers if threads else 1, size, size)
+    doubts = [doubt for one_part in parts for doubt in one_part]
+    if doubts and examine:
+        out = decided(arm, task, runner, out, target, near, *map(np.concatenate, zip(*doubts, strict=True)))
+    return Solved(out, math.prod(runner.axes), target, rounding)
+
+
+def _axes(runner: Recorded, straight: Straight | None, goal: Array) -> tuple[int, ...]:
+    """Lengths of the branch axes; goal: no targets."""
+    if straight is not None:
+        return np.broadcast_shapes((1, 1, 1), *straight.axes()[:-3])
+    values = runner.candidates(entries(runner.task, goal), [None] * runner.arm.n)[:-3]
+    return np.broadcast_shapes((1, 1, 1, 0), *map(np.shape, values))[:-1]
+
+
+def _candidates(
+    runner: Recorded,
+    straight: Straight | None,
+    goal: Array,
+    columns: list[Entry] | None,
+    near: Array,
+    workspace: list[NDArray[Any]],
+) -> tuple[list[Array], list[NDArray[Any]]]:
+    """A chunk's candidates as `Recorded.candidates` returns them, and the buffers that they stand in."""
+    N, task = len(goal), runner.task
+    if straight is None:
+        return runner.candidates(entries(task, goal), preferred(runner.arm, near)), workspace
+    if N == 1:
+        return straight.single(pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()), workspace
+    if not workspace or workspace[-1].shape[-1] != N:
+        workspace = straight.workspace(N)
+    return list(straight.run(entries(task, goal) if columns is None else columns, workspace)), workspace
+
+
+def _keep(arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], start: int, near: Array) -> list[_Doubts]:
+    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge."""
+    *values, miss, doubt, free = found
+    N = len(part.q)
+    shape, B = (*axes, N), math.prod(axes)
+    miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
+    valid = miss <= ACCEPTED**2
+    _fill(arm, part, values, valid.reshape(shape), near)
+    full = bool(valid.all())
+    doubtful = _doubtful(miss, valid, doubt, full)
+    if not full:
+        count = valid.sum(axis=0)
+        part.status[count == 0] = Status.UNREACHABLE
+        pack(part, count)
+    if not len(doubtful):
+        return []
+    q, loose = np.empty((*axes, len(doubtful), arm.n)), np.zeros((*axes, len(doubtful)), bool)
+    for i, value in enumerate(values):
+        q[..., i] = value[..., doubtful] if np.shape(value)[-1:] == (N,) else value
+    loose |= np.greater(free[..., doubtful] if np.shape(free)[-1:] == (N,) else free, 0)  # constants are numbers
+    q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
+    free_somewhere = np.asarray(loose.reshape(B, -1).any(axis=0))
+    return [_Doubts(start + doubtful, q, valid[:, doubtful].T, free_somewhere)]
+
+
+def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:
+    """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
+    *axes, N = valid.shape
+    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
+    within, legal = valid, []
+    for i in range(arm.n):
+        value, inside = _legal(arm, i, values[i], close)
+        legal.append(value)
+        if inside is not True:
+            within = within & inside
+    for i, value in enumerate(legal):
+        grid[..., i] = value
+    for mask, out in ((valid, part.valid), (within, part.within)):
+        out[...] = True if mask.all() else mask.reshape(-1, N).T
+    part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
+
+
+def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
+    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
+
+    miss, valid: (B, N); full: valid everywhere.
+    """
+    N = miss.shape[1]
+    if np.shape(doubt)[-1:] != (N,):
+        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
+    edge = np.flatnonzero(doubt) % N
+    if not full:
+        clear = miss > NEARBY**2
+        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
+            edge = np.concatenate([edge, np.flatnonzero(~(valid | clear)) % N])
+    return np.unique(edge) if len(edge) else edge
+
+
+def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
+    """A joint's values at their nearest legal copies, and whether they are within limits."""
+    lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
+    if not arm.prismatic[joint]:
+        close = float(near[joint]) if near.ndim == 1 else near[:, joint]
+        return nearest_copy(value, close, lower, upper)
+    if lower == -np.inf and upper == np.inf:
+        return value, True
+    return value, (value >= lower - SLACK) & (value <= upper + SLACK)

@@ -1,0 +1,35 @@
+"""Threads that share a batch: numpy and C run without Python's lock, and every target is solved as if alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from armkin.errors import UsageError
+
+Result = TypeVar("Result")
+
+
+def shared(part: Callable[[slice], Result], count: int, workers: int, least: int, step: int = 1) -> list[Result]:
+    """``part(rows)`` of all rows, in their order, by that many threads.
+
+    least: rows that are worth a thread; step: of which shares are multiples. One worker gets all rows at once.
+    Raises UsageError for less than one worker.
+    """
+    checked(workers)
+    share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
+    share += -share % step
+    rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
+    if workers == 1 or len(rows) < 2:
+        return [part(slice(0, count))]
+    from concurrent.futures import ThreadPoolExecutor  # here, as few batches are shared
+
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(part, rows))
+
+
+def checked(workers: int) -> int:
+    """The number of threads asked for. Raises UsageError for less than one."""
+    if workers < 1:
+        raise UsageError(f"workers: {workers}; at least 1 thread is needed")
+    return workers
