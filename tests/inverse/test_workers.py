@@ -1,0 +1,58 @@
+"""Threads that share a batch give what one gives, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from test_every_branch import shipped
+
+import armkin
+from armkin.errors import UsageError
+from armkin.formula import arrays
+from armkin.inverse import chunks
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.task import targets_of
+from armkin.inverse.workers import shared
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("three_dof", 9000), ("puma560", 9000), ("stanford", 5000), ("ra02", 5000), ("jaco_j2n6s300", 600)],
+)
+def test_results_do_not_depend_on_the_workers(name: str, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "SHARED", 4 * 512)  # shares of a batch that a test has time for
+    monkeypatch.setattr(arrays, "CHUNK", 512)
+    arm, _ = shipped(name)
+    q = np.random.default_rng(11).uniform(-3, 3, (count, arm.n))
+    q[::97, :] = np.round(q[::97, :] / (np.pi / 2)) * (np.pi / 2)  # targets on an edge, too
+    goal = targets_of(solver(arm, None)[0], armkin.fk(arm, q), q)
+    one, three = armkin.ik(arm, goal), armkin.ik(arm, goal, workers=3)
+    for field in fields(one):
+        a, b = getattr(one, field.name), getattr(three, field.name)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b, err_msg=field.name)
+        else:
+            assert a == b or field.name == "arm"
+
+
+def test_a_chunk_gives_what_a_longer_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, _ = shipped("ur5e")
+    T = armkin.fk(arm, np.random.default_rng(12).uniform(-3, 3, (5000, arm.n)))
+    whole = armkin.ik(arm, T)
+    monkeypatch.setattr(arrays, "CHUNK", 700)
+    np.testing.assert_array_equal(armkin.ik(arm, T).q, whole.q)
+
+
+@pytest.mark.parametrize(("workers", "least", "step"), [(1, 10, 1), (2, 10, 1), (3, 256, 256), (16, 1, 1)])
+def test_every_row_is_given_once_and_in_order(workers: int, least: int, step: int) -> None:
+    rows = shared(lambda rows: list(range(rows.start, rows.stop)), 1000, workers, least, step)
+    assert [row for part in rows for row in part] == list(range(1000))
+    assert all(part[0] % step == 0 for part in rows)
+
+
+def test_no_worker_is_refused() -> None:
+    arm, _ = shipped("three_dof")
+    with pytest.raises(UsageError, match="workers: 0; at least 1 thread is needed"):
+        armkin.ik(arm, np.full((5, 3), 200.0), workers=0)
