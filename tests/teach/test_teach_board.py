@@ -198,3 +198,21 @@ def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
         assert page.act("home")[0] in (200, 422)
         page.idle()
         page.close()
+
+
+def test_the_gripper_of_a_board_of_others_as_by_the_command_line(tmp_path: Path) -> None:
+    text = (ROOT / "tests/robots/three_dof_grbl.yaml").read_text()
+    begin, end = text.index("gripper:"), text.index("# The paper has no limit switches")
+    path = tmp_path / "spindle.yaml"
+    path.write_text(text[:begin] + "gripper: {kind: spindle, open: 40, closed: 200}\n" + text[end:])
+    with served(path, "sim") as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        page.idle()
+        status, answer = page.act("grip", value=201)
+        assert (status, "outside of the gripper's 40 to 200" in answer["error"]) == (422, True)
+        assert page.act("grip", value="closed")[0] == 200
+        assert page.idle()["error"] == ""
+        link = server.actions.board.thread.link  # type: ignore[union-attr]
+        assert link.port.spindle == 200  # type: ignore[union-attr]
+        page.close()

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.board import path_run
-from armkin.board.feetech.machine import ServoMachine
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.machine import Machine
 from armkin.board.foreign import Foreign
@@ -145,7 +144,9 @@ class BoardActions:
             raise UsageError("value: expected open, closed or a number")
         wanted = value if isinstance(value, str) else request_checks.number(fields, "value", -1e6, 1e6)
         board = self.thread.board
-        if not isinstance(board, Foreign):
+        if isinstance(board, Foreign):
+            board.grip_value(wanted)
+        else:
             gripping.count_of(gripping.gripper_of(self.arm.name, board), wanted)
         assume = request_checks.flag(fields, "assume")
         self.check_file()
@@ -210,16 +211,11 @@ class BoardActions:
             homing.home(machine)
 
     def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
-        if isinstance(machine, ServoMachine):
-            gripper = self.arm.gripper
-            if gripper is None:
-                raise UsageError(f"{self.arm.name} has no gripper; add gripper: to its robot file")
-            machine.grip(
-                gripper, {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
-            )
+        board = self.thread.board
+        if isinstance(board, Foreign):
+            board.grip(machine, board.grip_value(value))
             return
-        if not isinstance(machine, Machine):
-            raise UsageError(f"a gripper needs a board with armkin's firmware, not {self.thread.board.board.kind}")
+        assert isinstance(machine, Machine)
         grip = gripping.gripper_of(self.arm.name, machine.configuration)
         known = gripping.known(machine, grip)
         if not known and not assume and not machine.port.simulated:
