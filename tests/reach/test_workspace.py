@@ -19,7 +19,7 @@ from armkin.model.arm import Arm, from_links
 from armkin.model.rotation import transform
 from armkin.motors import joints_per_pulse, rounding
 from armkin.reach import workspace
-from armkin.reach.measures import step_error, tip_manipulability
+from armkin.reach.measures import measure
 from armkin.reach.sampling import CHUNK, Random, grid
 from armkin.reach.volume import extent
 
@@ -207,24 +207,24 @@ def test_step_error_is_the_worst_of_all_signs() -> None:
     q = np.random.default_rng(5).uniform(THREE_DOF.lower, THREE_DOF.upper, (50, 3))
     J = jacobian(THREE_DOF, q)[:, :3] @ joints_per_pulse(THREE_DOF)
     worst = np.max([np.linalg.norm(J @ (0.5 * np.array(s)), axis=1) for s in product((-1, 1), repeat=3)], axis=0)
-    assert step_error(THREE_DOF, q) == pytest.approx(worst, rel=1e-12)
+    assert measure(THREE_DOF, "step_error")(q) == pytest.approx(worst, rel=1e-12)
     many = np.random.default_rng(6).uniform(THREE_DOF.lower, THREE_DOF.upper, (20_000, 3))
-    ratio = rounding(THREE_DOF, many).error / step_error(THREE_DOF, many)
+    ratio = rounding(THREE_DOF, many).error / measure(THREE_DOF, "step_error")(many)
     assert 0.9 < ratio.max() < 1.001  # a bound, and a tight one
 
 
 def test_tip_manipulability() -> None:
     q = np.random.default_rng(7).uniform(-2, 2, (30, 3))
     values = np.linalg.svd(jacobian(THREE_DOF, q)[:, :3], compute_uv=False)
-    assert tip_manipulability(THREE_DOF, q) == pytest.approx(values.prod(axis=1), rel=1e-9)
+    assert measure(THREE_DOF, "manipulability")(q) == pytest.approx(values.prod(axis=1), rel=1e-9)
     # Planar arm: a1 a2 |sin q2| (Yoshikawa 1985, eq. 26); and the same in a plane that stands askew.
     tilted = chain(TILTED, along(200), along(300), kinds="RR", limits=[FREE, FREE])
     for arm in (PLANAR, tilted):
-        assert tip_manipulability(arm, q[:, :2]) == pytest.approx(200 * 300 * np.abs(np.sin(q[:, 1])), rel=1e-9)
+        assert measure(arm, "manipulability")(q[:, :2]) == pytest.approx(200 * 300 * np.abs(np.sin(q[:, 1])), rel=1e-9)
     # Two joints in space: the area of the parallelogram.
     J = jacobian(PAN_TILT, q[:, :2])[:, :3]
     area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=1)
-    assert tip_manipulability(PAN_TILT, q[:, :2]) == pytest.approx(area, rel=1e-6)
+    assert measure(PAN_TILT, "manipulability")(q[:, :2]) == pytest.approx(area, rel=1e-6)
 
 
 def read_csv(path: Path) -> tuple[list[str], np.ndarray]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armkin.reach import Workspace
 
 COLOURS = ("manipulability", "step_error", "reach", "z")
-KEEP = 150_000  # samples that a survey should keep for a picture: more cannot be told apart
+KEEP = 150_000  # samples of a survey that are enough for a picture: more cannot be told apart
 _CLOUD = 20_000  # of them drawn in space
 _EACH = 15  # samples a spot of a projection should have in the mean; below that they are drawn one by one
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -22,7 +21,14 @@ MEASURES = ("manipulability", "step_error")
 
 
 def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
-    """The function (N, n) -> (N,) of a measure's name, its constants worked out."""
+    """The function (N, n) [rad | mm] -> (N,) of a measure's name, its constants worked out.
+
+    step_error [mm]: how far the tip is off when every motor is half a pulse off, in the worst combination of signs:
+    the largest ``|J M^-1 s / 2|`` over all s of +1 and -1, J the linear rows of the Jacobian, M the motors matrix
+    (pulses per rad | mm). To first order it bounds the error of rounding joint values to pulses.
+    manipulability: the product of the singular values of J (Yoshikawa, Manipulability of Robotic Mechanisms, 1985,
+    eq. 13), a power of mm; of an arm that moves in a plane, within that plane.
+    """
     if name == "step_error":
         if len(arm.motor_gain) > _MOST_MOTORS:
             raise UsageError(
@@ -36,27 +42,6 @@ def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
     normal, _ = motion(arm)
     basis = np.eye(3) if normal is None else np.linalg.svd(normal[None])[2][1:]
     return lambda q: _volume(basis @ jacobian(arm, q)[:, :3])
-
-
-def step_error(arm: Arm, q: ArrayLike) -> Array:
-    """How far the tip is off when every motor is half a pulse off, in the worst combination of signs.
-
-    q: (..., n) [rad | mm]. Returns (...) [mm]: the largest ``|J M^-1 s / 2|`` over all s of +1 and -1,
-    J the linear rows of the Jacobian, M the motors matrix (pulses per rad | mm). To first order it
-    bounds the error of rounding joint values to pulses.
-    """
-    values = np.asarray(q, dtype=float)
-    return measure(arm, "step_error")(values.reshape(-1, arm.n)).reshape(values.shape[:-1])
-
-
-def tip_manipulability(arm: Arm, q: ArrayLike) -> Array:
-    """Yoshikawa's measure of the tip's position, within the plane of a planar arm.
-
-    q: (..., n) [rad | mm]. Returns (...): the product of the singular values of the Jacobian's linear
-    rows (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 13); a power of mm.
-    """
-    values = np.asarray(q, dtype=float)
-    return measure(arm, "manipulability")(values.reshape(-1, arm.n)).reshape(values.shape[:-1])
 
 
 def _volume(J: Array) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 COUNTS = 4096  # positions a turn
-RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)  # [baud] by register 6
 
 
 class Register(NamedTuple):
@@ -35,7 +34,6 @@ class Register(NamedTuple):
 
 MODEL = Register(3, 2)
 OFFSET = Register(31, 2, 11)  # [counts] taken off the encoder's position
-MODE = Register(33, 1)  # 0: position
 TORQUE = Register(40, 1)
 ACCELERATION = Register(41, 1)  # [100 counts/s^2], 0: none
 GOAL_POSITION = Register(42, 2, 15)

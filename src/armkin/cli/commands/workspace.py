@@ -71,13 +71,16 @@ def workspace(
         cloud.check(out)
     if plot is None and color is not None:
         raise UsageError("--color is for the picture; add --plot FILE")
-    shade = color or "manipulability"
+    shade, keep = color or "manipulability", 0
     if plot is not None:  # say what is missing before the work, not after it
         from armkin.plot import canvas
+        from armkin.plot.cloud import KEEP
+        from armkin.reach.measures import MEASURES
 
         canvas.check(plot)
         canvas.require()
-        measures += [shade] if shade in ("manipulability", "step_error") and shade not in measures else []
+        measures += [shade] if shade in MEASURES and shade not in measures else []
+        keep = KEEP
     count = None if samples is None else whole(samples, "--samples", 1, MOST)
     points = None if grid is None else _points(grid)
     each = points * arm.n if points and len(points) == 1 else points
@@ -91,7 +94,7 @@ def workspace(
             position=armkin.compile(arm).position if compiled else None,
             measures=measures,
             out=out,
-            keep=150_000 if plot is not None else 0,
+            keep=keep,
             progress=tick,
         )
     if plot is not None:
