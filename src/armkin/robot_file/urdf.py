@@ -13,6 +13,8 @@ from __future__ import annotations
 import math
 import os
 import re
+import sys
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,10 @@ from armkin.robot_file.writing import pose, tidy
 MAX_BYTES = 8 * 2**20
 SNAP = 1e-4  # [rad] an angle this close to a right angle counts as one, with `snap`
 METRE = 1000.0  # [mm]
+FARTHEST = 1e4  # [m] of anything from the base
+LARGE = 20.0  # [m] from base to tip that makes one ask
+TURNS = 25.0  # [rad] of a limit that make one ask: four turns
+ENDLESS = 1e6  # [deg | mm] of a limit that is none
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _MOVING = ("revolute", "continuous", "prismatic")
@@ -49,13 +55,17 @@ def read(
 ) -> Imported:
     """Read a URDF file; see `parse`. Raises FileError if it cannot be read."""
     name = os.fspath(path)
+    return parse(load(name), name, base=base, tip=tip, snap=snap)
+
+
+def load(path: str) -> bytes:
+    """A file's bytes, MAX_BYTES and one more at most; `-`: what stands in standard input. Raises FileError."""
     try:
-        with Path(name).open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+        with nullcontext(sys.stdin.buffer) if path == "-" else Path(path).open("rb") as file:
+            return file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(f"{name}: cannot read the URDF: {reason}") from None
-    return parse(raw, name, base=base, tip=tip, snap=snap)
+        raise FileError(f"{path}: cannot read the URDF: {reason}") from None
 
 
 def parse(
@@ -100,10 +110,16 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
             )
         direction = T[:3, :3] @ _axis(joint, where, snap)
         joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
+        if np.abs(T[:3, 3]).max() > FARTHEST:
+            raise RobotFileError(f"{where}: stands more than 10 km from {base}; a URDF is in metres")
     if not joints:
         raise RobotFileError(f"{path}: no joint moves between {base} and {tip}; choose another base or tip")
     if len(joints) > 12:
         raise RobotFileError(f"{path}: {len(joints)} joints between {base} and {tip}; a robot file has at most 12")
+    if (reach := float(np.abs(T[:3, 3]).max())) > FARTHEST:
+        raise RobotFileError(f"{path}: {tip} is more than 10 km from {base}; a URDF is in metres")
+    if reach > LARGE:
+        notes.append(f"{tip} is {reach:.4g} m from {base}: a URDF is in metres, are these millimetres?")
     T[:3, 3] *= METRE
     title = re.sub(r"[^\x20-\x7e]+", " ", robot).strip()[:80] or "arm"
     data = {
@@ -132,12 +148,16 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str
         low, high = (tidy((value or 0.0) * size, 9) for value in (lower, upper))
         if low > high:
             raise RobotFileError(f"{where}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
-        if low == high == 0:
+        if max(-low, high) > ENDLESS:
+            notes.append(f"joint {name} has limits beyond {ENDLESS:.0f} {unit}: read as no limits")
+        elif low == high == 0:
             notes.append(f"joint {name} has limits 0 and 0: read as no limits")
         elif low == high:
             raise RobotFileError(f"{where}: both limits are {low:g} {unit}; a joint that never moves is fixed")
         else:
             entry["limits"] = [low, high]
+            if not slides and max(-low, high) > TURNS * size:
+                notes.append(f"joint {name} turns {low:g} to {high:g} deg: a URDF is in radians, are these degrees?")
             if not low <= 0 <= high:
                 entry["home"] = tidy((low + high) / 2, 9)
                 notes.append(f"joint {name} has 0 outside its limits: home is their middle, {entry['home']:g} {unit}")
@@ -146,7 +166,7 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str
     speed = _value(joint, "velocity", where) or 0.0
     if speed < 0:
         raise RobotFileError(f"{where}: velocity {speed:g} is negative")
-    if 0 < speed * size <= 1e6:
+    if 1e-6 <= speed * size <= 1e6:
         entry["max_speed"] = tidy(speed * size, 9)
     return entry
 
@@ -170,7 +190,7 @@ def _origin(joint: Joint, where: str, snap: bool) -> Matrix:
     """Where the joint stands in its parent link [m]."""
     xyz = _triple(joint.text("origin", "xyz"), (0.0, 0.0, 0.0), f"{where}: origin xyz")
     rpy = _triple(joint.text("origin", "rpy"), (0.0, 0.0, 0.0), f"{where}: origin rpy")
-    if max(map(abs, xyz)) > 1e4:
+    if max(map(abs, xyz)) > FARTHEST:
         raise RobotFileError(f"{where}: origin xyz is more than 10 km; a URDF is in metres")
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
     return np.array(

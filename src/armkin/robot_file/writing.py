@@ -14,6 +14,7 @@ from decimal import Decimal
 from typing import Any
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_UNFIT = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")  # no YAML text
 _WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", "none", "nan", "inf"}
 
 
@@ -39,7 +40,7 @@ def text(data: Mapping[str, Any], comments: Iterable[str] = ()) -> str:
       - name: q1
         limits: [-90, 90]
     """
-    lines = [f"# {line}" for comment in comments for line in comment.splitlines()]
+    lines = [f"# {line}" for comment in comments for line in _UNFIT.sub("?", comment).splitlines()]
     for key, value in data.items():
         if isinstance(value, Mapping) or not _is_list_of_mappings(value):
             lines.append(f"{key}: {_flow(value)}")

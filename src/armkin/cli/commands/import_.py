@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def import_(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="A URDF file, flattened if it was a xacro.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE|-", help="A URDF, flattened if it was a xacro; -: standard input.")
+    ],
     base: Annotated[
         str | None, typer.Option("--base", metavar="LINK", help="Where the chain begins. [default: the root]")
     ] = None,
@@ -43,7 +45,8 @@ def import_(
         raise UsageError(f"{file} is a robot, and import reads URDFs: armkin info {file} says what it is")
     files.keep(file)
     try:
-        found = urdf.read(file, base=base, tip=tip, snap=snap)
+        raw = urdf.load(file)  # once: a pipe can be read no second time
+        found = urdf.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
         option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
         if option is None:
@@ -56,11 +59,11 @@ def import_(
     for note in found.notes:
         output.note(note)
     output.note(f"{arm.n} joints from {found.base} to {found.tip}")
-    if not snap and (gain := _gain(file, found, arm)):
+    if not snap and (gain := _gain(raw, found, arm)):
         output.note(gain)
 
 
-def _gain(file: str, found: Imported, arm: Arm) -> str | None:
+def _gain(raw: bytes, found: Imported, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 
@@ -70,7 +73,7 @@ def _gain(file: str, found: Imported, arm: Arm) -> str | None:
     from armkin.robot_file import urdf
     from armkin.robot_file.writing import text
 
-    snapped = build(robot_file.parse(text(urdf.read(file, base=found.base, tip=found.tip, snap=True).data)))
+    snapped = build(robot_file.parse(text(urdf.parse(raw, base=found.base, tip=found.tip, snap=True).data)))
     try:
         before, after = armkin.method(arm)[0], armkin.method(snapped)[0]
     except UsageError:
