@@ -132,7 +132,7 @@ size_t host_motion_payload(uint8_t *payload, uint16_t mask, uint8_t flags, const
         if (wide) {
             p = put16(put16(p, s->ticks), s->interval);
             *p++ = 0;
-            p = put16(put16(put16(p, s->add), s->bend), fine);
+            p = put16(put16(put16(p, s->add), s->bend), fine | (s->quick ? 0x8000 : 0));
         } else {
             *p++ = s->ticks;
             p = put16(put16(p, s->interval), s->add);

@@ -34,6 +34,7 @@ struct host_segment {
     uint16_t ticks, interval;
     int16_t add;  // 1/256 cycle
     int16_t bend;
+    bool quick;
     int16_t steps[AXES];
     int32_t rate[AXES];  // 2^-23 step a tick, where it is not 0, as the form can say it: then `steps` says what comes of it
 };

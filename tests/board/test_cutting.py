@@ -44,7 +44,9 @@ def tick_times(cut: Iterable[Segment]) -> list[int]:
             now += interval >> 16
             out.append(now)
             interval += add >> 8
-            if left % 16 == 0:
+            if s.quick:
+                add += s.bend << 7
+            elif left % 16 == 0:
                 add += s.bend << 2
     return out
 
@@ -281,7 +283,9 @@ def test_a_piece_at_rest_has_one_speed() -> None:
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     law = profile.trapezoid(1.0, 0.06, 2.0)
-    whole = straight_lines.LineSegments(np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, False)
+    whole = straight_lines.LineSegments(
+        np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, straight_lines.Pieces.FINE
+    )
     once = list(whole)
     assert len(once) == len(whole) == straight_lines.count(law, 90_001) > 40
     monkeypatch.setattr(straight_lines, "_AT_ONCE", 3)

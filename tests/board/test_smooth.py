@@ -19,7 +19,8 @@ def ticks(cut: list[Segment]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     when, where, now, place = [], [], 0, np.full(len(cut[0].rates), HALF, dtype=np.int64)
     for s in cut:
         left = s.ticks - np.arange(1, s.ticks + 1)
-        add = s.add * 256 + 4 * s.bend * np.concatenate([[0], np.cumsum(left % BLOCK == 0)[:-1]])
+        more, block = (128 * s.bend, 1) if s.quick else (4 * s.bend, BLOCK)
+        add = s.add * 256 + more * np.concatenate([[0], np.cumsum(left % block == 0)[:-1]])
         intervals = ((s.interval << 16) + np.concatenate([[0], np.cumsum(add >> 8)[:-1]])) >> 16
         assert intervals.min() >= MIN_INTERVAL
         when.append(now + np.cumsum(intervals))

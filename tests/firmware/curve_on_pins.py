@@ -87,7 +87,8 @@ def predicted(segments: Sequence[Segment], start: Sequence[int]) -> list[Array]:
     out: list[list[Array]] = [[] for _ in start]
     for s in segments:
         j = np.arange(1, s.ticks + 1)
-        grown = np.concatenate([[0], np.cumsum(4 * s.bend * ((s.ticks - j[:-1]) % 16 == 0))])
+        bends = 128 * s.bend * (j[:-1] > 0) if s.quick else 4 * s.bend * ((s.ticks - j[:-1]) % 16 == 0)
+        grown = np.concatenate([[0], np.cumsum(bends)])
         change = (256 * s.add + grown) >> 8
         interval = np.concatenate([[s.interval << 16], (s.interval << 16) + np.cumsum(change[:-1])])
         ticks = at + np.cumsum(interval >> 16)

@@ -37,11 +37,13 @@ def edges_by_the_protocol(segments: list[Segment], axis: int) -> NDArray[np.int6
     """Clock cycles from the start at which an axis's STEP rises: PROTOCOL.md, section 6, word for word."""
     out, now, place = [], 0, HALF
     for segment in segments:
-        interval, add = segment.interval << 16, segment.add
+        interval, add = segment.interval << 16, segment.add * 256
         for tick in range(1, segment.ticks + 1):
             now += interval >> 16
             interval += add >> 8
-            if (segment.ticks - tick) % 16 == 0:
+            if segment.quick:
+                add += 128 * segment.bend
+            elif (segment.ticks - tick) % 16 == 0:
                 add += 4 * segment.bend
             before = place // STEP
             place += segment.rates[axis]

@@ -10,11 +10,12 @@ enum { END = 1, WIDE = 2 };            // flags
 enum { HEAD = 6 };                     // type, tag, mask, flags, n
 enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
 
+enum { QUICK_INTERVAL = MIN_INTERVAL + MIN_INTERVAL / 4 };  // a tick that counts the bend costs more
 _Static_assert(MIN_INTERVAL > 128, "the reciprocal of an interval has 16 bits");
 
 // A segment's time in 1/256 of 50 ms, from units of 256 cycles.
 #define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
-enum { LONGEST = 255, LONGEST_BEND = 1 << 14 };
+enum { LONGEST = 255, LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
 
 // Velocities are rounded down in two places.
 static const uint32_t ROUNDING = 4 * ((1UL << 23) / MIN_INTERVAL);
@@ -55,7 +56,7 @@ static enum error check_start(const uint8_t *starts, uint16_t mask, uint8_t *det
     return OK;
 }
 
-// `fine` may have bits of axes that there are not: nobody looks at them.
+// `fine` may have bits of axes that there are not: nobody looks at them. Its bit 15 is QUICK.
 static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     s->ticks = wide ? get16(p) : *p;
     p += wide ? 2 : 1;
@@ -66,23 +67,26 @@ static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     }
     s->add = (sfine_t)(int16_t)get16(p + 3) * 256 + p[2];
     s->bend = (int16_t)get16(p + 5);
-    s->fine = get16(p + 7);
+    s->fine = (get16(p + 7) & (axes_t)~QUICK) | (p[8] & 0x80 ? QUICK : 0);
 }
 
 // An interval one tick past the end must fit as well, as the interrupt has it ready; and it must not turn within the segment.
 static bool times_valid(const struct segment *s, int32_t *last) {
-    if (s->ticks == 0 || s->interval < MIN_INTERVAL) {
+    const bool quick = s->fine & QUICK;
+    const uint16_t least = quick ? QUICK_INTERVAL : MIN_INTERVAL;
+    if (s->ticks == 0 || s->interval < least) {
         return false;
     }
-    if (s->bend && s->ticks > LONGEST_BEND) {
+    if (s->bend && s->ticks > (quick ? LONGEST_QUICK : LONGEST_BEND)) {
         return false;
     }
-    const int32_t add = s->add + (s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6);
+    const int32_t grown = quick ? s->bend * (int32_t)(s->ticks - 1) >> 1 : s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6;
+    const int32_t add = s->add + grown;
     if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || (s->add == 0 && s->bend)) {
         return false;
     }
     *last = motion_interval(s, s->ticks - 1);
-    return *last >= MIN_INTERVAL && *last <= 0xFFFF && motion_interval(s, s->ticks) <= 0xFFFF;
+    return *last >= least && *last <= 0xFFFF && motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
 static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {

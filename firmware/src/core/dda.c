@@ -17,6 +17,7 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.left = s->ticks;
     dda.interval = (uint32_t)s->interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
+    dda.block = s->fine & QUICK ? 0 : BLOCK - 1;
     if (dda.back & LAST) {
         dda_rest();
     }
@@ -39,5 +40,6 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
 }
 
 __attribute__((noinline)) void dda_bend(void) {
-    dda.add += (int32_t)dda.now->bend * 4;
+    const int32_t bend = dda.now->bend;
+    dda.add += dda.block ? bend * 4 : bend * 128;
 }

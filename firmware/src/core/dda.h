@@ -5,8 +5,8 @@
 // segment's rate; where it overflows, there is a step. Phases go on from segment to segment. Counts are not kept here: the sum is
 // exact, so motion.c tells them from the number of ticks.
 //
-// The interval between ticks changes by `add` with each tick, and `add` by `bend` with every 16th: 1 / (v + a t) to second order,
-// so that a ramp of constant acceleration takes few segments.
+// The interval between ticks changes by `add` with each tick, and `add` by `bend` with every 16th, or with each (QUICK): 1 / (v + a t)
+// to second order, so that a ramp of constant acceleration takes few segments.
 #pragma once
 #include <stdbool.h>
 #include <stdint.h>
@@ -22,8 +22,8 @@ typedef uint16_t axes_t;
 #endif
 
 enum { LAST = 1 << (8 * sizeof(axes_t) - 1) };  // in `back`: the motion may rest after this segment
+enum { QUICK = LAST };                          // in `fine`: `bend` counts with every tick
 _Static_assert(AXES < 8 * sizeof(axes_t), "one bit is LAST");
-
 
 enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
 
@@ -36,9 +36,9 @@ struct segment {
     uint16_t ticks;
     uint16_t interval;    // cycles to the first tick
     sfine_t add;          // 2^-16 cycle a tick
-    int16_t bend;         // 2^-22 cycle a tick, with every 16th
+    int16_t bend;         // 2^-22 cycle a tick, with every 16th; QUICK: 2^-17, with each
     axes_t back;          // axes that count down; LAST
-    axes_t fine;          // axes whose rate is in the small unit
+    axes_t fine;          // axes whose rate is in the small unit; QUICK
     uint16_t rate[AXES];  // 2^-24 step (fine) or 2^-16
 };
 
@@ -54,6 +54,7 @@ struct dda {
     int32_t add;                // 2^-24 cycle a tick
     fine_t phase[STEPPERS + 1], rate[STEPPERS + 1];
     axes_t back;                // as in the segment taken up last
+    uint8_t block;              // ticks with the same `add`, less 1
     uint8_t bits;               // STEP pins of the next tick
     uint8_t overruns;
 
@@ -92,7 +93,7 @@ void dda_bend(void);
 static inline uint16_t dda_interval(void) {
     uint16_t planned;
     DDA_ADVANCE(planned)
-    if ((uint8_t)dda.left % BLOCK == 0) {
+    if (((uint8_t)dda.left & dda.block) == 0) {
         dda_bend();
     }
     if (dda.stretch == 256) {

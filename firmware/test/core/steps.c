@@ -46,7 +46,8 @@ static void steps_are_exact(void) {
             s->ticks = 1 + rand() % 700;
             s->interval = 1400 + rand() % 3000;
             s->add = rand() % 400 - 200;
-            s->bend = (rand() % 2 ? rand() % 2000 : 0) * (s->add < 0 ? -1 : s->add > 0);
+            s->quick = rand() % 2;
+            s->bend = (rand() % 2 ? rand() % (s->quick ? 40 : 2000) : 0) * (s->add < 0 ? -1 : s->add > 0);
             for (uint8_t i = 0; i < 2; i++) {
                 s->rate[i] = rand() % 2 ? rand() % 65535 - 32767 : (rand() % 65533 - 32766) * 256;
                 if (rand() % 8 == 0 || llabs((place[i] + (int64_t)s->ticks * s->rate[i]) >> 23) > 50000) {

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from armkin.board.firmware.curves import CurveSegments, rates
 from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move
-from armkin.board.firmware.straight_lines import along, count
+from armkin.board.firmware.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.plan import check_limits, check_rates
@@ -69,25 +69,25 @@ class Cut:
             if self._is_line(stretch, at, end):
                 number += count(stretch.law, int(np.abs(end - at).max()))
             else:
-                number += len(self._move(stretch, at, end, False).segments)
+                number += len(self._move(stretch, at, end, Pieces.FINE).segments)
             at = end
         return number
 
-    def moves(self, rough: Callable[[], bool] = lambda: False) -> Iterator[Move]:
-        """The moves, one a stretch, made as they are asked for; rough: asked then, see `along`."""
+    def moves(self, pieces: Callable[[], Pieces] = lambda: Pieces.FINE) -> Iterator[Move]:
+        """The moves, one a stretch, made as they are asked for; pieces: asked then, of lines."""
         at = self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
-            yield self._move(stretch, at, end, rough())
+            yield self._move(stretch, at, end, pieces())
             at = end
 
     @staticmethod
     def _is_line(stretch: Stretch, start: Counts, end: Counts) -> TypeGuard[Straight]:
         return isinstance(stretch, Straight) and stretch.law.is_trapezoid and bool((start != end).any())
 
-    def _move(self, stretch: Stretch, start: Counts, end: Counts, rough: bool) -> Move:
+    def _move(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
         if self._is_line(stretch, start, end):
             a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
-            return along(a, b, stretch.law, clock=clock, min_interval=least, rough=rough)
+            return along(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         return Move(start, end, parts if stretch.duration else (), round(stretch.duration * self.clock), curve=True)

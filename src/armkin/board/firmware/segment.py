@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 STEP = 1 << 23  # units of a rate and of a place in one step
 HALF = STEP // 2  # where an axis stands at rest, above its count
@@ -21,7 +21,7 @@ class Segment:
 
     rates: 2^-23 steps a tick, signed; from 2^-8 step on multiples of `COARSE`, or STEP - 128. An axis at place P
     is at P + T x rate afterwards, and its count is P >> 23. The interval grows by `add` [2^-16 cycles] with each
-    tick, and `add` by `bend` [2^-22 cycles] with every 16th, counted from the end.
+    tick, and `add` by `bend`: 2^-22 cycles with every 16th, counted from the end, or quick: 2^-17 with each.
     """
 
     ticks: int
@@ -29,13 +29,16 @@ class Segment:
     add: int
     rates: tuple[int, ...]
     bend: int = 0
+    quick: bool = False
 
     def of(self, axes: Sequence[int]) -> Segment:
         """The same for some of its axes."""
-        return Segment(self.ticks, self.interval, self.add, tuple(self.rates[k] for k in axes), self.bend)
+        return replace(self, rates=tuple(self.rates[k] for k in axes))
 
     def interval_after(self, ticks: int) -> int:
         """Cycles to the tick after so many, not rounded from tick to tick."""
+        if self.quick:
+            return self.interval + (self.add * ticks >> 16) + (self.bend * (ticks * (ticks - 1) // 2) >> 17)
         blocks, rest = divmod(max(0, ticks - (self.ticks - 1) % BLOCK - 1), BLOCK)
         bends = (BLOCK // 2 * blocks + rest) * (blocks + 1)
         return self.interval + (self.add * ticks >> 16) + (self.bend * (bends >> 8) >> 14)
@@ -48,7 +51,14 @@ class Segment:
     @property
     def last_add(self) -> int:
         """Change of the interval at its end, 2^-16 cycle a tick."""
+        if self.quick:
+            return self.add + (self.bend * (self.ticks - 1) >> 1)
         return self.add + (self.bend * ((self.ticks - 1) // BLOCK) >> 6)
+
+    @property
+    def growth(self) -> tuple[int, int]:
+        """What `add` grows by [2^-24 cycle], and with every how many ticks, counted from the end."""
+        return (128 * self.bend, 1) if self.quick else (4 * self.bend, BLOCK)
 
     @property
     def narrow(self) -> bool:
@@ -103,13 +113,13 @@ def whole(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
 
 
 def pack(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
-    """A segment's bytes; bit i of the wide form's `fine` is axis i."""
+    """A segment's bytes; bit i of the wide form's `fine` is axis i, bit 15 `quick`."""
     if not wide:
         return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_short, s.rates))
     fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE]
     short = (r if abs(r) < FINE else _short(r) for r in s.rates)
     head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
-    return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine), *short)
+    return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine) | s.quick << 15, *short)
 
 
 def segment_size(axes: int, *, wide: bool) -> int:
@@ -125,4 +135,5 @@ def read_segment(data: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
     ticks, interval = struct.unpack_from("<HH", data)
     bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", data, 7)
     rates = tuple(r if fine >> i & 1 and r != -FINE else _long(r) for i, r in zip(axes, short, strict=True))
-    return Segment(ticks, interval, int.from_bytes(data[4:7], "little", signed=True), rates, bend)
+    add = int.from_bytes(data[4:7], "little", signed=True)
+    return Segment(ticks, interval, add, rates, bend, quick=bool(fine >> 15))

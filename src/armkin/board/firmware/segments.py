@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -25,9 +25,11 @@ Counts = NDArray[np.int64]
 CLOCK = 16_000_000  # [1/s] of every board so far
 MIN_INTERVAL = 576  # [cycles] between ticks, that every board makes
 
-_TICK = 1.12  # shortest intervals that a tick lasts at a segment's fast end
+_TICK, _TICK_QUICK = 1.12, 1.28  # shortest intervals that a tick lasts at a segment's fast end
 _TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no edge is farther off than that
 _COARSEST = 55e-6  # [s] of a tick, where a finer one would not fit the rates as well
+_ACCEL = 1.014  # of its acceleration, that a piece has at most, or its ends' speeds are nearer to each other:
+_LESS = 0.975  # so much at most, which is a jump of a few cycles of the interval between pieces
 _STEADY = 0.004  # change of speed that is none
 _EVEN = 0.02  # [s] that a piece of one speed lasts whose intervals grow bit by bit: in less that is too great a change
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
@@ -35,6 +37,8 @@ _DRIFT = 0.02  # steps
 _SLOW = 40  # ticks a step, from where the ticks need not fit the steps
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
+_QUICK = 1000, 20  # ticks of a segment whose `bend` counts with each, at most; and such a bend at least
+_CHOICE, _CHOICES = 32, 12  # one in so many ticks of a ramp may be left out, so that its intervals are whole cycles
 _MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
 
 
@@ -64,16 +68,13 @@ class Move:
 
 def cycles_of(segment: Segment) -> int:
     """Clock cycles of a segment, exactly as the device counts them."""
-    return segment.ticks * segment.interval + _added(segment.ticks, segment.add, segment.bend)
-
-
-def _added(ticks: int, add: int, bend: int) -> int:
-    """Cycles that `add` and `bend` give to all intervals together."""
-    if add == 0:
-        return 0
-    blocks = (np.arange(ticks - 1) + BLOCK - 1 - (ticks - 1) % BLOCK) // BLOCK  # counted from the end
-    adds = (add * 256 + 4 * bend * blocks) >> 8
-    return int((np.cumsum(adds) >> 16).sum())
+    ticks = segment.ticks
+    if segment.add == 0:
+        return ticks * segment.interval
+    grow, block = segment.growth
+    blocks = (np.arange(ticks - 1) + block - 1 - (ticks - 1) % block) // block  # counted from the end
+    adds = (segment.add * 256 + grow * blocks) >> 8
+    return ticks * segment.interval + int((np.cumsum(adds) >> 16).sum())
 
 
 class Cutter:
@@ -82,40 +83,78 @@ class Cutter:
     def __init__(self, start: Sequence[int], clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> None:
         self.clock, self.min_interval = clock, min_interval
         self.places = [int(count) * STEP + HALF for count in start]
+        self._aims = list(self.places)  # where the motors should be
         self.late = 0.0  # [cycles] that the segments so far should have lasted longer
 
-    def piece(self, seconds: float, counts: Sequence[float], change: float = 0.0, drift: float = _DRIFT) -> Segment:
+    def piece(
+        self,
+        seconds: float,
+        counts: Sequence[float],
+        change: float = 0.0,
+        drift: float = _DRIFT,
+        make_up: float | None = None,
+    ) -> Segment:
         """A straight line to `counts` (motors,), fractions included, in so many seconds.
 
         change: speed at its end less that at its beginning, over the mean: -2 to 2. The speed changes evenly.
-        drift: steps that a motor may be off at its end, for the next piece to make up for.
+        drift: steps that a motor may be off at its end, for the next piece to make up for. make_up: the share of its
+        own way by which a motor makes up for the pieces before, at most; None: all.
         """
-        left = [round(c * STEP) + HALF - p for c, p in zip(counts, self.places, strict=True)]
+        aims = [round(c * STEP) + HALF for c in counts]
+        owed = [before - place for before, place in zip(self._aims, self.places, strict=True)]
+        if make_up is not None:
+            least = seconds * self.clock / self.min_interval  # one unit a tick: less cannot be said
+            most_owed = [least + make_up * abs(aim - before) for aim, before in zip(aims, self._aims, strict=True)]
+            owed = [round(max(-most, min(most, x))) for x, most in zip(owed, most_owed, strict=True)]
+        left = [aim - before + x for aim, before, x in zip(aims, self._aims, owed, strict=True)]
+        self._aims = aims
         most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
         exact = seconds * self.clock + self.late
         if abs(change) < _STEADY:
-            change = 0.0
-        ticks = self._ticks(exact, most, _TICK * (1 + abs(change) / 2))
-        if change == 0.0 and (ticks > _SLOW * most or _drift(ticks, left) > drift):
-            ticks = _exact_ticks(ticks, left)
-        add, bend = _parabola(exact / ticks, ticks, change)
-        interval = round((exact - _added(ticks, add, bend)) / ticks)
-        if add == 0 and ticks > 1 and exact > _EVEN * self.clock:
-            interval, add = _even(exact, ticks)
-        elif rest := exact - ticks * interval - _added(ticks, add, bend):  # what whole cycles an interval leave
-            more = add + round(rest * 2 * 65536 / ticks**2)
-            add = more if more * add > 0 and (more + (bend * ((ticks - 1) // BLOCK) >> 6)) * more > 0 else add
-        segment = Segment(ticks, interval, add, tuple(nearest_rate(x / ticks) for x in left), bend)
+            segment = self._steady(exact, left, most, drift)
+        else:
+            segment = self._ramp(exact, left, most, change)
         short = self.min_interval - min(segment.interval, segment.last_interval)
         if short > 0:
-            segment = Segment(ticks, interval + short, add, segment.rates, bend)
-        self.places = [p + ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
-        self.late = min(exact - cycles_of(segment), float(ticks))  # what the shortest interval costs is not made up for
+            segment = replace(segment, interval=segment.interval + short)
+        self.places = [p + segment.ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
+        # What the shortest interval costs is not made up for.
+        self.late = min(exact - cycles_of(segment), float(segment.ticks))
         return segment
 
-    def _ticks(self, cycles: float, steps: float, spare: float) -> int:
-        """How many ticks a piece has: whole ones for each step of its fastest motor, if it makes many."""
-        least = max(spare * self.min_interval, _TICK_S * self.clock)
+    def _steady(self, exact: float, left: Sequence[int], most: float, drift: float) -> Segment:
+        """A piece of one speed that lasts `exact` cycles; left: (motors,) 2^-23 step, most: steps of the fastest."""
+        ticks = self._ticks(exact, most)
+        if ticks > _SLOW * most or _drift(ticks, left) > drift:
+            ticks = _exact_ticks(ticks, left)
+        interval, add = round(exact / ticks), 0
+        if ticks > 1 and exact > _EVEN * self.clock:
+            interval, add = _even(exact, ticks)
+        return Segment(ticks, interval, add, _rates(left, ticks))
+
+    def _ramp(self, exact: float, left: Sequence[int], most: float, change: float) -> Segment:
+        """A piece whose speed changes evenly, see `piece`: as many ticks as the board makes, as `bend` has 16 bits."""
+        fast = (1 + abs(change) / 2) * self.min_interval
+        shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
+        ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
+        quick = most <= ticks <= _QUICK[0] and ticks > 1 and abs(_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
+        if not quick:
+            ticks = int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
+        ticks = max(1, ticks, math.ceil(most), math.ceil(exact / _LONGEST))
+        ratio = (2 + abs(change)) / (2 - abs(change))
+        above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
+        change *= max(_LESS, min(1.0, _ACCEL / (1 + above)))
+        if ticks > max(_CHOICE, 1.1 * most):
+            spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
+            ticks = min(spread, key=lambda t: _parabola(exact, t, change, quick)[3])
+        interval, add, bend, _ = _parabola(exact, ticks, change, quick)
+        segment = Segment(ticks, interval, add, _rates(left, ticks), bend, quick and bend != 0)
+        rest = exact - cycles_of(segment)  # every interval is cut to whole cycles
+        return replace(segment, interval=interval + round(rest / ticks))
+
+    def _ticks(self, cycles: float, steps: float) -> int:
+        """How many ticks a piece of one speed has: whole ones for each step of its fastest motor, if it makes many."""
+        least = max(_TICK * self.min_interval, _TICK_S * self.clock)
         each = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
         tick = max(least, min(each / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
         over = int(each / tick) if each < math.inf else 0
@@ -125,6 +164,10 @@ class Cutter:
         elif over == 0 and each < math.inf:
             tick = each
         return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
+
+
+def _rates(left: Sequence[int], ticks: int) -> tuple[int, ...]:
+    return tuple(nearest_rate(x / ticks) for x in left)
 
 
 def _drift(ticks: int, left: Sequence[int]) -> float:
@@ -159,24 +202,35 @@ def _even(cycles: float, ticks: int) -> tuple[int, int]:
     return interval, round((1 / (1 - part) if part < 0.5 else 3 / (2 - part)) * 65536 / ticks)
 
 
-def _parabola(mean: float, ticks: int, change: float) -> tuple[int, int]:
-    """`add` and `bend` of a segment whose speed changes evenly: mean interval [cycles], ticks, see `Cutter.piece`."""
-    if abs(change) < 1e-9 or ticks < 2:
-        return 0, 0
-    slow, fast = 1 - change / 2, 1 + change / 2  # speeds at its ends, in means
-    c = (fast / slow) ** 2 - 1  # interval(x) = I / sqrt(1 + c x), x from 0 to 1 over the ticks
-    # Its slope is made linear: right at the two points where the error of a line is least (Chebyshev's).
-    x = np.array([0.5 - math.sqrt(0.125), 0.5 + math.sqrt(0.125)])
-    slope = -mean / slow * c / 2 * (1 + c * x) ** -1.5
-    curve = (slope[1] - slope[0]) / (x[1] - x[0])
-    bend = round(curve * BLOCK / ticks**2 * 2**22)
-    blocks = (ticks - 1) // BLOCK
-    if abs(bend) > 32767 or blocks < 2:
-        return round(
-            2 * math.copysign(mean - mean / max(slow, fast), -change) / ticks * 65536
-        ), 0  # right at its fast end
-    add = round((mean / fast - mean / slow) / ticks * 65536 - bend * blocks / 128)
-    return (add, bend) if add * (add + (bend * blocks >> 6)) > 0 else _parabola(mean, ticks, change / 2)
+def _parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple[int, int, int, float]:
+    """Interval, `add` and `bend` of a segment whose speed changes evenly, see `Cutter.piece`.
+
+    The interval is 1 / v(t). The parabola over the ticks that has its ends and its integral has its slope, too, to
+    0.53 (r - 1)^2 of it, r being the ratio of the speeds: to 2 % up to 1.2. Fourth: what rounding has cost, in quarters
+    of a cycle and percents of the bend.
+    """
+    mean = exact / ticks
+    a, b = mean / (1 - change / 2), mean / (1 + change / 2)  # intervals at its ends
+    curve = 3 * (a + b) - 6 * mean
+    whole = (b - a) * (ticks - 1) / ticks  # from the first interval's middle to the last one's
+    unit, block = (17, 1) if quick else (22, BLOCK)
+    exact_bend = 2 * curve / ticks**2 * block * 2**unit
+    bend = max(-32767, min(32767, round(exact_bend)))
+    add = (whole - bend * _bends(ticks, quick) / 2**unit) / max(ticks - 1, 1) * 65536
+    if (bend and add * (add + bend * ((ticks - 1) // block) / 2 ** (unit - 16)) <= 0) or abs(add) < 0.5:
+        bend, add = 0, whole / max(ticks - 1, 1) * 65536
+    second = bend / 2**unit / block
+    first = mean - (ticks - 1) * (add / 131072 + second * (ticks - 2) / 6) + 0.5  # each is cut to whole cycles
+    cost = abs(first - round(first)) * 4 + abs(bend / exact_bend - 1) * 100
+    return round(first), round(add), bend, cost
+
+
+def _bends(ticks: int, quick: bool) -> int:
+    """How often `bend` counts in a segment's last interval."""
+    if quick:
+        return (ticks - 1) * (ticks - 2) // 2
+    blocks, rest = divmod(max(0, ticks - 2 - (ticks - 1) % BLOCK), BLOCK)
+    return (BLOCK // 2 * blocks + rest) * (blocks + 1)
 
 
 def changing(begin: float, end: float) -> float:

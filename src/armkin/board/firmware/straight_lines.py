@@ -1,4 +1,4 @@
-"""A straight line in counts as segments: ramps in pieces whose speed changes by an eighth, cruises in long ones.
+"""A straight line in counts as segments: ramps in pieces whose speed changes by a sixth, cruises in long ones.
 
 Which pieces: so few that the board's queue always holds the time to a stop, and so many that every step comes when the
 time law says, to 60 us or 2 % of its period, from the first to the last.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from itertools import islice, pairwise
 
 import numpy as np
@@ -18,22 +19,30 @@ from armkin.board.firmware.protocol import STEP, Segment
 from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Cutter, Move, changing, cycles_of
 from armkin.motion.profile import Profile, trapezoid
 
-Ratios = tuple[float, int, float, int]
-
-# Speed at a segment's fast end over that at its slow end: so many with the first ratio from a ramp's top down, then the
-# second, wider where there are more than so many of those. All of a ramp fits into the board's queue (32).
-_RATIOS = (1.13, 10, 1.2, 17)
-_ROUGH = (1.2, 12, 2.0, 0)  # for a line that is too bad for so many
-_SHORT = 13  # segments of a ramp of a move that is short
-_FIRST = 0.003  # [s] a ramp's first segment at least, and twice what any other lasts at least
+# A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right
+# to 0.53 (ratio - 1)^2, 1.5 % at 1.17. All of a ramp fits into the board's queue (32).
+_RATIO = 1.14  # with fewer segments than `_RAMP`
+_RAMP, _SHORT, _ROUGH = 27, 13, 12  # segments of a ramp at most, see `Pieces`
+_WIDEST = 1.4  # ratio, from where the first segment gets longer instead: the board takes 5/4 of the acceleration
+_FIRST, _FIRST_ROUGH = 0.003, 0.015  # [s] a ramp's first segment at least, and four times what any other lasts at least
+_FIRST_MOST = 0.1  # [s] the same at most: the board lets a speed jump by what 50 ms of 5/4 of the acceleration make
 _BEFORE_STEP = 0.9  # of the time to its first step: until then no motor tells how it got there
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
 _SPLIT = 0.08  # [s] a cruise segment whose end is one of its own
-_MOST = (1.02, 1.04)  # of its top rate, that the motor with the most steps makes, and any other; the board takes 1.05
+_NONE = (0.03, 0.0006)  # of a ramp, or [s]: a cruise that is shorter belongs to the ramps
+_MAKE_UP = 0.01  # of its way in a piece, that a motor makes up for: the board takes 1.05 of its rate
 _SPARE = 0.0005  # of a piece's steps, that are left for the next one to make up for
 _EAGER = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
+
+
+class Pieces(IntEnum):
+    """How many segments a ramp has."""
+
+    FINE = 0  # so many that the acceleration is right to 2 %
+    FEW = 1  # a short move so few that the queue holds all of it, however late the host is; right to 7 %
+    ROUGH = 2  # so few that a bad line brings them in time; right to 10 %
 
 
 def along(
@@ -43,16 +52,16 @@ def along(
     *,
     clock: int = CLOCK,
     min_interval: int = MIN_INTERVAL,
-    rough: bool = False,
+    pieces: Pieces = Pieces.FINE,
 ) -> Move:
     """The segments of a straight line in counts; law: how far along it is over time, from 0 to its length.
 
-    rough: half as many, with an acceleration that is right to 10 %. A line of very many makes them as asked for.
+    A line of very many makes them as asked for.
     """
     first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
     if not (last - first).any():
         return Move(first, last, (), 0)
-    line = LineSegments(first, last, law, clock, min_interval, rough)
+    line = LineSegments(first, last, law, clock, min_interval, pieces)
     if len(line) > _EAGER:
         return Move(first, last, line, round(law.duration * clock))
     made = tuple(line)
@@ -68,15 +77,13 @@ class LineSegments:
     law: Profile
     clock: int
     min_interval: int
-    rough: bool
+    pieces: Pieces
 
     def __iter__(self) -> Iterator[Segment]:
         """The segments in order."""
         law, span, steps = self.law, self.end - self.start, self._steps
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
-        shares = np.where(np.abs(span) == steps, *_MOST) * np.abs(span)
-        most = [float(m) for m in shares * law.peak / law.length]  # [counts/s] of every motor
-        for times, ending in _on_steps(law, _bounds(law, _ratios(law, steps, self.rough), steps), steps):
+        for times, ending in _on_steps(law, _bounds(law, steps, self.pieces), steps):
             done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
             if ending:
                 done[-1] = 1.0
@@ -84,7 +91,8 @@ class LineSegments:
                 change = changing(float(speed[k]), float(speed[k + 1]))
                 counts = (self.start + span * done[k + 1]).tolist()
                 drift = _SPARE * steps * float(done[k + 1] - done[k])
-                yield _slow_enough(cutter, b - a, counts, change, drift, most)
+                last = ending and k + 2 == len(times)
+                yield cutter.piece(b - a, counts, change, drift, None if last else _MAKE_UP)
         if [p // STEP for p in cutter.places] != self.end.tolist():
             raise AssertionError("a line's rates do not lead to its end")
 
@@ -93,32 +101,13 @@ class LineSegments:
         return int(np.abs(self.end - self.start).max())
 
     def __len__(self) -> int:
-        return count(self.law, self._steps, self.rough)
+        return count(self.law, self._steps, self.pieces)
 
 
-def count(law: Profile, steps: int, rough: bool = False) -> int:
+def count(law: Profile, steps: int, pieces: Pieces = Pieces.FINE) -> int:
     """How many segments a line with this law has; steps: of the motor that makes most."""
-    phases = _phases(law, _ratios(law, steps, rough), steps)
+    phases = _phases(law, steps, pieces)
     return sum(parts if isinstance(parts, int) else len(parts) for _, _, parts in phases)
-
-
-def _slow_enough(
-    cutter: Cutter, seconds: float, counts: Sequence[float], change: float, drift: float, most: Sequence[float]
-) -> Segment:
-    """A piece in which no motor exceeds its `most` [counts/s]: where rounding asks for it, it lasts longer.
-
-    A piece of a third of a step has a hundredth of one to make up for; the board checks every motor by itself.
-    """
-    places = list(cutter.places)
-    for _ in range(4):
-        one = cutter.piece(seconds, counts, change, drift)
-        ticks = cutter.clock / min(one.interval, one.last_interval) / STEP  # a second, over a step
-        over = max((abs(r) * ticks / m for r, m in zip(one.rates, most, strict=True) if r), default=0.0)
-        if over <= 1.0:
-            break
-        cutter.places, cutter.late = list(places), 0.0
-        seconds *= 1.001 * over
-    return one
 
 
 def line(
@@ -134,20 +123,12 @@ def line(
     return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
-def _ratios(law: Profile, steps: int, rough: bool) -> Ratios:
-    """Of a move with a long cruise, whose few segments keep the queue full of time, the fine ones.
-
-    A short move has so few segments that the queue holds all of it, however late the host is.
-    """
-    if rough:
+def _most(law: Profile, pieces: Pieces) -> int:
+    """Segments of a ramp at most; a move is short if its cruise is shorter than a ramp."""
+    if pieces == Pieces.ROUGH:
         return _ROUGH
-    if not law.is_trapezoid:
-        return _RATIOS
-    ramp = law.peak / law.accel
-    if law.duration - 2 * ramp >= ramp:
-        return _RATIOS
-    ratio = (ramp / max(_FIRST, _to_first_step(law, law.accel, steps))) ** (1 / _SHORT)
-    return (ratio, _SHORT, ratio, 1) if ratio > _RATIOS[0] else _RATIOS
+    short = law.is_trapezoid and law.duration < 3 * law.peak / law.accel
+    return _SHORT if short and pieces == Pieces.FEW else _RAMP
 
 
 def _to_first_step(law: Profile, accel: float, steps: int) -> float:
@@ -155,18 +136,21 @@ def _to_first_step(law: Profile, accel: float, steps: int) -> float:
     return _BEFORE_STEP / math.sqrt(abs(accel) * steps / law.length)
 
 
-def _phases(law: Profile, ratios: Ratios, steps: int) -> Iterator[tuple[float, float, int | list[float]]]:
+def _phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[float, float, int | list[float]]]:
     """A law's phases: begin, end, and into how many segments they are cut evenly, or where else.
 
-    The speed changes by an eighth in each; cruises have long ones. steps: of the motor that makes most.
+    steps: of the motor that makes most.
     """
     ramp = law.peak / max(law.accel, 1e-12)
-    for k, (t0, t1) in enumerate(pairwise(law.times.tolist())):
+    times = law.times.tolist()
+    if law.is_trapezoid and times[2] - times[1] < max(_NONE[0] * ramp, _NONE[1]):
+        times[1] = times[2] = (times[1] + times[2]) / 2
+    for k, (t0, t1) in enumerate(pairwise(times)):
         accel, jerk = float(law.states[k, 2]), float(law.jerk[k])
         if t1 - t0 < 1e-9:
             continue
         if jerk == 0.0 and accel != 0.0:
-            yield t0, t1, _ramp(law, t0, t1, accel, ratios, steps)
+            yield t0, t1, _ramp(law, t0, t1, accel, steps, pieces)
             continue
         longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
         parts = math.ceil((t1 - t0) / longest)
@@ -179,36 +163,37 @@ def _phases(law: Profile, ratios: Ratios, steps: int) -> Iterator[tuple[float, f
         yield t1 - each, t1, [t1 - each / 4, t1]  # a short end: what its rates' rounding leaves, the ramp makes up for
 
 
-def _bounds(law: Profile, ratios: Ratios, steps: int) -> Iterator[float]:
+def _bounds(law: Profile, steps: int, pieces: Pieces) -> Iterator[float]:
     """When segments end, from 0 on."""
     yield 0.0
-    for t0, t1, parts in _phases(law, ratios, steps):
+    for t0, t1, parts in _phases(law, steps, pieces):
         yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1)) if isinstance(parts, int) else parts
 
 
-def _ramp(law: Profile, t0: float, t1: float, accel: float, ratios: Ratios, steps: int) -> list[float]:
+def _ramp(law: Profile, t0: float, t1: float, accel: float, steps: int, pieces: Pieces) -> list[float]:
     """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
     v0, v1 = (float(v) for v in law.at(np.array([t0, t1]), 1))
     if accel < 0:
         v1 = max(0.0, v0 + accel * (t1 - t0))
-    low, high = min(v0, v1), max(v0, v1)
-    first, many, second, more = ratios
-    shortest = _FIRST if more else 5 * _FIRST
-    least = max(low, abs(accel) * max(shortest, _to_first_step(law, accel, steps)))
-    to_rest = [high / abs(accel)]  # [s] at each speed
-    shortest /= 2
-    for number in range(many + more):
-        slower = min(to_rest[-1] / (first if number < many else second), to_rest[-1] - shortest)
-        if slower < least / abs(accel) * 1.02:
-            if to_rest[-1] - least / abs(accel) > shortest / 2:
-                to_rest.append(least / abs(accel))
-            break
-        to_rest.append(slower)
+    most, shortest = _most(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
+    top = max(v0, v1) / abs(accel)  # [s] from rest at each speed
+    first = max(min(v0, v1) / abs(accel), shortest, _to_first_step(law, accel, steps))
+    first = min(max(first, top / _WIDEST**most), _FIRST_MOST)
+    to_rest = [top]
+    if top > first:
+        number = min(most, math.ceil(math.log(top / first) / math.log(_RATIO)))
+        ratio = (top / first) ** (1 / number)
+        while (slower := min(to_rest[-1] / ratio, to_rest[-1] - shortest / 4)) > first * 1.02:
+            to_rest.append(slower)
+        if len(to_rest) > 1:
+            to_rest[-1] = math.sqrt(to_rest[-2] * first) if to_rest[-1] - first < shortest / 8 else to_rest[-1]
+            to_rest.append(first)
+        elif top - first > shortest / 8:
+            to_rest.append(first)
+    if accel > 0:
+        times = [t0 - v0 / accel + t for t in reversed(to_rest[1:])]
     else:
-        if more and to_rest[-1] > 2 * least / abs(accel):  # a long ramp: what is left goes into as many, wider ones
-            wider = (to_rest[many] * abs(accel) / least) ** (1 / more)
-            to_rest[many:] = [to_rest[many] / wider**k for k in range(more + 1)]
-    times = sorted(t0 + (t * abs(accel) - v0) / accel for t in to_rest[1:])
+        times = [t1 - v1 / accel - t for t in to_rest[1:]]
     return [t for t in times if t0 + 1e-6 < t < t1 - 1e-6] + [t1]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from armkin.board.firmware import protocol
 from armkin.board.firmware.motion_frame import Batch
 from armkin.board.firmware.protocol import Segment, State, Status
+from armkin.board.firmware.straight_lines import Pieces
 
 if TYPE_CHECKING:
     from armkin.board.backend import Progress
@@ -40,7 +41,7 @@ def carry_out(
                 yield None
                 continue
             total += plan.duration
-            for move in plan.moves(lambda: session.line.noisy):
+            for move in plan.moves(lambda: _pieces(session)):
                 for batch in batches(session, move, axes, plan.clock):
                     begun += batch.seconds
                     yield batch
@@ -74,6 +75,13 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
 
 
 _DONE = object()
+
+
+def _pieces(session: Session) -> Pieces:
+    """How finely ramps are cut."""
+    if session.line.noisy:
+        return Pieces.ROUGH
+    return Pieces.FEW if _busy() and not session.port.simulated else Pieces.FINE
 
 
 def _busy() -> bool:

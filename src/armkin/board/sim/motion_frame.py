@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armkin.board.firmware.protocol import STEP, Error, Segment
 from armkin.board.sim.axes import within
 from armkin.board.sim.frames import Batch, RefusedError
@@ -56,4 +58,4 @@ class Batches:
             if axis in given and not within(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
         self._rows.check([p >> 23 for p in plan], known)
-        return Segment(s.ticks, s.interval, s.add, tuple(rates), s.bend)
+        return replace(s, rates=tuple(rates))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment
+from armkin.board.firmware.protocol import HALF, STEP, Segment
 from armkin.board.sim.axes import Axes
 
 _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
@@ -17,11 +17,12 @@ _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
 def intervals(s: Segment) -> Iterator[int]:
     """Cycles before every tick, as the device adds them up."""
     interval, add = s.interval << 16, s.add * 256
+    more, block = s.growth
     for tick in range(1, s.ticks + 1):
         yield interval >> 16
         interval += add >> 8
-        if (s.ticks - tick) % BLOCK == 0:
-            add += s.bend * 4
+        if (s.ticks - tick) % block == 0:
+            add += more
 
 
 @dataclass
