@@ -84,10 +84,8 @@ def strike(board: EmulatedBoard, sender: subprocess.Popen[bytes], fault: str, rn
 
 
 def codes(fault: str) -> set[int]:
-    """Exit codes that a sender may end with; 0 only at the goal."""
-    if fault == "kill":
-        return {0, -9}
-    return {0, SIGNALS.get(fault, 5)}
+    """Exit codes that a sender may end with, as a shell tells them; 0 only at the goal."""
+    return {0, 137 if fault == "kill" else SIGNALS.get(fault, 5)}
 
 
 def one(fault: str, seed: int) -> Struck:
@@ -106,9 +104,10 @@ def one(fault: str, seed: int) -> Struck:
             return Struck([f"{fault} {seed}: the sender hangs"], "", "")
         board.wait(0.7)  # it takes the silence for the host's end after half a second
         stopped = at_rest(board)
-        if b"Traceback" in err or sender.returncode not in codes(fault):
-            wrong.append(f"exit {sender.returncode}: {err.decode()[-200:]}")
-        if sender.returncode == 0 and stopped != COUNTS:
+        code = sender.returncode if sender.returncode >= 0 else 128 - sender.returncode
+        if b"Traceback" in err or code not in codes(fault):
+            wrong.append(f"exit {code}: {err.decode()[-200:]}")
+        if code == 0 and stopped != COUNTS:
             wrong.append("exit 0 before the goal")
         if not on_the_line(stopped, START, COUNTS):
             wrong.append("not on the line")

@@ -1,7 +1,7 @@
 """What the compiled firmware does, in the emulator, beside GRBL 1.1h's figures: `python tests/bench/bench_firmware.py`.
 
 Simulated time: the figures repeat to the cycle, whatever the machine. `--noise SEEDS`: noise runs (20); `--curves
-PLACES`: planned curves, each held and its cable cut at so many places (20); `--only-curves`: these alone.
+PLACES`: planned curves, each held and its cable cut at so many places (20); `--only ROWS`: these alone.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -86,19 +87,8 @@ def pico_rows() -> None:
         row(f"pico6: segments a second of {len(axes)} axes, {by}", f"{best:.0f}")
 
 
-def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--noise", type=int, default=20, metavar="SEEDS")
-    options.add_argument("--curves", type=int, default=20, metavar="PLACES")
-    options.add_argument("--only-curves", action="store_true")
-    given = options.parse_args()
-    seeds = given.noise
-
-    if given.curves:
-        curves(given.curves)
-    if given.only_curves:
-        return
-    row("", "armkin", "GRBL 1.1h")
+def chip_rows() -> None:
+    """What the AVR boards hold."""
     for board, grbl in (("uno_cnc_shield", "29864 B, 1633 B"), ("mega_ramps14", ""), ("uno_servos", "")):
         flash, ram = flash_and_ram(board)
         row(f"{board}: flash, variables", f"{flash} B, {ram} B", grbl)
@@ -126,21 +116,45 @@ def main() -> None:
                 break
             best = got_rate
         row(f"short segments a second at {baud}", f"{best:.0f}", grbl)
+    for cause in ("hold", "abort", "silence"):
+        stop = measure.hold(cause=cause)
+        figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"
+        row(f"{cause} from full speed / ideal ramp", figures, "173 / 133 ms" if cause == "hold" else "")
+
+
+def smooth_rows() -> None:
+    """Step intervals against the time law's."""
     for speed, grbl in ((1.0, "73 us (X)"), (0.2, "88 us (X)"), (0.05, "354 us (X)"), (0.02, "")):
         got = measure.smoothness(speed)
         figures = " / ".join(f"{one.peak_to_peak_us:.0f}" for one in got)
         row(f"step intervals at {speed:.0%}, X / Y / Z, peak to peak", f"{figures} us", grbl)
         worst = max(one.worst for one in got)
         row("  worst of all, ramps included, of max(60 us, 2 %)", f"{worst:.0%}")
-    for cause in ("hold", "abort", "silence"):
-        stop = measure.hold(cause=cause)
-        figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"
-        row(f"{cause} from full speed / ideal ramp", figures, "173 / 133 ms" if cause == "hold" else "")
-    pico_rows()
-    if seeds:
-        runs = [measure.noise(seed) for seed in range(seeds)]
-        good = sum(r.exact and r.on_path for r in runs)
-        row(f"1 % flipped, 1 % dropped, {seeds} x 1000 segments", f"{good} exact, on the path", "runs away at 0.1 %")
+
+
+def noise_rows(seeds: int) -> None:
+    """A line that damages 1 % of the bytes and loses another 1 %."""
+    runs = [measure.noise(seed) for seed in range(seeds)]
+    good = sum(r.exact and r.on_path for r in runs)
+    row(f"1 % flipped, 1 % dropped, {seeds} x 1000 segments", f"{good} exact, on the path", "runs away at 0.1 %")
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--noise", type=int, default=20, metavar="SEEDS")
+    options.add_argument("--curves", type=int, default=20, metavar="PLACES")
+    rows: dict[str, Callable[[], None]] = {
+        "curves": lambda: curves(given.curves),
+        "chip": chip_rows,
+        "smooth": smooth_rows,
+        "pico": pico_rows,
+        "noise": lambda: noise_rows(given.noise),
+    }
+    options.add_argument("--only", choices=rows, action="append", metavar="ROWS", help=", ".join(rows))
+    given = options.parse_args()
+    row("", "armkin", "GRBL 1.1h")
+    for name in given.only or rows:
+        rows[name]()
 
 
 if __name__ == "__main__":
