@@ -108,13 +108,15 @@ def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int
 
 def zoomed(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray, tolerance: float) -> float:
     """The length that some run from the first sample arrives at, to a two-hundredth of a millimetre; -1: no start."""
-    start = None
+    start, end = None, s[-1]
     while True:
         alive = carried(arm, targets(s), tolerance, start=start)
-        if not alive or len(alive) == len(s) or s[1] - s[0] < 0.005:
+        if not alive or s[len(alive) - 1] == end or (len(alive) < len(s) and s[1] - s[0] < 0.005):
             return float(s[len(alive) - 1]) if alive else -1.0
         k = max(len(alive) - 3, 0)
-        start, s = alive[k], np.linspace(s[k], s[min(len(alive) + 1, len(s) - 1)], 41)
+        # Where all is carried the next samples are asked: coarser ones have taken too long a step for a jump.
+        far = s[k] + 40 * (s[1] - s[0]) if len(alive) == len(s) else s[min(len(alive) + 1, len(s) - 1)]
+        start, s = alive[k], np.linspace(s[k], min(far, end), 41)
 
 
 def reach(arm: Arm, targets: np.ndarray, tolerance: float) -> int:

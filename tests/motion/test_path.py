@@ -103,3 +103,17 @@ def test_a_path_beyond_the_reach_is_refused_with_what_each_branch_carries(three_
 def test_moves_that_make_no_sense_are_refused_in_words(three_dof: Arm, moves: list[Any], words: str) -> None:
     with pytest.raises(UsageError, match=words):
         armkin.path(three_dof, {"moves": moves, "blend": 15, "start": "home"})
+
+
+def test_a_way_of_many_turns_is_planned(three_dof: Arm) -> None:
+    """The grid grows with the way: 100 turns of 50 mm are 31 m."""
+    one, many = (
+        armkin.path(
+            three_dof,
+            {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300], "turns": turns}}]},
+            tolerance=0.1,
+        )
+        for turns in (1, 100)
+    )
+    assert many.deviation <= 0.1
+    assert many.duration == pytest.approx(100 * one.duration, rel=0.08)

@@ -5,6 +5,7 @@ route --columns--> linked branches --chains--> runs --here--> joint values on a 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _GRID = 1000  # points of a route's grid, at least
+_TIMES = 16.0  # more of them, at most, where the tolerance needs that
+_BLOCK = 8192  # points that are looked at together
 _EACH = (8, 64)  # of a piece's, at least, with many pieces and with few
 _DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
@@ -146,14 +149,12 @@ def stretches(
     for a, b in pairwise(edges):
         if b - a <= 1e-9:
             continue
-        number = max(int(grid * (b - a) / route.length), 60)
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
-        for damping, times in [(d, 2**k) for d in _DAMPING for k in range(5)]:
-            path, breaks = _on_grid(arm, route, s[here], q[here], a, b, number * times, damping)
-            off = 0.0 if grid < _GRID else deviation(arm, route, path)
-            if off <= pace.tolerance:
-                break
-        else:
+        solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
+        number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
+        check = (lambda path: 0.0) if grid < _GRID else (lambda path: deviation(arm, route, path))
+        path, breaks, off = _fine_enough(arm, route, s[here], q[here], a, b, number, check, pace.tolerance)
+        if off > pace.tolerance:
             raise NoSolutionError(
                 f"between {a:.3f} and {b:.3f} mm the plan may leave the path by {off:.3g} mm; "
                 f"{pace.tolerance:g} are allowed: nothing was moved"
@@ -162,6 +163,24 @@ def stretches(
             path.q[0] = made[-1].end
         made.append(_timed(arm, route, knots(path.s, path.q, breaks), pace))
     return made
+
+
+def _fine_enough(
+    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int,
+    check: Callable[[Knots], float], tolerance: float,
+) -> tuple[Knots, list[int], float]:  # fmt: skip
+    """A grid from a to b of `number` points or more, as many as the tolerance needs; what `check` says of it."""
+    for damping in _DAMPING:
+        times = 1.0
+        while True:
+            path, breaks = _on_grid(arm, route, s, q, a, b, int(number * times), damping)
+            off = check(path)
+            if off <= tolerance or times >= _TIMES:
+                break
+            times = min(times * float(np.clip(1.1 * np.sqrt(off / tolerance), 1.5, 4.0)), _TIMES)
+        if off <= tolerance:
+            break
+    return path, breaks, off
 
 
 def _on_grid(
@@ -196,6 +215,11 @@ def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _D
     damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
     round for what is within the tolerance anyway.
     """
+    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
+    return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
+
+
+def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
     k, p = len(task.sums), task.position
     scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
     scale[:p] = 1 / arm.reach
@@ -222,7 +246,14 @@ def deviation(arm: Arm, route: Route, path: Knots) -> float:
     Chord against tip: `chord_bound`; cubic against chord: h^2 / 8 |q''| times the levers; chord against route:
     its sagitta in the middle of each interval, a third more for what is not symmetrical.
     """
-    lever = levers(arm)
+    lever, worst = levers(arm), 0.0
+    for i in range(0, len(path.s) - 1, _BLOCK):
+        part = slice(i, i + _BLOCK + 1)
+        worst = max(worst, _deviation(arm, route, Knots(path.s[part], path.q[part], path.d[part]), lever))
+    return worst
+
+
+def _deviation(arm: Arm, route: Route, path: Knots, lever: Array) -> float:
     left, right = path.second()
     h = path.h[:, None]
     bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))

@@ -149,6 +149,8 @@ class _Motion:
 
         With q'' = l + f (r - l) and x(f) = x + 2 u h f it is u q'(f) + q''(f) x(f).
         """
+        if np.ndim(f) == 0 and f == 0:
+            return self.first, self.left
         bend = self.right - self.left
         return self.first + self.h * f * (3 * self.left + 2.5 * f * bend), self.left + f * bend
 
