@@ -34,7 +34,7 @@ _EXCESS = 1.001  # of an acceleration, between grid points
 _ROUNDS = 6
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _FEW = 400  # samples of a way: the law needs more grid points
-_AT_ONCE = 4096  # grid points that are looked at together
+_PAIRS = 4096  # intervals whose rows are compared pair by pair at once
 
 
 @dataclass(frozen=True)
@@ -260,8 +260,8 @@ def _meeting(cap: Array, slope: Array, level: Array) -> Array:
     """
     i, j = np.triu_indices(slope.shape[1], 1)
     out = cap.copy()
-    for begin in range(0, len(cap), _AT_ONCE):
-        part = slice(begin, begin + _AT_ONCE)
+    for begin in range(0, len(cap), _PAIRS):
+        part = slice(begin, begin + _PAIRS)
         sl, lv = slope[part], level[part]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             met = (lv[:, i] + lv[:, j]) / np.abs(sl[:, i] - sl[:, j])
