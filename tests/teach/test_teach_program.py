@@ -44,7 +44,7 @@ def program(arm: armkin.Arm) -> Program:
 
 def test_what_is_recorded_is_a_path_file(program: Program, tmp_path: Path) -> None:
     text = program.text()
-    assert "- {line: [334.737402, -111.192673, 295.805775], blend: 10.0}  # above the bin" in text
+    assert "- {line: [334.737402, -111.192673, 295.805775], blend: 10}  # above the bin" in text
     file = tmp_path / "program.yaml"
     file.write_text(text)
     read = path_file.read(str(file))

@@ -31,13 +31,8 @@ def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
 
 def violation(arm: Arm, joint: int, value: float) -> Violation:
     """A joint outside its limits, for JSON; value: [deg | mm]."""
-    lower, upper = map(finite, units.limits_out(arm)[joint])
+    lower, upper = map(units.finite, units.limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": value, "lower": lower, "upper": upper}
-
-
-def finite(value: float) -> float | None:
-    """A number for JSON, which has no infinity."""
-    return float(value) if abs(value) < float("inf") else None
 
 
 def said(arm: Arm, violation: Violation) -> str:

@@ -13,6 +13,8 @@ from armkin.model import units
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+_IDENTITY = {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}
+
 
 def numbers(arm: Arm) -> dict[str, Any]:
     """Joints with their screws, limits and speeds, DH tables where there are any, the chain's matrices.
@@ -43,7 +45,7 @@ def numbers(arm: Arm) -> dict[str, Any]:
         "joints": joints,
         "base": arm.base.tolist(),
         "zero_pose": screws["zero_pose"],
-        "tool": screws.get("tool", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}),
+        "tool": screws.get("tool", _IDENTITY),
         "links": arm.link.tolist(),
         "dh_standard": _table(arm, modified=False),
         "dh_modified": _table(arm, modified=True),
@@ -56,6 +58,5 @@ def _table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
         data = tables.dh(arm, modified=modified)
     except UsageError:
         return None
-    nothing = {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}
     rows = [joint["dh"] for joint in data["joints"]]
-    return {"base": data.get("base", nothing), "rows": rows, "tool": data.get("tool", nothing)}
+    return {"base": data.get("base", _IDENTITY), "rows": rows, "tool": data.get("tool", _IDENTITY)}

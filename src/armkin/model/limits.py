@@ -1,4 +1,4 @@
-"""Joint limits: who is outside."""
+"""Which joints are outside their limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.model.units import DEGREE, limits_out
+from armkin.model.units import DEGREE, finite, limits_out
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -30,9 +30,9 @@ def outside(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
 
 
 def fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
-    """The same as an error's fields: joint, value, lower, upper [deg | mm]; null where unlimited."""
+    """Fields of the error about a joint outside its limits: joint, value, lower, upper [deg | mm]; None: unlimited."""
     unit = 1.0 if arm.prismatic[joint] else DEGREE
-    lower, upper = (end if math.isfinite(end) else None for end in limits_out(arm)[joint])
+    lower, upper = map(finite, limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": float(value) / unit, "lower": lower, "upper": upper}
 
 
@@ -45,7 +45,7 @@ def said(arm: Arm, joint: int, value: float) -> str:
     >>> said(armkin.load("robots/three_dof.yaml"), 1, math.radians(130))
     'q2 = 130 deg is outside -20 to 120 deg'
     """
-    size, unit = (1.0, "mm") if arm.prismatic[joint] else (math.pi / 180, "deg")
+    size, unit = (1.0, "mm") if arm.prismatic[joint] else (DEGREE, "deg")
     ends = (arm.lower[joint], arm.upper[joint])
     low, high = (f"{end / size + 0.0:.10g}" if math.isfinite(end) else "any" for end in ends)
     return f"{arm.joint_names[joint]} = {value / size:.10g} {unit} is outside {low} to {high} {unit}"

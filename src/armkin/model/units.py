@@ -1,6 +1,6 @@
-"""The command line speaks millimetres and degrees, the API millimetres and radians: the one crossing.
+"""From the millimetres and degrees of the command line and of JSON to the API's millimetres and radians, and back.
 
-(The other one is the robot file's: `armkin.model.arm.build`.)
+(The robot file's degrees are converted by `armkin.model.build`.)
 """
 
 from __future__ import annotations
@@ -81,6 +81,11 @@ def angles_out(angles: ArrayLike) -> Array:
     import numpy as np
 
     return np.asarray(angles, dtype=float) / DEGREE + 0.0
+
+
+def finite(value: float) -> float | None:
+    """A number for JSON, which has neither infinity nor nan: null."""
+    return float(value) if math.isfinite(value) else None
 
 
 def label_units(labels: Sequence[str]) -> list[str]:

@@ -53,7 +53,7 @@ def _breaks(plan: PathPlan) -> list[float]:
     begins = plan.motion.begins
     found = []
     for one in plan.reconfigurations:
-        later = [begins[k] for k, (_, base) in sorted(plan.on_path.items()) if plan.s_range(k)[0] >= one.s - 1e-6]
+        later = [begins[k] for k in sorted(plan.on_path) if plan.s_range(k)[0] >= one.s - 1e-6]
         found += later[:1]
     return found
 

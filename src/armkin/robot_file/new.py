@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armkin.robot_file.writing import scalar
+from armkin.robot_file.writing import number, scalar
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def text(name: str, convention: str, rows: Sequence[Row], source: str = "") -> s
     lines = [
         "# Millimetres and degrees throughout. `armkin info` prints the table as papers do: compare it line by line.",
         f"name: {scalar(name)}",
-        f"source: {_quoted(source)}" if source else "# source: where the numbers come from",
+        f"source: {scalar(source)}" if source else "# source: where the numbers come from",
         f"convention: {convention}   # {_HEAD[convention]}",
         "joints:",
     ]
@@ -86,12 +86,5 @@ def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
 
 
 def _number(value: float) -> str:
-    """A number as people write it, and as YAML 1.1 reads it back: 1e-05 would be text there."""
-    short = f"{value:.10g}"
-    if "e" in short:
-        short = f"{value:.20f}".rstrip("0").rstrip(".")
-    return "0" if short in ("-0", "") else short
-
-
-def _quoted(words: str) -> str:
-    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """A number with at most ten digits, as people write it."""
+    return number(float(f"{value:.10g}"))

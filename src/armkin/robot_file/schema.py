@@ -71,29 +71,23 @@ class _Generator(GenerateJsonSchema):
 
 
 def json_schema() -> dict[str, Any]:
-    """The schema as plain JSON data.
+    """The schema of a robot file as plain JSON data.
 
     >>> json_schema()["required"]
     ['name', 'convention', 'joints']
     """
     Pose.model_rebuild()  # its defaults stand in the schema, and its own build was deferred
-    made = _tidied(RobotFile.model_json_schema(schema_generator=_Generator))
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "armkin robot file",
-        "examples": EXAMPLES,
-        **made,
-    }
+    return made_from(RobotFile, "armkin robot file", examples=EXAMPLES)
 
 
-def made_from(model: type[BaseModel], title: str) -> dict[str, Any]:
-    """The schema of another kind of file."""
+def made_from(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:
+    """The schema of a kind of file; more: keys that stand before those of the model."""
     made = _tidied(model.model_json_schema(schema_generator=_Generator))
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **made}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **more, **made}
 
 
 def _tidied(part: Any) -> Any:
-    """The same schema from every pydantic: whole bounds as integers, a lone reference without its allOf.
+    """A schema that does not depend on pydantic's version: whole bounds as integers, a lone reference without allOf.
 
     Titles go ("Max Speed"), as they hide the descriptions in editors' hovers.
     """

@@ -43,11 +43,11 @@ def text(data: Mapping[str, Any], comments: Iterable[str] = ()) -> str:
     lines = [f"# {line}" for comment in comments for line in _UNFIT.sub("?", comment).splitlines()]
     for key, value in data.items():
         if isinstance(value, Mapping) or not _is_list_of_mappings(value):
-            lines.append(f"{key}: {_flow(value)}")
+            lines.append(f"{key}: {flow(value)}")
             continue
         lines.append(f"{key}:")
         for item in value:
-            entries = [f"{k}: {_flow(v)}" for k, v in item.items()]
+            entries = [f"{k}: {flow(v)}" for k, v in item.items()]
             lines += [f"  {'-' if i == 0 else ' '} {entry}" for i, entry in enumerate(entries)]
     return "\n".join(lines) + "\n"
 
@@ -86,7 +86,8 @@ def _is_list_of_mappings(value: Any) -> bool:
     return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
+    """A value in YAML's flow style, which reads back as the same value."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -94,9 +95,9 @@ def _flow(value: Any) -> str:
     if isinstance(value, float):
         return number(value)
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_flow, value)) + "]"
+        return "[" + ", ".join(map(flow, value)) + "]"
     return scalar(str(value))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -16,6 +15,7 @@ from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
+from armkin.robot_file.writing import flow
 from armkin.teach import request_checks
 
 if TYPE_CHECKING:
@@ -107,10 +107,10 @@ class Program:
 
         lines = [f"robot: {self.arm.name}"]
         keys = [key for key in PathFile.model_fields if key in self.head]
-        lines += [f"{key}: {_flow(self.head[key])}" for key in keys]
+        lines += [f"{key}: {flow(self.head[key])}" for key in keys]
         lines.append("moves:")
         for move, name in zip(self.moves, self.names, strict=True):
-            entries = [f"{key}: {_flow(value)}" for key, value in move.items()]
+            entries = [f"{key}: {flow(value)}" for key, value in move.items()]
             shown = entries[0] if len(entries) == 1 else "{" + ", ".join(entries) + "}"
             lines.append(f"  - {shown}" + (f"  # {name}" if name else ""))
         return "\n".join(lines) + "\n"
@@ -276,17 +276,3 @@ def _said(move: Mapping[str, Any]) -> str:
 
 def _rounded(values: Sequence[float]) -> list[float]:
     return [round(float(value), _DIGITS) + 0.0 for value in values]
-
-
-def _flow(value: Any) -> str:
-    """A value in YAML's flow style."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    if isinstance(value, float):
-        text = repr(value)
-        return text if "e" not in text else f"{value:.12f}".rstrip("0")
-    if isinstance(value, str) and re.fullmatch(r"[A-Za-z][\w ]*", value) and value not in ("yes", "no", "on", "off"):
-        return value
-    return json.dumps(value)

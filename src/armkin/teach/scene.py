@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def scene(arm: Arm) -> dict[str, Any]:
     """The arm: links and bodies (see `armkin.view.skeleton.shape`), joints, motors."""
     form = shape(arm)
-    limits = [[_finite(end) for end in pair] for pair in units.limits_out(arm)]
+    limits = [[units.finite(end) for end in pair] for pair in units.limits_out(arm)]
     return {
         "robot": arm.name,
         "robot_file": arm.path,
@@ -38,7 +38,7 @@ def scene(arm: Arm) -> dict[str, Any]:
                 "prismatic": bool(sliding),
                 "ratio": float(ratio),
                 "at": float(at),
-                "max_speed": _finite(speed),
+                "max_speed": units.finite(speed),
             }
             for name, unit, (low, high), home, sliding, ratio, at, speed in zip(
                 arm.joint_names,
@@ -93,8 +93,3 @@ def _gripper(arm: Arm) -> dict[str, Any] | None:
         "unit": "deg" if file.lead is None else "mm",
         "along": (inside / np.linalg.norm(inside)).tolist(),
     }
-
-
-def _finite(value: float) -> float | None:
-    """A number for JSON, which has neither infinity nor nan."""
-    return float(value) if abs(value) < float("inf") else None

@@ -101,7 +101,7 @@ class Page {
     this.q = q;
     this.joints.show(q);
     this.view?.pose(q);
-    this.view?.haunt([]);
+    this.view?.showGhosts([]);
   }
 
   /** The board says where the arm stands. @param {import("./types.js").BoardState} state */
@@ -112,21 +112,21 @@ class Page {
     if (!this.view) return;
     if (this.moving && state.joints) {
       this.view.pose(state.joints);
-      this.view.haunt([]);
+      this.view.showGhosts([]);
     } else if (ended) {
       this.ask({});
       this.program.planning.push({}); // it starts where the arm stands
       this.show(this.look);
-    } else this.haunt();
+    } else this.showGhosts();
   }
 
   /** Ghosts: the other branches, the nearest pose, and the arm itself where it stands elsewhere. */
-  haunt() {
+  showGhosts() {
     const ghosts = this.tip.ghosts();
     const stands = this.board.state?.joints;
     const away = stands?.some((value, i) => Math.abs(value - this.q[i]) > 0.1);
     if (stands && away) ghosts.push({ joints: stands, colour: "#3a444f", faint: false });
-    this.view?.haunt(ghosts);
+    this.view?.showGhosts(ghosts);
   }
 
   /**
@@ -144,8 +144,8 @@ class Page {
     this.motors.show(look);
     if (!this.view || this.moving) return;
     this.view.pose(look.q);
-    this.haunt();
-    const flat = look.task === "xy" || look.task === "xy_theta";
+    this.showGhosts();
+    const flat = isFlat(look.task);
     const { position_mm: tip, rpy_deg } = look.tip;
     const target = look.target ?? tip;
     this.view.gizmo.show(look.task !== null, flat);
@@ -156,7 +156,7 @@ class Page {
   /** Move the target from where it is. @param {number[]} way [steps] */
   nudge(way) {
     if (!this.tip.target.length || !this.look.task) return;
-    const flat = this.look.task.startsWith("xy") && !this.look.task.startsWith("xyz");
+    const flat = isFlat(this.look.task);
     const target = this.tip.target.map((value, i) => (i < (flat ? 2 : 3) ? value + NUDGE * way[i] : value));
     this.tip.target = target;
     this.aim(target);
@@ -178,7 +178,7 @@ class Page {
     get("legend").textContent = `a square is ${view.step} mm`;
     view.gizmo.moved = (position, rpy) => {
       const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);
-      const flat = this.look.task === "xy" || this.look.task === "xy_theta";
+      const flat = isFlat(this.look.task);
       const target = flat ? [...position.slice(0, 2), ...(this.look.target ?? []).slice(2)] : [...position, ...rest];
       this.aim(target, true);
     };
@@ -199,13 +199,16 @@ class Page {
   }
 }
 
+/** Whether a task's targets lie in the base's x-y plane. @param {string | null} task */
+const isFlat = (task) => task === "xy" || task === "xy_theta";
+
 /** @type {Map<string, string>} */
 const troubles = new Map();
 
 /**
  * Say what went wrong.
  * @param {string} text or nothing
- * @param {string} [source] whose trouble it is: what one part has mended says nothing of another's
+ * @param {string} [source] the part of the page that it is about: each part clears its own text alone
  */
 export function trouble(text, source = "page") {
   troubles.set(source, text);

@@ -146,7 +146,7 @@ export class View {
   }
 
   /** Show ghosts instead of those shown. @param {import("./ghosts.js").Ghost[]} wanted */
-  haunt(wanted) {
+  showGhosts(wanted) {
     this.ghosts.show(wanted, this.solid);
     this.draw();
   }
