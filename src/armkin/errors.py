@@ -4,7 +4,7 @@
     ├── FileError          a file that cannot be read or written
     ├── RobotFileError     a robot file that is not valid
     ├── UsageError         an argument that does not fit the arm or the command
-    │   └── PathFileError  a path file that is not valid
+    │   ├── PathFileError  a path file that is not valid
     │   ├── RedundantArmError   more joints than the task has constraints
     │   ├── NoHomingError       joints without a limit switch
     │   └── NothingHeldError    there is no motion to go on with, or another one

@@ -13,19 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.chain import Model
+from armkin.calibration.chain import KINDS, Model
 from armkin.calibration.fit import Fit, Measured, fit, residuals
 from armkin.calibration.observability import left_open
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
 FOLDS = 5
-GAIN = 0.97  # of the file's squared error on unseen rows, what a first correction may leave,
-CERTAIN = 0.5  # and how many standard errors it must gain; a further one must only gain,
-FEW = 18.0  # with few rows by more: FEW / rows standard errors
-MANY = 10  # rows; with fewer a fit can look good by chance, and what it leaves open is looked at, too:
-OPEN = 0.5  # of the file's error, how much of the tip's place a fit to few rows may leave open
-CAP = 4.0  # errors beyond so many medians count as that: a row that is wrong decides nothing
+GAIN = 0.97  # the first level above the file is taken if it leaves at most this share of the squared error
+CERTAIN = 0.5  # [standard errors] that the first level must gain besides; later levels: 0
+FEW = 18.0  # every level must gain FEW / rows standard errors more than that
+MANY = 10  # [rows] with fewer a fit can look good by chance: OPEN holds for it, too
+OPEN = 0.5  # share of the file's error: what the covariance of a fit to few rows may leave open at the tip
+CAP = 4.0  # errors above this many medians count as this many: one wrong row does not decide
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
 
 def free_at(model: Model, level: int, data: Measured, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level: its own kind's and the simpler levels'."""
-    kinds = ("base", "tool", "zeros", "ratios", "lengths", "twists")[: level + 1 if level else 0]
+    kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
     wanted = [
         parameter.kind in kinds
         and not {parameter.kind, parameter.name} & set(fixed)
@@ -88,7 +88,7 @@ def _parts(count: int) -> list[NDArray[np.intp]]:
 
 
 def _settled(model: Model, candidate: Fit, before: Array) -> bool:
-    """Whether the rows leave less open than the fit mends."""
+    """Whether the fit's covariance leaves less of the tip's place open than OPEN times the file's error."""
     return left_open(model, candidate) < OPEN * float(np.sqrt(np.mean(before**2)))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
-UNSEEN = 0.7  # of the prior's doubt left: the rows hardly speak of this correction
+UNSEEN = 0.7  # share of the prior's doubt: a correction of which more is left is not shown by the rows
 TOGETHER = 0.9  # correlation of two corrections of which only the sum is seen
 CANDIDATES = 400
 UNLIMITED = np.pi, 200.0  # [rad, mm] how far an unlimited joint is moved for a suggestion
@@ -52,9 +52,9 @@ def unseen(model: Model, found: Fit) -> list[str]:
 
 
 def left_open(model: Model, found: Fit) -> float:
-    """How far the tip may still be off after a fit, because its rows do not tell: root mean square [mm].
+    """The tip's standard deviation after a fit, by the fit's covariance [mm]: root mean square over 100 poses.
 
-    By the fit's own covariance, over 100 poses anywhere within limits.
+    The poses are random, within limits.
     """
     J = model.poses(found.p, _anywhere(model.arm, 100))[1][:, :3, found.free] * model.prior[found.free]
     return float(np.sqrt(np.einsum("mip,pq,miq->m", J, np.linalg.inv(found.normal), J, optimize=True).mean()))
@@ -88,7 +88,7 @@ def suggestions(model: Model, count: int, free: NDArray[np.intp], before: Array 
 
 
 def _range(arm: Arm) -> tuple[Array, Array]:
-    """Limits (n,) [rad | mm]; where there are none, a range that tells enough."""
+    """Limits, lower and upper (n,) [rad | mm]; where a joint has none, half a turn or 200 mm to that side."""
     span = np.where(arm.prismatic, UNLIMITED[1], UNLIMITED[0])
     low = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - span, -span))
     return low, np.where(np.isfinite(arm.upper), arm.upper, np.where(np.isfinite(arm.lower), arm.lower + span, span))

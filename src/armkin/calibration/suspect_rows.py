@@ -90,7 +90,7 @@ def _meaning(arm: Arm, data: Measured) -> None:
 def _axes_in_place(expected: Array, measured: Array, most: float, largest: float) -> str:
     """Whether the points fit without any motion once axes change places or one of them its sign; "" if not.
 
-    A measuring frame may stand anywhere; but one whose axes change places explains itself.
+    Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
     """
     found = [
         (_plain(expected, measured[:, order]), f"columns {_named(order)} of the measured points look like x y z")

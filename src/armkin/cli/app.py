@@ -34,14 +34,14 @@ _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 class _ClosedPipe(Exception):  # noqa: N818 - no error
-    """Who reads standard output has seen enough. (Typer would end the process with 1 for the OSError.)"""
+    """The reader of standard output has closed the pipe. (Typer would end the process with 1 for the OSError.)"""
 
 
 class Command(TyperCommand):
-    """A command whose negative numbers are arguments, and whose help says no more than needed."""
+    """A command whose negative numbers are arguments, and whose help has no names of Python types."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the options, then all that is none."""
+        """Parse the options first, then the arguments."""
         takes_value = [
             name
             for parameter in self.params
@@ -223,13 +223,13 @@ def _closed_pipes() -> Iterator[None]:
 
 
 def _enough() -> int:
-    """`| head` has seen enough: that is no failure."""
+    """Exit code 0 where the reader has closed the pipe, as `| head` does."""
     _drop_stdout()
     return 0
 
 
 def _drop_stdout() -> None:
-    """What is still buffered goes nowhere, or the interpreter complains about it when it ends."""
+    """Throw away what is still buffered: the interpreter would complain about it at its end."""
     try:
         _flush()
     except (OSError, ValueError):

@@ -147,7 +147,7 @@ def _batch_rows(
 def streamed_rows(
     source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None = None
 ) -> Iterator[tuple[int, list[float]]]:
-    """The same row by row, each as soon as it is there: its number and its values."""
+    """Rows of a CSV file one by one, each as soon as it can be read: its number and its values."""
     columns = Columns(names, what, named)
     with _opened(source) as file:
         for number, line in enumerate(iter(lambda: _line(file, source), b""), 1):

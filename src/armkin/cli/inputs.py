@@ -103,20 +103,27 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
 
 
 def target(arm: Arm, task: Task, words: Sequence[str] | None) -> list[float]:
-    """One value for each of the target's numbers [mm, deg]."""
+    """The target's numbers [mm, deg], one word each."""
     values = numbers(words or (), task.labels, f"task {task.name}")
     unit_notes.target(arm, task.labels, values)
     return values
 
 
 def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = None) -> list[float]:
-    """The same of `--target`, comma-separated; rest: numbers that stand behind it as words of their own."""
+    """The numbers of `--target X,Y,Z` [mm, deg]; rest: words that stand behind the option, numbers for its target."""
     if rest and is_number(text) and all(map(is_number, rest)):
         whole = ",".join([text, *rest])
         raise UsageError(f"--target: separate the numbers with commas: --target {whole}")
     values = listed(text, task.labels, f"--target (task {task.name})")
     unit_notes.target(arm, task.labels, values)
     return values
+
+
+def check_commas(arm: Arm, task: str | None, text: str, rest: Sequence[str]) -> None:
+    """Raise UsageError for `--target 390 80 300`, where a target's numbers stand behind it as words of their own."""
+    from armkin.inverse.tasks.fitting import task_for
+
+    target_list(arm, task_for(arm, task), text, rest)
 
 
 def no_numbers(words: Sequence[str] | None) -> None:

@@ -91,7 +91,7 @@ def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
 
 
 def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:
-    """The same as the arm and the answers themselves."""
+    """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
     text = _text()
     if not text.strip():
         inputs.named(robot)

@@ -32,10 +32,7 @@ def goals(
 
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
     if target is not None and q and robot is not None and batch is None:
-        from armkin.inverse.tasks.fitting import task_for
-
-        arm = inputs.load(robot)
-        inputs.target_list(arm, task_for(arm, task), target, q)  # 390 80 300 wants commas
+        inputs.check_commas(inputs.load(robot), task, target, q)
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
     if target is None and (branch is not None or task is not None or near is not None or lock):

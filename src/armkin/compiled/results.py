@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.solutions import Solutions
 
-ROOM = 24  # columns that there is room for from the beginning, where moving to another place would cost memory
-MOVABLE = 32_000_000  # [bytes] up to which it does not, and allocators keep what was given back for the next call
+ROOM = 24  # columns that a large result has room for from the start: to grow it would take its memory twice
+MOVABLE = 32_000_000  # [bytes] results up to this grow by a copy instead: allocators reuse the memory given back
 BLOCK = 4096  # rows moved at once
 
 

@@ -116,7 +116,7 @@ def _alike(name: str) -> str:
 
 
 def _lists(value: Any) -> Any:
-    """The same data with lists where the reader (or a program) has tuples."""
+    """Data with its tuples (the reader's, or a program's) turned into lists."""
     if isinstance(value, Mapping):
         return {key: _lists(part) for key, part in value.items()}
     return [_lists(part) for part in value] if isinstance(value, list | tuple) else value

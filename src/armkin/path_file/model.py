@@ -141,7 +141,7 @@ class PathFile(_Model):
     moves: Annotated[list[Move], Field(min_length=1, max_length=1_000_000)] = Field(description="The moves, in order.")
 
     def read_from(self, source: Source) -> PathFile:
-        """The same path, which knows where its moves stand."""
+        """Note where the path was read, for messages; returns the path."""
         self._source = source
         return self
 

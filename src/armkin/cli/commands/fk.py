@@ -57,7 +57,7 @@ def fk(
 
 
 def _poses(robot: str | None, q: list[str] | None) -> tuple[Arm, list[list[float]]]:
-    """The arm and joint values [deg | mm] of the command line, or of an answer on standard input."""
+    """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
     if q:
         arm = inputs.load(inputs.named(robot))
         return arm, [inputs.joints(arm, q)]

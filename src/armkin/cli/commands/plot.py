@@ -71,7 +71,7 @@ def plot(
         return
     arm = inputs.load(inputs.named(robot))
     if target is not None and q:
-        _no_words(arm, task, target, q)
+        inputs.check_commas(arm, task, target, q)
     if sum((bool(q), target is not None, batch is not None)) > 1:
         raise UsageError("joint values, --target and --batch: give one of the three")
     if target is not None:
@@ -130,13 +130,6 @@ def _eye(text: str) -> tuple[float, float]:
         raise UsageError(f"--view {text}: there are {', '.join(_VIEWS)}, or ELEVATION,AZIMUTH, for example 20,-60")
     elevation, azimuth = listed(text, ("elevation", "azimuth"), "--view")
     return elevation, azimuth
-
-
-def _no_words(arm: Arm, task: str | None, target: str, q: list[str]) -> None:
-    """`--target 390 80 300`: say that it wants commas, where that is what is wrong."""
-    from armkin.inverse.tasks.fitting import task_for
-
-    inputs.target_list(arm, task_for(arm, task), target, q)
 
 
 def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out: str | None, **style: Any) -> None:
