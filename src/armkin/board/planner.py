@@ -70,7 +70,7 @@ class Planner:
         return self._lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
-        """The same plans, summed up in `done`; none is kept: rows may come for hours."""
+        """Pass plans on and sum them up in `done`; none is kept, as rows may come for hours."""
         for made in plans:
             if made is not None:
                 self.done.add(made)
@@ -140,9 +140,7 @@ class Stream:
         try:
             for row in rows:
                 self._rows.put(row)
-        except ArmkinError as error:
-            self._rows.put(error)
-        except Exception as error:  # what nobody foresaw ends the stream, too, and is raised where it is read
+        except Exception as error:  # told, or raised if it is a bug, in `plans`: this thread has nobody to tell
             self._rows.put(error)
         self._rows.put(None)
 
