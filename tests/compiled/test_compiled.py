@@ -226,3 +226,16 @@ def test_the_command_line_says_the_same_with_it(tmp_path: Path) -> None:
     refused = run("ik", "robots/panda.yaml", "1", "2", "3", "0", "0", "0", "--sweep", "J1=1:2:3", "--compiled")
     assert refused.code == 2
     assert "every value would be another arm to compile" in refused.err
+
+
+def test_a_posture_on_its_limit_stays() -> None:
+    """The exact answer for the rounded target is beyond the limit of joint 2; `near` solves it, too."""
+    arm = armkin.load(ROBOTS / "kuka_kr6_r700.yaml")
+    q = np.radians([0.0, 45.0, 0.0, 0.0, 90.0, 0.0])
+    T = armkin.fk(arm, q)
+    T[:3, 3] = np.round(T[:3, 3], 6)
+    fast = armkin.compile(arm)
+    for target in (T, np.stack([T] * 3)):
+        found = fast.ik(target, near=q)
+        same(found, armkin.ik(arm, target, near=q))
+        assert np.abs(found.q.reshape(-1, 8, 6)[0, np.ravel(found.best)[0]] - q).max() < 1e-12

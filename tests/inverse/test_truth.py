@@ -300,6 +300,36 @@ def test_near_as_a_batch_is_near_one_by_one() -> None:
         assert many.best[k] == one.best
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_posture_on_its_limits_stays_where_its_target_is_rounded(name: str) -> None:
+    """The exact answer for a rounded target may lie beyond the limit that `near`, which solves it, too, is on."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(12)
+    q = rng.uniform(np.clip(arm.lower, -np.pi, np.pi), np.clip(arm.upper, -np.pi, np.pi), (30, arm.n))
+    on = rng.random(q.shape) < 0.5
+    ends = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
+    q = np.where(on & np.isfinite(ends), ends, q)
+    target = goal(task, screw, q).array()
+    kinds = {f"{n} digits": truth.typed(task, target, n) for n in (11, 12)}
+    verdict, what = judged(
+        arm, screw, dict.fromkeys(kinds, q), np.concatenate(list(kinds.values())), np.tile(q, (2, 1))
+    )
+    verdict.lost = []
+    assert verdict, what
+
+
+def test_a_posture_on_its_limit_stays_alone_and_in_a_batch() -> None:
+    arm = load("kuka_kr6_r700")
+    q = np.radians([0.0, 45.0, 0.0, 0.0, 90.0, 0.0])
+    T = armkin.fk(arm, q)
+    T[:3, 3] = np.round(T[:3, 3], 6)
+    one, many = armkin.ik(arm, T, near=q), armkin.ik(arm, np.stack([T] * 3), near=q)
+    np.testing.assert_allclose(one.q[one.best], q, atol=1e-12)
+    np.testing.assert_allclose(many.q[np.arange(3), many.best], [q] * 3, atol=1e-12)
+    assert one.status == Status.EXACT
+
+
 def test_copies_are_the_legal_ones_nearest_to_near() -> None:
     """Against all copies, for limits of every kind."""
     from armkin.inverse.branches.turns import nearest_copy

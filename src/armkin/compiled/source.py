@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from armkin.export.c import elimination, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_code import number
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, ON_LIMIT
 from armkin.inverse.tasks.task import LARGEST
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         "target": str(program.target_size(task)),
         "goal": str(kernel.goal_size(task)),
         "accepted": number(accepted),
+        "beside": number(ON_LIMIT),
         "farthest": number(_farthest(arm)),
         "most": ", ".join(most),
         "axis": str(int(task.orientation == "axis")),
@@ -107,11 +108,18 @@ def _fast_numbers() -> str:
 
 
 def _choose(arm: Arm, branches: int) -> str:
-    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits."""
-    lines = []
+    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits.
+
+    And `arm_on_limit`, whether a posture has a joint on a limit.
+    """
+    lines, ends = [], ["0"]
     for j in range(arm.n):
         lower, upper = (number(float(limit[j])) for limit in (arm.lower, arm.upper))
         at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
+        if math.isfinite(arm.lower[j]):
+            ends.append(f"near[{j} * ARM_LANES] <= {number(float(arm.lower[j]) + ON_LIMIT)}")
+        if math.isfinite(arm.upper[j]):
+            ends.append(f"near[{j} * ARM_LANES] >= {number(float(arm.upper[j]) - ON_LIMIT)}")
         if arm.prismatic[j]:
             lines.append(f"in &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);")
         else:
@@ -127,5 +135,11 @@ def _choose(arm: Arm, branches: int) -> str:
 {body}
             inside[b * ARM_LANES + i] = in;
         }}
+}}
+
+static int arm_on_limit(const double *near)
+{{
+    (void)near;
+    return {" || ".join(ends)};
 }}
 """

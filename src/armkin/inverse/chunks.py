@@ -12,7 +12,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import Straight
 from armkin.inverse.batch import Batch, empty, pack
-from armkin.inverse.branches.turns import nearest_copy
+from armkin.inverse.branches.turns import beyond_near, nearest_copy
 from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import decided
@@ -129,6 +129,8 @@ def _keep(arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], star
     _fill(arm, part, values, valid.reshape(shape), near)
     full = bool(valid.all())
     doubtful = _doubtful(miss, valid, doubt, full)
+    if (beyond := beyond_near(arm, part.q, part.valid, part.within, near)).any():
+        doubtful = np.union1d(doubtful, np.flatnonzero(beyond))
     if not full:
         count = valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE

@@ -18,9 +18,9 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.formula.recording import axes_of
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.branches.turns import nearest_number
+from armkin.inverse.branches.turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, ON_LIMIT
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
@@ -59,6 +59,11 @@ class OneTarget:
         straight = recorded(arm, definition, geometry).code.always()
         self._run, self._off = straight.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
+        self._limited = [
+            (i, low + ON_LIMIT, high - ON_LIMIT)
+            for i, (low, high, _) in enumerate(self._joints)
+            if math.isfinite(low) or math.isfinite(high)
+        ]
         own = [axes_of(x) for x in straight.outputs]
         axes = np.broadcast_shapes((1, 1, 1), *own[: arm.n])
         self.count = math.prod(axes)
@@ -106,8 +111,19 @@ class OneTarget:
             return None
         return self._found(kept, near, values, there, off)
 
-    def _found(self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float) -> Solutions:
-        """The branches that are there, at their nearest legal copies, nan behind."""
+    def _beyond(self, near: Array, legal: list[float], there: list[int], within: list[bool]) -> bool:
+        """`turns.beyond_near` of the branches that are there."""
+        for b, ok in zip(there, within, strict=True):
+            away = [v - c for v, c in zip(self._rows[b](legal), near.tolist(), strict=False)]
+            beside = all(abs(math.remainder(d, TURN)) < ON_LIMIT for d in away)
+            if beside and not (ok and all(abs(d) < ON_LIMIT for d in away)):
+                return True
+        return False
+
+    def _found(
+        self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float
+    ) -> Solutions | None:
+        """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be better."""
         legal: list[float] = []
         inside: list[bool] = []
         for value, close, joint, plain in zip(values, near.tolist(), self._joints, self._plain, strict=False):
@@ -123,6 +139,8 @@ class OneTarget:
             for place, b in enumerate(there):
                 q[place] = self._rows[b](legal)[:-1]
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
+        if any(not low < near[i] < high for i, low, high in self._limited) and self._beyond(near, legal, there, within):
+            return None
         none = B - count
         block = np.array([
             *[True] * count, *[False] * none, *within, *[False] * none,

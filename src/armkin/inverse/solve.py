@@ -20,7 +20,7 @@ from armkin.inverse import chunks, one_target
 from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.turns import beyond_near, nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.doubtful import examined
 from armkin.inverse.many_starts import many_starts
@@ -140,7 +140,7 @@ def _rows(
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
     pack(out, count)
-    doubtful = np.flatnonzero(doubt)
+    doubtful = np.flatnonzero(doubt | beyond_near(arm, out.q, out.valid, out.within, near))
     if examine and len(doubtful):
         solve = geometry.rows
 

@@ -2,6 +2,19 @@
    rounding, not finite, too large). */
 enum { ARM_DONE = 0, ARM_OPEN = 1, ARM_UNREAD = 2 };
 
+/* Whether a branch at `near` is outside limits or a whole turn away from there: `near` may solve the target, too. */
+static int arm_beside(const double *q, const double *near, int inside)
+{
+    int j, there = inside;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        const double d = q[j * ARM_LANES] - near[j * ARM_LANES];
+        there &= fabs(d) < @beside@;
+        if (!(fabs(d - ARM_TURN * rint(d / ARM_TURN)) < @beside@)) /* of a slide, too: Python decides */
+            return 0;
+    }
+    return !there;
+}
+
 /* All branches of n targets, in the layout of `armkin.Solutions`; near_step: 0 if one `near` serves all, else the
    number of joints. read: whether the targets have been read. Returns how many are not done. */
 int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t near_step, int64_t read, double *out_q,
@@ -9,7 +22,8 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
 {
     double goal[ARM_GOAL * ARM_LANES], close[ARM_JOINTS * ARM_LANES];
     double q[ARM_BRANCHES * ARM_JOINTS * ARM_LANES], miss[ARM_BRANCHES * ARM_LANES];
-    int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES];
+    int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES],
+        limit[ARM_LANES];
     int64_t start, left = 0;
     int i, j, b;
     for (i = 0; i < ARM_LANES; i++)
@@ -22,11 +36,18 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
             for (i = 0; i < count; i++)
                 for (j = 0; j < ARM_JOINTS; j++)
                     close[j * ARM_LANES + i] = near[(start + i) * near_step + j];
+        if (near_step || !start)
+            for (i = 0; i < ARM_LANES; i++)
+                limit[i] = arm_on_limit(close + i);
         arm_candidates(goal, close, q, miss, doubt, count);
         arm_choose(close, q, inside, count);
         for (b = 0; b < ARM_BRANCHES; b++)
             for (i = 0; i < count; i++)
                 doubt[i] |= !(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY);
+        for (b = 0; b < ARM_BRANCHES; b++)
+            for (i = 0; i < count; i++)
+                if (limit[i] && !doubt[i])
+                    doubt[i] = arm_beside(q + b * ARM_JOINTS * ARM_LANES + i, close + i, inside[b * ARM_LANES + i]);
         for (i = 0; i < count; i++) {
             const int64_t at = start + i;
             double *row = out_q + at * ARM_BRANCHES * ARM_JOINTS;
