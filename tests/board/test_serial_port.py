@@ -33,7 +33,7 @@ class FakeSerial:
 class FakeLock:
     """The right to a port that is not there."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, rate: int) -> None:
         pass
 
     def release(self) -> None:

@@ -52,9 +52,10 @@ def _only(found: Sequence[str], kind: str) -> str:
         output.note(f"using {found[0]}, the only port where {kind} answers")
         return found[0]
     where = f"{len(found)} boards answer ({', '.join(found)})" if found else f"no port where {kind} answers was found"
+    lists = "it is a socket, as klippy.py -a names it" if "klipper" in kind else "armkin ports lists them"
     raise UsageError(
         f"--port is missing, and {where}\n"
-        "armkin ports lists them, ARMKIN_PORT names one for every command; sim is a board in this process"
+        f"{lists}, ARMKIN_PORT names one for every command; sim is a board in this process"
     )
 
 

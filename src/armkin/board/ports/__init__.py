@@ -6,7 +6,19 @@ socket_port.py  the Unix socket of a program on this computer
 """
 
 from armkin.board.ports.port import BAUD, SIM, Port
-from armkin.board.ports.serial_port import Found, SerialPort, holder, list_ports, note_path
+from armkin.board.ports.serial_port import Found, SerialPort, holder, holder_rate, list_ports, note_path
 from armkin.board.ports.socket_port import SocketPort, is_socket
 
-__all__ = ["BAUD", "SIM", "Found", "Port", "SerialPort", "SocketPort", "holder", "is_socket", "list_ports", "note_path"]
+__all__ = [
+    "BAUD",
+    "SIM",
+    "Found",
+    "Port",
+    "SerialPort",
+    "SocketPort",
+    "holder",
+    "holder_rate",
+    "is_socket",
+    "list_ports",
+    "note_path",
+]

@@ -42,7 +42,7 @@ class SerialPort:
 
     def __init__(self, name: str, baud: int = BAUD, *, reset: bool = True) -> None:
         self.name, self.baud = name, baud
-        self._lock = Lock(name)
+        self._lock = Lock(name, baud)
         try:
             self._serial = _open_serial(name, baud, reset)
         except BaseException:
@@ -241,9 +241,12 @@ def list_ports() -> list[Found]:
 
 
 class Lock:
-    """The right to a port, held as long as this process lives; a file beside it says which process that is."""
+    """The right to a port, held as long as this process lives; a file beside it says which process that is.
 
-    def __init__(self, name: str) -> None:
+    rate: the port's, 0 for a socket; it is told by `holder_rate`.
+    """
+
+    def __init__(self, name: str, rate: int = 0) -> None:
         self._lock: BaseFileLock | None = None
         if "://" in name:
             return
@@ -257,7 +260,7 @@ class Lock:
         with suppress(OSError):
             os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
         with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
-            file.write(f"{os.getpid()} {_born(os.getpid())}")
+            file.write(f"{os.getpid()} {_born(os.getpid())} {rate}")
 
     def release(self) -> None:
         """Let others have the port."""
@@ -280,6 +283,12 @@ def holder(name: str) -> int | None:
         return _read_pid(name)
     lock.release()
     return None
+
+
+def holder_rate(name: str) -> int | None:
+    """The rate at which the process that holds a port speaks there; None if nobody says."""
+    words = _pid_file(name)
+    return int(words[2]) if len(words) == 3 and words[2].isdigit() else None
 
 
 def note_path(name: str) -> str:
@@ -307,12 +316,17 @@ def _path(name: str, end: str) -> str:
 
 def _read_pid(name: str) -> int | None:
     """The process that wrote the file beside a lock, if it still is that process: by its number and its birth."""
+    number, born, _ = (*_pid_file(name), "", "", "")[:3]
+    return int(number) if number.isdigit() and born == _born(int(number)) else None
+
+
+def _pid_file(name: str) -> list[str]:
+    """Words of the file beside a lock: a process, its birth, its rate; [] if there is none."""
     try:
         with open(_path(name, "pid"), encoding="ascii") as file:
-            number, _, born = file.read(60).partition(" ")
+            return file.read(60).split(" ")
     except (OSError, ValueError):
-        return None
-    return int(number) if number.isdigit() and born == _born(int(number)) else None
+        return []
 
 
 def _born(process: int) -> str:

@@ -28,7 +28,7 @@ def stop(
     Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
     for that, cut the motors' power.
     """
-    from armkin.board.ports import SIM, SerialPort, holder, is_socket
+    from armkin.board.ports import SIM, SerialPort, holder, holder_rate, is_socket
 
     baud = baud or board_link.BAUD
     port = _port(port, baud, not no_reset)
@@ -36,12 +36,14 @@ def stop(
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
     process = holder(port)
     if process is not None:
+        others = holder_rate(port) not in (None, baud)  # a board of others: it was stopped by the process that moved it
         _end(process, port)
         output.note(f"process {process} has given the port back")
-    if is_socket(port):  # Klipper's: it carries out what it holds, and takes nothing of it back
-        if process is None:
-            raise UsageError(f"no armkin moves an arm by {port}; M112 stops Klipper at once, and loses the position")
-        return
+        if others and not power_cut:
+            output.note("it has stopped the arm first")
+            return
+    elif is_socket(port):
+        raise UsageError(f"no armkin moves an arm by {port}; M112 stops Klipper at once, and loses the position")
     from armkin.board.firmware import protocol
     from armkin.board.firmware.session import Session
     from armkin.board.stopping import stoppable
