@@ -14,6 +14,7 @@ from armkin.calibration.chain import Model
 from armkin.calibration.fit import FINEST, Fit
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.model import units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,7 +70,7 @@ def suggestions(model: Model, count: int, free: NDArray[np.intp], before: Array 
     if count < 1 or count > 1000:
         raise UsageError(f"{count} poses cannot be suggested; ask for 1 to 1000")
     arm = model.arm
-    step = np.where(arm.prismatic, 1.0, np.pi / 180)  # whole degrees and millimetres, as people type them
+    step = units.scale(arm)  # whole degrees and millimetres, as people type them
     low, high = _range(arm)
     candidates = np.clip(np.round(_anywhere(arm, CANDIDATES) / step) * step, low, high)
     J = _whitened(model, candidates, free)

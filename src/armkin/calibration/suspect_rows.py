@@ -11,6 +11,7 @@ import numpy as np
 from armkin.calibration.fit import Measured
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -113,7 +114,7 @@ _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "
 
 def _readings(arm: Arm, data: Measured) -> list[_Reading]:
     c, x = data.c, data.position
-    degree = np.where(arm.prismatic, 1.0, math.pi / 180)
+    degree = units.scale(arm)
     found = [
         _Reading("the joint values look like radians where degrees are expected", c / degree, x),
         _Reading("the joint values look like degrees where radians are expected", c * degree, x),

@@ -29,14 +29,14 @@ def joints_in(arm: Arm, values: ArrayLike) -> Array:
     """Joint values (..., n) from [deg | mm] to [rad | mm]."""
     import numpy as np
 
-    return np.asarray(values, dtype=float) * _scale(arm)
+    return np.asarray(values, dtype=float) * scale(arm)
 
 
 def joints_out(arm: Arm, q: ArrayLike) -> Array:
     """Joint values (..., n) from [rad | mm] to [deg | mm]."""
     import numpy as np
 
-    return np.asarray(q, dtype=float) / _scale(arm) + 0.0  # + 0.0: no -0.0
+    return np.asarray(q, dtype=float) / scale(arm) + 0.0  # + 0.0: no -0.0
 
 
 def limits_out(arm: Arm) -> list[tuple[float, float]]:
@@ -66,14 +66,13 @@ def _poses_out(arm: Arm) -> tuple[tuple[str, tuple[float, ...]], ...]:
 
 def _as_written(arm: Arm, q: Array) -> tuple[float, ...]:
     """Joint values [deg | mm] with the fewest digits that mean q: those of a file, which degrees of pi/180 lose."""
-    scale = _scale(arm).tolist()
-    return tuple(_shortest(value, one) for value, one in zip(q.tolist(), scale, strict=True))
+    return tuple(_shortest(value, unit) for value, unit in zip(q.tolist(), scale(arm).tolist(), strict=True))
 
 
-def _shortest(value: float, scale: float) -> float:
-    exact = value / scale + 0.0  # + 0.0: no -0.0
+def _shortest(value: float, unit: float) -> float:
+    exact = value / unit + 0.0  # + 0.0: no -0.0
     shorter = (float(f"{exact:.{digits}g}") for digits in range(6, 17))
-    return next((text for text in shorter if text * scale == value), exact)
+    return next((text for text in shorter if text * unit == value), exact)
 
 
 def angles_out(angles: ArrayLike) -> Array:
@@ -107,7 +106,7 @@ def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
 
         flat = [transform(row[:3], row[3:]) for row in numbers.reshape(-1, 6).tolist()]
         return np.array(flat).reshape(*numbers.shape[:-1], 4, 4)
-    return numbers * [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]
+    return numbers * _label_scale(labels)
 
 
 def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
@@ -118,11 +117,16 @@ def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
         from armkin.model.rotation import rpy
 
         targets = np.concatenate([targets[:, :3, 3], rpy(targets[:, :3, :3])], axis=1)
-    scale = [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]
-    return [list(row) for row in (targets / scale + 0.0).tolist()]
+    return [list(row) for row in (targets / _label_scale(labels) + 0.0).tolist()]
 
 
-def _scale(arm: Arm) -> Array:
+def scale(arm: Arm) -> Array:
+    """What one unit of each joint, a degree or a millimetre, is in [rad | mm]: (n,)."""
     import numpy as np
 
     return np.where(arm.prismatic, 1.0, DEGREE)
+
+
+def _label_scale(labels: Sequence[str]) -> list[float]:
+    """What one unit of each of a target's numbers is in [mm, rad, 1]."""
+    return [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]
