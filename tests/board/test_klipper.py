@@ -71,6 +71,47 @@ def test_a_curve_goes_on_without_a_stop() -> None:
     assert port.jumps == 0
 
 
+def looked_ahead(lines: list[str]) -> tuple[float, int]:
+    """Seconds that Klipper's look-ahead takes for lines, and how many of them begin at rest.
+
+    As Klipper's Kinematics.md has it (look-ahead: v2^2 = v1^2 + 2 a d from move to move, forwards and backwards), for
+    moves along X; each extra axis limits a move's speed and acceleration, and the speed between two moves by what its
+    own speed may jump there (G-Codes.md: LIMIT_VELOCITY, LIMIT_ACCEL, INSTANTANEOUS_CORNER_VELOCITY).
+    """
+    words = [{word[0]: float(word[1:]) for word in line.split()[1:]} for line in lines]
+    places = np.array([[word[axis.letter] for axis in AXES] for word in words])
+    way = np.diff([0.0, *(word["X"] for word in words)])
+    slope = np.diff(np.vstack([[axis.at_home for axis in AXES], places]), axis=0) / way[:, None]
+    limits = {key: np.array([getattr(axis, key) for axis in AXES]) for key in ("max_speed", "max_accel", "corner")}
+    with np.errstate(divide="ignore"):
+        top = np.minimum(10.0, (1.001 * limits["max_speed"] / np.abs(slope)).min(axis=1))
+        accel = np.minimum(1000.0, (limits["max_accel"] / np.abs(slope)).min(axis=1))
+        between = (limits["corner"] / np.abs(np.diff(slope, axis=0))).min(axis=1)
+    gain = 2 * accel * way
+    begin = np.zeros(len(way) + 1)  # squares of the speeds where the moves begin, and where the last one ends
+    for k in range(1, len(way)):
+        begin[k] = min(top[k] ** 2, top[k - 1] ** 2, between[k - 1] ** 2, begin[k - 1] + gain[k - 1])
+    for k in reversed(range(len(way))):
+        begin[k] = min(begin[k], begin[k + 1] + gain[k])
+    a, b = np.sqrt(begin[:-1]), np.sqrt(begin[1:])
+    cruise = np.sqrt(np.minimum(top**2, (begin[:-1] + begin[1:] + gain) / 2))
+    ramps = (2 * cruise**2 - a**2 - b**2) / (2 * accel)  # way of both
+    seconds = (2 * cruise - a - b) / accel + np.maximum(way - ramps, 0.0) / cruise
+    return float(seconds.sum()), int((begin[:-1] < 1e-9).sum())
+
+
+def test_klipper_s_look_ahead_makes_the_plan_s_own_time_of_the_lines() -> None:
+    _, one = opened()
+    moves = [{"joint": [0, 80, -80]}, {"joint": [20, 70, -90]}, {"line": [390, 80, 300]}, {"line": [390, -60, 300]}]
+    path = armkin.path(ARM, {"start": "home", "blend": 5, "tolerance": 0.1, "moves": moves})
+    jobs = [one.plan(one.counts(), np.deg2rad(goal)) for goal in ([60, 20, -60], [-100, 0, 20], [0.5, 89, -89])]
+    for job in [*jobs, *path_run.parts(path, one.counts(), one.lay)]:
+        assert isinstance(job, Job)
+        seconds, rests = looked_ahead(list(Lines(job, AXES)))
+        assert job.duration <= seconds < job.duration + 0.03
+        assert rests == 1
+
+
 @pytest.mark.parametrize("after", [3, 40, 90, 140])
 def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> None:
     asked = iter(range(100_000))
