@@ -124,7 +124,7 @@ def chip_rows() -> None:
 
 def smooth_rows() -> None:
     """Step intervals against the time law's."""
-    for speed, grbl in ((1.0, "73 us (X)"), (0.2, "88 us (X)"), (0.05, "354 us (X)"), (0.02, "")):
+    for speed, grbl in ((1.0, "73 us (X)"), (0.2, "88 us (X)"), (0.05, "354 us (X)"), (0.02, ""), (0.01, "")):
         got = measure.smoothness(speed)
         figures = " / ".join(f"{one.peak_to_peak_us:.0f}" for one in got)
         row(f"step intervals at {speed:.0%}, X / Y / Z, peak to peak", f"{figures} us", grbl)

@@ -284,7 +284,7 @@ def smoothness(speed: float) -> list[Smooth]:
         host = BareHost(emulated)
         host.run(0.02)
         host.setup(configuration.image, {0: 0, 1: 0, 2: 0})
-        status = host.stream(batches((0, 1, 2), (0, 0, 0), work, 5), give_up=200.0, poll=0.1)
+        status = host.stream(batches((0, 1, 2), (0, 0, 0), work, 5), give_up=400.0, poll=0.1)
         assert status.error == 0, status
         assert status.counts[:3] == tuple(cut.end.tolist())
         trace = emulated.trace()
