@@ -194,14 +194,19 @@ def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None,
                 yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 500, 500
 
 
-def asked(name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | None, q: Array, target: Array) -> None:
-    """A line: what is wrong with the answers to targets made from postures, near home and near the postures."""
+def asked(
+    name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | None, q: Array, target: Array, check: int
+) -> None:
+    """A line: what is wrong with the answers to targets made from postures, near home and near the postures.
+
+    check: how many of them the oracle is asked about; over all lines it is a hundred or more for an arm.
+    """
     begin = time.perf_counter()
     armkin.ik(arm, target, task)
     seconds = time.perf_counter() - begin
     verdict = truth.judge(arm, screw, task, q, target)
     beside = truth.judge(arm, screw, task, q, target, near=q)
-    few = np.arange(0, len(q), max(len(q) // 10, 1))
+    few = np.unique(np.linspace(0, len(q) - 1, min(check, len(q))).astype(int))
     truth.ask_oracle(arm, screw, verdict, target, few, 60 if arm.n < 4 else 250, 3)
     s = verdict.solutions
     wrong = "; ".join(str(v).partition(": ")[2].rpartition("; ")[0] for v in (verdict, beside) if not v) or "none"
@@ -218,7 +223,7 @@ def postures(share: float, only: str) -> None:
         for step in (90, 45):
             q = truth.round_postures(arm, step, max(int(count * share), 1))
             definition, _ = solver(arm, task)
-            asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array())
+            asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array(), 25)
 
 
 def surfaces(share: float, only: str) -> None:
@@ -226,7 +231,7 @@ def surfaces(share: float, only: str) -> None:
     for name, arm, screw, task, _, count in asked_arms(only):
         definition, _ = solver(arm, task)
         for label, q in truth.singular_postures(arm, screw, task, max(int(count * share), 1)).items():
-            asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array())
+            asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array(), 5)
 
 
 def rounded(share: float, only: str) -> None:
@@ -237,9 +242,9 @@ def rounded(share: float, only: str) -> None:
         target = oracle.goal(definition, screw, q).array()
         for digits in (3, 4, 5, 6, 7, 7.5, 8, 9, 10, 11, 12, 13, 14, 15, 16):
             what = "float32" if digits == 7.5 else f"{digits} digits"
-            asked(name, what, arm, screw, task, q, truth.typed(definition, target, digits))
+            asked(name, what, arm, screw, task, q, truth.typed(definition, target, digits), 2)
             if definition.orientation == "full" and digits >= 7:
-                asked(name, f"{what}, matrices", arm, screw, task, q, truth.printed(target, digits))
+                asked(name, f"{what}, matrices", arm, screw, task, q, truth.printed(target, digits), 2)
 
 
 def main() -> None:
