@@ -62,10 +62,13 @@ def branches(lines: int) -> None:
             whole += mine >= way.length - 1e-9
             apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
             off, differ = max(off, apart), differ + (apart > 0.01)
-            own_runs = sum(run.last > run.first for run in fewest(all_, len(columns.s)))
-            if own_runs != len(brute.runs(arm, way.targets(dense), 0.05)):
-                finer = np.linspace(0, way.length, 10_001)
-                others += own_runs != len(brute.runs(arm, way.targets(finer), 0.05))
+            length = [columns.s[run.last] - columns.s[run.first] for run in fewest(all_, len(columns.s))]
+            for finer_by in (1, 10):  # a run that is shorter than their step is none to the samples
+                s = np.linspace(0, way.length, 1000 * finer_by + 1)
+                unlike = sum(x > s[1] for x in length) != len(brute.runs(arm, way.targets(s), 0.05))
+                if not unlike:
+                    break
+            others += unlike
             worst = max(worst, tips_off(arm, all_))
             s = np.linspace(0, way.length, 10_000)
             targets = way.targets(s)

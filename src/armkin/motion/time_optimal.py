@@ -262,10 +262,10 @@ def _meeting(cap: Array, slope: Array, level: Array) -> Array:
     out = cap.copy()
     for begin in range(0, len(cap), _PAIRS):
         part = slice(begin, begin + _PAIRS)
-        sl, lv = slope[part], level[part]
+        sl, lv = np.ascontiguousarray(slope[part].T), np.ascontiguousarray(level[part].T)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            met = (lv[:, i] + lv[:, j]) / np.abs(sl[:, i] - sl[:, j])
-        out[part] = np.fmin(out[part], np.fmin.reduce(met, axis=1, initial=np.inf))
+            met = (lv[i] + lv[j]) / np.abs(sl[i] - sl[j])
+        out[part] = np.fmin(out[part], np.fmin.reduce(met, axis=0, initial=np.inf))
     return out
 
 

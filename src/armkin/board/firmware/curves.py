@@ -28,6 +28,7 @@ _LEAST, _MOST = 0.010, 0.050  # [s] a segment
 _GROWTH = 0.12  # of the time since the start, or to the end
 _FINE = 0.005  # [s] between the samples from which the spans are chosen
 _QUEUED = 25  # segments that are surely in the board's queue
+_SETTLING = 0.05  # of the greatest acceleration
 _JUMP = 1.1  # of the greatest acceleration
 _SAMPLES = 20_000  # that are looked at at once
 _BLOCK = 512  # segments that are made at once
@@ -73,15 +74,17 @@ class CurveSegments:
     def _places(self, t: Array) -> Array:
         """Where the motors are at times t, fractions included: (T, motors).
 
-        Both ends are whole counts; what rounding them has moved is spread over the whole stretch, with no speed at
-        its ends, where a segment is worth a fraction of a step.
+        Both ends are whole counts; what rounding them has moved, half a step at most, is left behind as fast as
+        _SETTLING of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
         """
-        ends = places(self.arm, self.stretch.at(np.array([0.0, self.stretch.duration])))
-        f = (t / self.stretch.duration)[:, None]
-        w = f * f * (3 - 2 * f)
-        return np.asarray(
-            places(self.arm, self.stretch.at(t)) + (1 - w) * (self.start - ends[0]) + w * (self.end - ends[1])
-        )
+        whole = self.stretch.duration
+        ends = places(self.arm, self.stretch.at(np.array([0.0, whole])))
+        out = places(self.arm, self.stretch.at(t))
+        for off, since in ((self.start - ends[0], t), (self.end - ends[1], whole - t)):
+            span = np.sqrt(6 * np.abs(off) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
+            f = np.clip(since[:, None] / np.clip(span, 1e-9, whole), 0.0, 1.0)
+            out = out + off * (1 - f * f * (3 - 2 * f))
+        return np.asarray(out)
 
     def _smooth(
         self, cutter: Cutter, seconds: float, counts: list[float], change: float, before: Array, since: float,
