@@ -115,6 +115,7 @@ def test_settings_are_read_again_before_a_motion() -> None:
     """A long session (a page) outlives resets, and whoever else turns a board's screws."""
     port, one = opened()
     port.settings[100] = 250.0
+    port.advance(6.0)
     with pytest.raises(LinkError, match=r"settings do not fit three_dof: \$100"):
         one.prepare()
     port.settings[100] = FITS[100]

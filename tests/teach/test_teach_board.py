@@ -169,7 +169,10 @@ def test_a_port_that_is_none(tmp_path: Path) -> None:
         page.close()
 
 
-@pytest.mark.parametrize(("robot", "differs"), [("three_dof_grbl", "GRBL has no checksum"), ("bus_arm", "degree")])
+@pytest.mark.parametrize(
+    ("robot", "differs"),
+    [("three_dof_grbl", "GRBL has no checksum"), ("bus_arm", "degree"), ("three_dof_klipper", "M112 stops at once")],
+)
 def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
     arm = armkin.load(str(ROOT / f"tests/robots/{robot}.yaml"))
     goal = units.home_out(arm)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 MARK = 1000.0  # [units] added to G92: an offset of 0 means that nobody has said where the arm stands
 _REST = 30.0  # [s] that a hold may take
+_FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second
 
 
 class GrblMachine:
@@ -54,7 +55,7 @@ class GrblMachine:
         self.session = Session(port)
         self.session.open()
         self._offset: np.ndarray[Any, np.dtype[np.int64]] | None = None  # machine steps less counts
-        self.settings = self.session.settings()
+        self.settings, self.told = self.session.settings(), port.now()  # when they were read
         self._spindle = Spindle(self.session)
         self._read()
 
@@ -118,11 +119,12 @@ class GrblMachine:
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
-        serious = self._read_again()  # the board may have been reset, or set by somebody else
+        state = self.session.status().state
+        serious = _serious(self)
         if serious:
             more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
             raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
-        if (state := self.session.status().state) not in ("Idle", "Jog"):
+        if state not in ("Idle", "Jog"):
             raise LinkError(f"GRBL is in state {state}, not Idle: home it, or unlock it once you know why")
         self.session.was_reset = False  # what a reset has taken from it is read now
         self._read()
@@ -258,14 +260,6 @@ class GrblMachine:
 
     # What GRBL says
 
-    def _read_again(self) -> list[settings.Difference]:
-        """Serious differences of the settings as they are now; $$ has no checksum: two readings must find them."""
-        for _ in range(2):
-            self.settings = self.session.settings()
-            if not (found := [difference for difference in self.wrong() if difference.serious]):
-                break
-        return found
-
     def _read(self) -> None:
         """Read position and offset: what stands in G92 since the last reset tells where the arm stands."""
         status = self.session.sure_status()
@@ -287,6 +281,19 @@ class GrblMachine:
             self._reset()
         except LinkError:
             return  # in an alarm, or gone: forgotten all the same
+
+
+def _serious(machine: GrblMachine) -> list[settings.Difference]:
+    """Serious differences of the settings, read again after a reset or a while: others may have changed them.
+
+    $$ has no checksum: two readings must find them.
+    """
+    session, now = machine.session, machine.port.now()
+    for _ in range(2 if session.was_reset or now > machine.told + _FRESH else 0):
+        machine.settings, machine.told = session.settings(), now
+        if not any(difference.serious for difference in machine.wrong()):
+            break
+    return [difference for difference in machine.wrong() if difference.serious]
 
 
 def _steps(report: Report | None, axes: Sequence[Axis]) -> np.ndarray[Any, np.dtype[np.int64]]:
