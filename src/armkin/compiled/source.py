@@ -112,29 +112,39 @@ def _choose(arm: Arm, branches: int) -> str:
 
     And `arm_on_limit`, whether a posture has a joint on a limit.
     """
-    lines, ends = [], ["0"]
+    loops, ends = [], ["0"]
     for j in range(arm.n):
         lower, upper = (number(float(limit[j])) for limit in (arm.lower, arm.upper))
         at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
+        close = f"near[{j} * ARM_LANES + i]"
         if math.isfinite(arm.lower[j]):
             ends.append(f"near[{j} * ARM_LANES] <= {number(float(arm.lower[j]) + ON_LIMIT)}")
         if math.isfinite(arm.upper[j]):
             ends.append(f"near[{j} * ARM_LANES] >= {number(float(arm.upper[j]) - ON_LIMIT)}")
         if arm.prismatic[j]:
-            lines.append(f"in &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);")
-        else:
-            lines.append(f"{at} = arm_copy({at}, near[{j} * ARM_LANES + i], {lower}, {upper}, &in);")
-    body = "\n".join(f"            {line}" for line in lines)
-    return f"""static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
+            loops.append(_every(f"in[i] &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);"))
+            continue
+        copied = _every(f"{at} = arm_copy({at}, {close}, {lower}, {upper}, &in[i]);")
+        if arm.lower[j] >= -math.pi and arm.upper[j] <= math.pi:
+            loops.append(copied)
+            continue
+        # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
+        turned = _every(f"{at} += ARM_TURN * ARM_RINT(({close} - {at}) / ARM_TURN);")
+        wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
+        loops.append(f"wide = {wide};\nif (wide == 0) {{\n{copied}\n}} else if (wide == 1) {{\n{turned}\n}}")
+    body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
+    return f"""{_part("wide")}
+static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
     int count)
 {{
-    int i, b;
-    for (b = 0; b < {branches}; b++)
-        for (i = 0; i < count; i++) {{
-            int in = 1;
+    int i, b, wide;
+    (void)wide;
+    for (b = 0; b < {branches}; b++) {{
+        int *ARM_RESTRICT in = inside + b * ARM_LANES;
+        for (i = 0; i < count; i++)
+            in[i] = 1;
 {body}
-            inside[b * ARM_LANES + i] = in;
-        }}
+    }}
 }}
 
 static int arm_on_limit(const double *near)
@@ -143,3 +153,7 @@ static int arm_on_limit(const double *near)
     return {" || ".join(ends)};
 }}
 """
+
+
+def _every(line: str) -> str:
+    return f"for (i = 0; i < count; i++)\n    {line}"
