@@ -47,6 +47,7 @@ class Queue:
         self.plan = [HALF] * len(axes.base)  # places where the queue ends, 2^-23 step
         self._fraction = [HALF] * len(axes.base)  # how far the axes are beyond their base, 2^-23 step
         self._queue: deque[Queued] = deque()
+        self._units = 0  # length of all of them, in units of 256 cycles: asked for every millisecond
         self._at = 0.0  # cycles since the running segment's start
 
     @property
@@ -56,8 +57,7 @@ class Queue:
 
     def milliseconds(self) -> int:
         """Milliseconds of motion in the queue, the running segment counted whole."""
-        units = sum(q.segment.units() for q in self._queue)
-        return min(units * 256 * 1000 // self.clock, 65535)
+        return min(self._units * 256 * 1000 // self.clock, 65535)
 
     def plan_counts(self) -> list[int]:
         """Counts where the queue ends."""
@@ -67,6 +67,7 @@ class Queue:
         """Queue segments (a step for every axis), the last one ending at rest or not."""
         for i, segment in enumerate(segments):
             self._queue.append(Queued(segment, at_rest and i + 1 == len(segments)))
+            self._units += segment.units()
             self.plan = [p + segment.ticks * r for p, r in zip(self.plan, segment.rates, strict=True)]
         if at_rest:
             self.plan = [p // STEP * STEP + HALF for p in self.plan]
@@ -80,6 +81,7 @@ class Queue:
     def rest(self) -> None:
         """Be empty, with the axes at rest on their counts."""
         self._queue.clear()
+        self._units = 0
         self._at = 0.0
         self._fraction = [HALF] * len(self.axes.base)
         self.plan = [count * STEP + HALF for count in self.axes.base]
@@ -101,6 +103,7 @@ class Queue:
         while self._queue and self._at >= self._queue[0].times[-1]:
             speed = self.stop_time()
             done = self._queue.popleft()
+            self._units -= done.segment.units()
             places = [f + done.segment.ticks * r for f, r in zip(self._fraction, done.segment.rates, strict=True)]
             self.axes.settle([p >> 23 for p in places])
             self._fraction = [HALF if done.end else p % STEP for p in places]
@@ -128,6 +131,6 @@ class Queue:
         """Whether what is left is just enough to stop in, and does not end at rest."""
         if not self._queue or self._queue[-1].end:
             return False
-        rest = sum(q.segment.units() * 256 for q in self._queue) - self._at
+        rest = self._units * 256 - self._at
         u = self.stop_time()
         return rest / self.clock < u + u / 32 + 0.002
