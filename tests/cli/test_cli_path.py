@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -143,3 +144,42 @@ def test_send_follows_a_path_file_and_rounds_waypoints(pick: Path, tmp_path: Pat
     assert flows.json["duration_s"] < 0.8 * stops["duration_s"]
     assert flows.json["waypoints"] == stops["waypoints"] == 4
     assert run("send", THREE_DOF, 1, 2, 3, "--blend", 8, "--dry-run").code == 2
+
+
+def test_a_branch_is_asked_for_in_any_spelling_and_a_wrong_one_is_told(tmp_path: Path) -> None:
+    corners = ("--via", "390,80,300", "--via", "390,100,300")
+    for name in ("left, elbow up", "left elbow up", "left/elbow-up", "Elbow up left"):
+        done = run("path", THREE_DOF, *corners, "--branch", name, "--json")
+        assert done.code == 0, done.err
+        assert done.json["runs"][0]["branches"][0]["name"] == "left, elbow up"
+    wrong = run("path", THREE_DOF, *corners, "--branch", "nope")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "no branch is called 'nope'; this arm's are: right, elbow up;" in wrong.err
+    outside = run("path", THREE_DOF, *corners, "--branch", "right")
+    assert outside.code == 3
+    assert "branch 'right' is not within the limits at the path's start; left, elbow" in outside.err
+    assert "carries 20.000 of 20.000 mm" in outside.err
+    file = tmp_path / "g.yaml"
+    for name, code in (("elbow up", 0), ("nope", 2)):
+        file.write_text(f"moves:\n  - {{point: [390, 80, 300], branch: {name}}}\n  - joint: [0, 90, -90]\n")
+        assert run("path", THREE_DOF, file).code == code
+    assert f"{file}:2: move 1: no branch is called 'nope'" in run("path", THREE_DOF, file).err
+
+
+def test_samples_on_stdout_and_the_answer_beside_them() -> None:
+    done = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,100,300", "--out", "-", "--json")
+    assert done.code == 0
+    heading, *rows = done.out.splitlines()
+    assert heading.startswith("time_s,q1,")
+    assert all(row.count(",") == heading.count(",") for row in rows)
+    assert json.loads(done.err)["length_mm"] == pytest.approx(20)
+
+
+def test_a_plan_begins_within_the_limits() -> None:
+    for words in (
+        ("path", THREE_DOF, "--via", "390,80,300", "--start", "500,0,0"),
+        ("send", THREE_DOF, "home", "--dry-run", "--from", "500,0,0"),
+    ):
+        done = run(*words)
+        assert (done.code, done.out) == (3, ""), words
+        assert f"error: {words[-2]}: q1 = 500 deg is outside -120 to 120 deg" in done.err

@@ -58,6 +58,7 @@ def test_notes_are_not_cut_in_the_middle(capsys: pytest.CaptureFixture[str]) -> 
         ("nonsense://x", "port nonsense://x cannot be opened"),
         ("hwgrep://(", "port hwgrep://( cannot be opened"),
         (str(ROOT / "README.md"), "is no serial port"),
+        ("/dev/null", "/dev/null is no serial port"),
     ],
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="names of devices")

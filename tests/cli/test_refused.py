@@ -194,3 +194,21 @@ def test_what_does_not_speak_the_protocol_is_told_apart(said: bytes, says: str) 
     with pytest.raises(LinkError) as caught:
         Session(Talker(said)).open()
     assert says in str(caught.value)
+
+
+def test_a_stream_that_moves_nothing_prints_nothing() -> None:
+    for data in (b"", b"x\n", b"0,130,0\n"):
+        done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", stdin=data)
+        assert done.out == "", data
+        assert done.code == (3 if b"130" in data else 2)
+
+
+def test_counts_of_one_are_said_so(tmp_path: Path) -> None:
+    assert "1 row is too few" in run("calibrate", THREE_DOF, "-", stdin=b"1,2,3,4,5,6\n").err
+    file = tmp_path / "g.yaml"
+    file.write_text("moves: []\n")
+    assert "moves: has 0 items, and must have at least 1" in run("path", THREE_DOF, file).err
+    assert (
+        "does not fit the 2 joints that are not held; hold fewer joints"
+        in run("ik", THREE_DOF, 390, 80, 300, "--lock", "q1=5").err
+    )

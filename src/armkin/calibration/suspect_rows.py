@@ -26,7 +26,8 @@ EXPLAINS = 0.35  # of the miss as given, what another reading must leave to be t
 def check(arm: Arm, data: Measured) -> None:
     """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
     if len(data) < LEAST_ROWS:
-        raise UsageError(f"{len(data)} rows are too few; measure at least {LEAST_ROWS}, better 20 to 60")
+        rows = "1 row is" if len(data) == 1 else f"{len(data)} rows are"
+        raise UsageError(f"{rows} too few; measure at least {LEAST_ROWS}, better 20 to 60")
     _moves(arm, data)
     _spread(data)
     _meaning(arm, data)

@@ -152,15 +152,18 @@ def simulated(assume: str | None) -> str:
 
 def assumed(arm: Arm, text: str | None) -> Array | None:
     """`--assume`: joint values (n,) [rad | mm] where a lost arm stands, which are within its limits."""
-    if text is None:
-        return None
+    return None if text is None else standing(arm, text, "--assume")
+
+
+def standing(arm: Arm, text: str, option: str) -> Array:
+    """Joint values (n,) [rad | mm] where an arm stands or a plan begins; NoSolutionError outside its limits."""
     from armkin.motion.plan import check_limits
 
-    q = units.joints_in(arm, inputs.joint_list(arm, text, "--assume"))
+    q: Array = units.joints_in(arm, inputs.joint_list(arm, text, option))
     try:
         check_limits(arm, q[None])
     except NoSolutionError as error:
-        raise error.within("--assume") from None
+        raise error.within(option) from None
     return q
 
 

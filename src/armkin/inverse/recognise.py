@@ -54,6 +54,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     usual = default_task(arm)
     hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
     joints = f"the {arm.n} joints that are not held" if arm.held else f"its {arm.n} joints"
+    hint = hint or ("; hold fewer joints" if arm.held else "")
     raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}", robot=arm.name, task=task.name)
 
 

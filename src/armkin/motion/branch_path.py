@@ -15,6 +15,7 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian, position
+from armkin.inverse.branches.names import find
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
@@ -92,7 +93,7 @@ def carry(
     """The branches that carry a route, and the best way along them.
 
     near: where the arm comes from; fixed: where it stands at the route's start, if it has no choice; branch: name
-    of the branch to start on.
+    of the branch to start on. Raises UsageError, which lists the names, if there is no branch of that name.
     """
     name = route.task.name
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
@@ -102,7 +103,8 @@ def carry(
         apart = [float(np.abs(change(arm, c.q[0], fixed)).max()) for c in starts]
         starts = [c for c, d in zip(starts, apart, strict=True) if d < 1e-4]
     if branch is not None:
-        starts = [c for c in starts if c.labels[0] >= 0 and columns.names[c.labels[0]] == branch]
+        wanted = find(columns.names, branch)
+        starts = [c for c in starts if c.labels[0] in wanted]
     end = len(columns.s) - 1
     complete = [c for c in starts if c.carries(0) == end]
     if len(complete) == 1:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
+from armkin.inverse.branches.names import find
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -295,14 +296,14 @@ class _Walk:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
         near = self.q if self.near is None else self.near
+        branch = (self.goal_branch or self.branch) if free else None
         carried = carry(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
-            fixed=None if free else self.q, branch=(self.goal_branch or self.branch) if free else None,
-            count=self.samples,
+            fixed=None if free else self.q, branch=branch, count=self.samples,
         )  # fmt: skip
         report.note(self.plan, carried, near)
         if not carried.whole and not (self.split and carried.covered):
-            raise report.refused(self.plan, carried)
+            raise report.refused(self.plan, carried, branch)
         for k, run in enumerate(carried.runs):
             if run.first == run.last:
                 continue
@@ -348,8 +349,9 @@ class _Walk:
         """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
         found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
         wanted = branch or self.branch
+        meant = None if wanted is None else find(found.names, wanted)
         for b in found.order:
-            named = wanted is None or (found.branch[b] >= 0 and found.names[found.branch[b]] == wanted)
+            named = meant is None or found.branch[b] in meant
             if found.valid[b] and found.within_limits[b] and named:
                 return np.asarray(found.q[b])
         what = f" on branch '{wanted}'" if wanted else ""

@@ -144,12 +144,15 @@ def _shown(arm: Arm, joint: int, value: float) -> float:
     return value if arm.prismatic[joint] else value / units.DEGREE
 
 
-def refused(plan: PathPlan, carried: Carried) -> NoSolutionError:
-    """The error of a path that is not carried; `plan` of it tells the rest."""
+def refused(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSolutionError:
+    """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
     best = plan.branches[0] if plan.branches else None
     length = carried.route.length
     if best is None:
         text = "the path's first point is out of reach"
+    elif branch is not None and (not carried.runs or carried.runs[0].first > 0):
+        text = f"branch '{branch}' is not within the limits at the path's start; "
+        text += f"{best.name or 'another'} carries {best.carries:.3f} of {length:.3f} mm"
     elif not carried.runs or carried.runs[0].first > 0:
         text = f"no branch is within the limits at the path's start: {best.ends_because}"
     else:

@@ -80,9 +80,10 @@ def _text(at: Place, one: Any) -> str:
         bound = context.get("gt", context.get("ge", context.get("le", context.get("lt"))))
         return f"must be {sign.get(kind, 'below')} {bound:g}, not {shown(one['input'])}"
     if kind in ("too_short", "too_long"):
-        return (
-            f"has {context['actual_length']} items; {context.get('min_length', context.get('max_length'))} are needed"
-        )
+        least = context.get("min_length")
+        bound = f"at least {least}" if least is not None else f"at most {context['max_length']}"
+        count = context["actual_length"]
+        return f"has {count} item{'s' * (count != 1)}, and must have {bound}"
     if kind == "finite_number":
         return "must be a finite number"
     example = next((EXAMPLES[name] for name in reversed(names) if name in EXAMPLES), None)

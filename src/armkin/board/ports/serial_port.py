@@ -101,7 +101,9 @@ def check(name: str) -> None:
         if "://" in name:
             serial.serial_for_url(name, do_not_open=True)
         elif os.name == "posix":
-            if not stat.S_ISCHR(os.stat(name).st_mode):
+            found = os.stat(name)
+            memory = sys.platform == "linux" and os.major(found.st_rdev) == 1  # /dev/null and its kin
+            if not stat.S_ISCHR(found.st_mode) or memory:
                 raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
             if not os.access(name, os.R_OK | os.W_OK):
                 raise OSError(errno.EACCES, os.strerror(errno.EACCES))

@@ -116,11 +116,11 @@ def path(
         )
     if port is None or dry_run:
         if start is not None:
-            options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--start"))
+            options["start"] = board_link.standing(arm, start, "--start")
         plan = _planned(arm, moves, options, json=json)
-        _files(plan, out, plot)
         found = _found(plan, _rehearsed(plan, rehearsal=dry_run))
-        _print(plan, found, json=json)
+        _files(plan, out, plot)
+        _print(plan, found, json=json, out=out)
         return
     _carried_out(
         arm, moves, options, port, baud, out, plot, assume=assume, reset=not no_reset, json=json, resume=resume
@@ -152,10 +152,11 @@ def sent(
         _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json, resume=resume)
         return
     if start is not None:
-        options["start"] = units.joints_in(arm, inputs.joint_list(arm, start, "--from"))
+        options["start"] = board_link.standing(arm, start, "--from")
     plan = _planned(arm, moves, options, json=json)
+    found = {**_found(plan, _rehearsed(plan)), "dry_run": True}
     _files(plan, trace, None)
-    _print(plan, {**_found(plan, _rehearsed(plan)), "dry_run": True}, json=json)
+    _print(plan, found, json=json, out=trace)
 
 
 def _carried_out(
@@ -191,9 +192,9 @@ def _carried_out(
         with resuming.under_way(machine, laid, held) as (left, first, note), board_link.told(left, note) as tell:
             path_run.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
-    _print(plan, found, json=json)
+    _print(plan, found, json=json, out=out)
     if not json:
-        with output.destination(None) as write:
+        with output.beside(out) as write:
             write(board_link.where_text(arm, found))
 
 
@@ -312,8 +313,9 @@ def _write(plan: PathPlan, name: str) -> None:
             write("".join(csv_line(row) + "\n" for row in (rows + 0.0).tolist()))
 
 
-def _print(plan: PathPlan, found: dict[str, Any], *, json: bool) -> None:
-    with output.destination(None) as write:
+def _print(plan: PathPlan, found: dict[str, Any], *, json: bool, out: str | None = None) -> None:
+    """The answer, on stderr while the samples of `--out -` have stdout."""
+    with output.beside(out) as write:
         write(render.to_json(found) + "\n" if json else _text(plan, found))
 
 

@@ -132,8 +132,8 @@ def send(
         raise
     planner, stands = Planner(arm, board, fraction, radius), board_link.assumed(arm, assume)
     if dry_run:
-        home = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
-        plans = _all(planner, goals, planner.counts(units.joints_in(arm, home)))
+        begin = arm.home if start is None else board_link.standing(arm, start, "--from")
+        plans = _all(planner, goals, planner.counts(begin))
         _write_trace(arm, plans, trace)
         with output.beside(trace) as write:
             summed = Total(arm, plans).summary()
@@ -160,10 +160,13 @@ def send(
             _carry_out(machine, planner, plans, held)
         planned = planner.done.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
+    problem = goals.problem if isinstance(goals, Stream) else None
+    if problem is not None and not planned["waypoints"]:
+        raise problem  # nothing has moved: there is nothing to tell
     with output.beside(trace) as write:
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
-    if isinstance(goals, Stream) and goals.problem is not None:
-        raise goals.problem
+    if problem is not None:
+        raise problem
 
 
 def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], held: Note | None) -> None:
