@@ -29,7 +29,7 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/branches",
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
-    "motion": "errors formula model forward inverse/tasks inverse motors path_file",
+    "motion": "errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
     "reach": "errors files formula model forward motors",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",

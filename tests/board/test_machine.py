@@ -26,6 +26,7 @@ from armkin.model import build as arms
 from armkin.model.arm import Arm
 from armkin.motors import joints, pulses
 from armkin.robot_file import parse
+from command_line import THREE_DOF, run
 
 ROBOT = "robots/three_dof.yaml"
 WRIST = """
@@ -241,3 +242,13 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
 def test_a_joint_without_homing_is_named(three_dof: Arm) -> None:
     with pytest.raises(UsageError, match="no homing: for q1, q2, q3"):
         homing.searches(three_dof, configure(three_dof))
+
+
+def test_moves_behind_a_long_ramp_do_not_pass_for_a_dry_queue() -> None:
+    """27 segments of a ramp's end leave room for 5 of the next one's beginning: 9 ms where 11 are asked for."""
+    rows = [[10, 80, -80], [-30, 5, -5], [40, 100, -100], [0, 90, -90]]
+    for count in (2, 4):
+        data = "\n".join(",".join(map(str, row)) for row in rows[:count]).encode()
+        done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=data)
+        assert done.code == 0, done.err
+        assert done.json["waypoints"] == count

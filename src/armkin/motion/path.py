@@ -348,8 +348,7 @@ class _Walk:
     def _reached(self, goal: Spot, branch: str | None) -> Array:
         """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
         found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
-        wanted = branch or self.branch
-        meant = None if wanted is None else find(found.names, wanted)
+        meant = find(found.names, wanted) if (wanted := branch or self.branch) else None
         for b in found.order:
             named = meant is None or found.branch[b] in meant
             if found.valid[b] and found.within_limits[b] and named:

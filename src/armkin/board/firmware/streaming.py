@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # Standing still while the queue fills: 100 ms, 250 ms on a busy computer, or half a second on a bad line.
 _LEAD, _LEAD_BUSY, _LEAD_BAD = Segment(80, 20_000, 0, ()), Segment(200, 20_000, 0, ()), Segment(255, 32_000, 0, ())
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
+_MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
 _FULL = 12  # segments of room: a frame of 6 would wait for as many, and leave the queue short of a ramp's end
 
 
@@ -57,16 +58,21 @@ def carry_out(
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
     """Send frames until there are no more and the arm stands; left: told the seconds of motion to come."""
-    more = True
+    more, at_rest = True, False  # whether what was submitted ends at rest
+    held: Batch | object | None = None  # the beginning of the next move
     while more or session.pending[0]:
         while more and session.pending[0] < 2:
-            batch = next(frames, _DONE)
+            batch, held = (held or next(frames, _DONE)), None
+            if isinstance(batch, Batch) and at_rest and not _reaches(session, batch):
+                held = batch
+                break
             if batch is _DONE:
                 more = False
             if batch is None or not more:
                 break
             assert isinstance(batch, Batch)
             session.submit(batch.payload, len(batch.segments), batch.seconds)
+            at_rest = batch.at_rest
         session.pump()
         left(session.under_way + session.queued / 1000)
     for seconds in session.arrivals():
@@ -75,6 +81,16 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
 
 
 _DONE = object()
+
+
+def _reaches(session: Session, batch: Batch) -> bool:
+    """Whether the queue may go on behind a rest with the beginning of the next move.
+
+    All the way down to the rest the queue holds just the time to a stop and what follows the rest: a short beginning
+    behind a long ramp would pass for a queue that runs dry.
+    """
+    left = session.under_way + session.queued / 1000
+    return batch.at_rest or left <= 0 or left < _MARGIN * (batch.seconds - _SPARE)
 
 
 def _pieces(session: Session) -> Pieces:
@@ -103,9 +119,10 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> It
     if move.segments and (resting or line.damaged):
         lead = _LEAD_BAD if line.damaged else _LEAD_BUSY if _busy() and not session.port.simulated else _LEAD
         todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
+    begins = not resting  # behind a rest, which may wait for room
     while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-        most = _BATCH[0] if line.noisy or session.pending[1] < _FULL else _BATCH[1]
-        n = 1
+        most = _BATCH[0] if line.noisy or (session.pending[1] < _FULL and not begins) else _BATCH[1]
+        n, begins = 1, False
         while (
             n < min(most, len(todo))
             and todo[n].narrow == todo[0].narrow
