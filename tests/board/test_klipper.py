@@ -5,6 +5,7 @@ The other side is a stand-in written from Klipper's public documentation, not Kl
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 
 import numpy as np
@@ -214,3 +215,56 @@ def test_arms_that_klipper_cannot_drive_are_refused() -> None:
         axes_of(build(parse(text.replace("axis: A", "axis: X").replace("board: {kind: klipper}", ""))))
     with pytest.raises(UsageError, match="armkin drives steppers alone"):
         axes_of(armkin.load("ra02"))
+
+
+LIES: list[object] = [None, True, -1, 1e300, float("nan"), "x", "", [], [1], {}, {"a": 1}, "\u0003", [[[]]], 10**400]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_an_api_that_lies_is_believed_in_nothing_that_cannot_be(seed: int) -> None:
+    """Of every answer one value is another: what is told then is a place that can be, lost, or an error in words."""
+    rng = random.Random(seed)
+
+    def spoilt(value: object, depth: int) -> object:
+        if depth == 0 or not isinstance(value, dict) or not value:
+            return rng.choice(LIES)
+        key = rng.choice(sorted(value))
+        return {**value, key: spoilt(value[key], depth - 1)}
+
+    class Liar(Klipper):
+        lies = False
+
+        def _say(self, message: dict[str, object]) -> None:
+            super()._say(spoilt(message, rng.randrange(6)) if self.lies and rng.random() < 0.5 else message)  # type: ignore[arg-type]
+
+    port = Liar(settings_of(AXES))
+    port.simulated = False
+    one = KlipperMachine(port, ARM)
+    one.prepare(assume=ARM.home)
+    port.lies, errors = True, list[LinkError]()
+    for _ in range(8):
+        try:
+            again = KlipperMachine(port, ARM)
+            again.report()
+            again.prepare()
+            again.run([again.plan(again.counts(), np.deg2rad([1, 89, -89]))])
+        except LinkError as error:
+            errors.append(error)
+            continue
+        assert all(abs(count) < 1e12 for count in again.counts())
+    assert all(len(str(error).splitlines()) <= 2 for error in errors)
+
+
+def test_answers_that_are_none_end_in_words() -> None:
+    class Other(Klipper):
+        text = b""
+
+        def read(self, timeout: float) -> bytes:
+            self._now += timeout
+            return self.text
+
+    for text in (b"\x03", b"[]\x03", b"[" * 100_000 + b"\x03", b"\xff\x03", b"x" * 70_000):
+        port = Other(settings_of(AXES))
+        port.text = text
+        with pytest.raises(LinkError, match=r"does not answer as Klipper's API server does|did not answer info"):
+            KlipperMachine(port, ARM)

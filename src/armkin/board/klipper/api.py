@@ -40,10 +40,11 @@ class Api:
             self.pump(0.02)
         return self._result(number)
 
-    def query(self, **objects: list[str]) -> dict[str, Any]:
-        """Fields of printer objects: object -> field -> value. An object that is not there is left out."""
+    def query(self, **objects: list[str]) -> dict[str, dict[str, Any]]:
+        """Fields of printer objects: object -> field -> value. An object that is not there has none."""
         status = self.ask("objects/query", {"objects": objects}).get("status")
-        return status if isinstance(status, dict) else {}
+        found = status if isinstance(status, dict) else {}
+        return {name: fields if isinstance(fields := found.get(name), dict) else {} for name in objects}
 
     def run(self, script: str, patience: float = _ANSWER) -> None:
         """Run lines of G-code, and wait until they are done."""
@@ -72,12 +73,12 @@ class Api:
         for part in whole:
             try:
                 found = json.loads(part)
-            except ValueError:
+            except (ValueError, RecursionError):
                 found = None
             if not isinstance(found, dict):
                 raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
             number = found.get("id")
-            if number in self._waiting:
+            if isinstance(number, int) and number in self._waiting:
                 self._waiting.discard(number)
                 self._answers[number] = found
 

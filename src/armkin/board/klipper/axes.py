@@ -151,7 +151,8 @@ def differences(axes: Sequence[Axis], found: Mapping[str, Any]) -> list[Differen
 
     Pins are not compared: no program can know them. Ratios of `gear_ratio` count.
     """
-    printer = found.get("printer", {})
+    printer = found.get("printer")
+    printer = printer if isinstance(printer, Mapping) else {}
     wrong = []
     kinematics = printer.get("kinematics")
     if kinematics != "none":
@@ -163,7 +164,7 @@ def differences(axes: Sequence[Axis], found: Mapping[str, Any]) -> list[Differen
     for axis in axes:
         name = f"[manual_stepper {axis.section}]"
         section = found.get(name[1:-1])
-        if section is None:
+        if not isinstance(section, Mapping):
             wrong.append(Difference(name, None, f"one for motor {axis.name}"))
             continue
         steps = _steps(section)
@@ -179,7 +180,7 @@ def _steps(section: Mapping[str, Any]) -> float | None:
         ratio = math.prod(float(a) / float(b) for a, b in section.get("gear_ratio") or ())
         full = float(section.get("full_steps_per_rotation", 200))
         return full * float(section["microsteps"]) * ratio / float(section["rotation_distance"])
-    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+    except (KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         return None
 
 

@@ -17,7 +17,7 @@ from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, braking
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.axes import Difference, axes_of, differences
+from armkin.board.klipper.axes import Axis, Difference, axes_of, differences
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
 from armkin.motion.plan import plan as plan_joints
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _CHUNK = 10  # lines in one request
 _PENDING = 8  # requests that may wait: Klipper answers when it has taken them
 _SPARE = 0.75  # [s] sent ahead besides what braking takes: Klipper drains its queue when it holds less than 0.25 s
+_FARTHEST = 1e9  # [units] of a place that can be
 _REST = 30.0  # [s] until what was sent must be done
 
 
@@ -217,20 +218,31 @@ class KlipperMachine:
             gcode_move=["axis_map"],
             stepper_enable=["steppers"],
         )
-        hooks = found.get("webhooks", {})
-        self.state = str(hooks.get("state", self.state))
-        self._message = str(hooks.get("state_message", self._message)).partition("\n")[0]
-        self.settings = found.get("configfile", {}).get("settings", {})
-        position = found.get("toolhead", {}).get("position", [])
-        places = found.get("gcode_move", {}).get("axis_map", {})
-        on = found.get("stepper_enable", {}).get("steppers", {})
-        there = [places.get(axis.letter) for axis in self.axes]
-        self._known = (
-            self.state == "ready"
-            and all(isinstance(k, int) and k < len(position) for k in there)
-            and all(on.get(f"manual_stepper {axis.section}") for axis in self.axes)
-        )
-        if self._known:
-            values = [position[k] for k in there]
+        self.state = str(found["webhooks"].get("state", self.state))
+        self._message = str(found["webhooks"].get("state_message", self._message)).partition("\n")[0]
+        self.settings = _dict(found["configfile"].get("settings"))
+        values = _places(found["toolhead"].get("position"), _dict(found["gcode_move"].get("axis_map")), self.axes)
+        on = _dict(found["stepper_enable"].get("steppers"))
+        running = all(on.get(f"manual_stepper {axis.section}") is True for axis in self.axes)
+        self._known = self.state == "ready" and running and values is not None
+        if self._known and values is not None:
             steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
             self._counts = np.rint(steps).astype(np.int64)
+
+
+def _dict(value: object) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _places(position: object, places: dict[str, Any], axes: Sequence[Axis]) -> list[float] | None:
+    """Where the axes stand in a coordinate, by the places of their letters in it; None if it does not tell all."""
+    found = []
+    for axis in axes:
+        k = places.get(axis.letter)
+        if not isinstance(position, list) or not isinstance(k, int) or not 0 <= k < len(position):
+            return None
+        value = position[k]
+        if not isinstance(value, int | float) or not abs(value) < _FARTHEST:
+            return None
+        found.append(float(value))
+    return found
