@@ -111,10 +111,10 @@ class OneTarget:
             return None
         return self._found(kept, near, values, there, off)
 
-    def _beyond(self, near: Array, legal: list[float], there: list[int], within: list[bool]) -> bool:
+    def _beyond(self, near: list[float], legal: list[float], there: list[int], within: list[bool]) -> bool:
         """`turns.beyond_near` of the branches that are there."""
         for b, ok in zip(there, within, strict=True):
-            away = [v - c for v, c in zip(self._rows[b](legal), near.tolist(), strict=False)]
+            away = [v - c for v, c in zip(self._rows[b](legal), near, strict=False)]
             beside = all(abs(math.remainder(d, TURN)) < ON_LIMIT for d in away)
             if beside and not (ok and all(abs(d) < ON_LIMIT for d in away)):
                 return True
@@ -126,7 +126,8 @@ class OneTarget:
         """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be better."""
         legal: list[float] = []
         inside: list[bool] = []
-        for value, close, joint, plain in zip(values, near.tolist(), self._joints, self._plain, strict=False):
+        where = near.tolist()
+        for value, close, joint, plain in zip(values, where, self._joints, self._plain, strict=False):
             for v in (value,) if plain else value:
                 copy, ok = nearest_number(v, close, *joint)
                 legal.append(copy)
@@ -139,7 +140,9 @@ class OneTarget:
             for place, b in enumerate(there):
                 q[place] = self._rows[b](legal)[:-1]
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
-        if any(not low < near[i] < high for i, low, high in self._limited) and self._beyond(near, legal, there, within):
+        if any(not low < where[i] < high for i, low, high in self._limited) and self._beyond(
+            where, legal, there, within
+        ):
             return None
         none = B - count
         block = np.array([
