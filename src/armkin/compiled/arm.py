@@ -239,7 +239,7 @@ class _CompiledTask:
         return out
 
     def _in_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
-        """The same for an elimination, whose rows are kept in no more columns than the batch needs."""
+        """As `_solved`, for an elimination: block by block, in no more columns than the batch needs."""
         out = Results(len(target), 0, self.n)
         for start in range(0, max(len(target), 1), BLOCK):
             rows = slice(start, min(start + BLOCK, len(target)))

@@ -89,7 +89,7 @@ class Straight:
 
 
 class OncePaid:
-    """A formula that is recorded once that pays: it takes some milliseconds.
+    """A formula that is recorded at the first batch of 64 poses, or at the fifth call: recording takes milliseconds.
 
     Recorded or not, a batch is computed by the same operations of numpy; a single target is always computed in
     plain Python. So no result depends on what was asked before.
@@ -101,12 +101,12 @@ class OncePaid:
         self._straight: Straight | None = None
 
     def get(self, batch: int) -> Straight | None:
-        """The recorded code for a batch, once its size or a fifth call makes it worth while."""
+        """The recorded code for a batch of that many poses; None while it is not recorded."""
         self._calls += 1
         return self.always() if batch >= 64 or self._calls > 4 or self._straight is not None else None
 
     def always(self) -> Straight:
-        """The recorded code."""
+        """The recorded code, recorded now if it is not yet."""
         if self._straight is None:
             self._straight = Straight(self._formula, self._inputs)
         return self._straight

@@ -22,6 +22,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.files import whole
 from armkin.formula.arrays import Array
+from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -50,20 +51,14 @@ def cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[
         yield write
 
 
-def _degrees(arm: Arm) -> Array:
-    """Files hold degrees and mm."""
-    return np.where(arm.prismatic, 1.0, 180.0 / np.pi)
-
-
 @contextmanager
 def _csv(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     heading = [*arm.joint_names, "x", "y", "z", *measures]
     file.write(f"{','.join(heading)}\n".encode())
     row = ",".join(["%.10g"] * len(heading)) + "\n"
-    scale = _degrees(arm)
 
     def write(q: Array, tip: Array, values: list[Array]) -> None:
-        table = np.round(np.column_stack([q * scale, tip, *values]), 9) + 0.0  # + 0.0: no -0
+        table = np.round(np.column_stack([units.joints_out(arm, q), tip, *values]), 9) + 0.0  # + 0.0: no -0
         for start in range(0, len(table), 4096):
             part = table[start : start + 4096]
             file.write((row * len(part) % tuple(part.ravel().tolist())).encode())
@@ -89,12 +84,11 @@ def _npz(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[st
     # A zip file takes one member after the other: each array waits in a nameless file beside the target.
     folder = os.path.dirname(os.path.realpath(path))
     shapes = {"joints": (count, arm.n), "position": (count, 3), **dict.fromkeys(measures, (count,))}
-    scale = _degrees(arm)
     with ExitStack() as stack:
         parts = {name: stack.enter_context(tempfile.TemporaryFile(dir=folder)) for name in shapes}
 
         def write(q: Array, tip: Array, values: list[Array]) -> None:
-            for part, array in zip(parts.values(), [q * scale, tip, *values], strict=True):
+            for part, array in zip(parts.values(), [units.joints_out(arm, q), tip, *values], strict=True):
                 part.write(np.ascontiguousarray(array, dtype="<f8").tobytes())
 
         yield write

@@ -191,7 +191,7 @@ class _Cells:
         return np.asarray(new)
 
     def merged(self) -> _Cells | None:
-        """The same with cells of twice the size along every side; None when they would be few."""
+        """What was found, in cells twice as wide along every side; None from 32 cells a side down."""
         if self.shape[0] <= 32:
             return None
         coarse = _Cells(self.section, self.low, self.high, self.shape[0] // 2)

@@ -89,7 +89,7 @@ def send(
     its path; its position stays known.
     """
     from armkin.board.firmware.machine import Machine
-    from armkin.board.planner import Planner, Stream, Total, where
+    from armkin.board.planner import Planner, Stream, where
     from armkin.board.stopping import planning
 
     fraction = inputs.percent(speed, "--speed")
@@ -132,14 +132,7 @@ def send(
         raise
     planner, stands = Planner(arm, board, fraction, radius), board_link.assumed(arm, assume)
     if dry_run:
-        begin = arm.home if start is None else board_link.standing(arm, start, "--from")
-        plans = _all(planner, goals, planner.counts(begin))
-        _write_trace(arm, plans, trace)
-        with output.beside(trace) as write:
-            summed = Total(arm, plans).summary()
-            write(
-                render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed)
-            )
+        _dry_run(planner, goals, start, trace, json)
         return
     with board_link.backend(
         arm, board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset
@@ -167,6 +160,19 @@ def send(
         write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
     if problem is not None:
         raise problem
+
+
+def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: str | None, json: bool) -> None:
+    """`--dry-run`: plan from `--from`, print what the plans come to, move nothing."""
+    from armkin.board.planner import Total
+
+    arm = planner.arm
+    begin = arm.home if start is None else board_link.standing(arm, start, "--from")
+    plans = _all(planner, goals, planner.counts(begin))
+    _write_trace(arm, plans, trace)
+    summed = Total(arm, plans).summary()
+    with output.beside(trace) as write:
+        write(render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed))
 
 
 def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], held: Note | None) -> None:
