@@ -254,7 +254,6 @@ def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
         "tips": fk(arm, q)[:, :3, 3].round(3).tolist(),
         "shares": shares.round(4).T.tolist(),
         "stops": [round(begin, 4) for begin in begins],
-        "end_joints": units.joints_out(arm, plan.q(plan.duration)).tolist(),
     }
 
 

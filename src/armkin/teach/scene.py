@@ -23,7 +23,6 @@ def scene(arm: Arm) -> dict[str, Any]:
     return {
         "robot": arm.name,
         "robot_file": arm.path,
-        "description": arm.description,
         "reach": arm.reach,
         "base": arm.base.tolist(),
         "links": arm.link.tolist(),
@@ -38,9 +37,8 @@ def scene(arm: Arm) -> dict[str, Any]:
                 "prismatic": bool(sliding),
                 "ratio": float(ratio),
                 "at": float(at),
-                "max_speed": units.finite(speed),
             }
-            for name, unit, (low, high), home, sliding, ratio, at, speed in zip(
+            for name, unit, (low, high), home, sliding, ratio, at in zip(
                 arm.joint_names,
                 units.names(arm),
                 limits,
@@ -48,7 +46,6 @@ def scene(arm: Arm) -> dict[str, Any]:
                 arm.prismatic,
                 arm.ratio,
                 form.at,
-                units.joints_out(arm, arm.max_speed).tolist(),
                 strict=True,
             )
         ],

@@ -82,7 +82,6 @@ export class Board {
     button.addEventListener("keyup", end);
     document.addEventListener("visibilitychange", end);
     window.addEventListener("blur", end);
-    this.endJog = end;
   }
 
   /** @param {string} name @param {object} [fields] */

@@ -3,9 +3,9 @@
  * What the server sends; lengths in mm, angles in degrees.
  *
  * @typedef {{name: string, unit: string, lower: number|null, upper: number|null, home: number,
- *   prismatic: boolean, ratio: number, at: number, max_speed: number|null}} Joint
+ *   prismatic: boolean, ratio: number, at: number}} Joint
  * @typedef {{open: number, closed: number, unit: string, along: number[]}} Gripper
- * @typedef {{robot: string, robot_file: string, description: string, reach: number, base: number[][],
+ * @typedef {{robot: string, robot_file: string, reach: number, base: number[][],
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
  *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
  *   lock: string|null, locks: boolean}} Arm
@@ -22,6 +22,6 @@
  * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,
  *   undo: number, redo: number}} ProgramState
  * @typedef {{duration_s: number, length_mm: number, time: number[], joints: number[][], tips: number[][],
- *   shares: number[][], stops: number[], end_joints: number[]}} Played
+ *   shares: number[][], stops: number[]}} Played
  */
 export {};
