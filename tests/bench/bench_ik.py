@@ -2,6 +2,7 @@
 
     pip install -e '.[bench]'
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/bench/bench_ik.py [--poses 100000]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/bench/bench_ik.py --workers 2    # wall time of threads
 
 Everything counts: all branches, masks, limits, residual check, arrays in the API's layout. A
 peer that is not installed is left out of the table. Times are the best of several runs, the
@@ -140,12 +141,34 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--poses", type=int, default=100_000)
     parser.add_argument("--only", help="one robot")
+    parser.add_argument("--workers", type=int, default=1, help="wall time with that many threads beside one")
     args = parser.parse_args()
+    if args.workers > 1:
+        print(f"| arm | task | one thread, us/pose | {args.workers} threads | times faster |\n|---|---|---|---|---|")
+        for row in ROWS:
+            if not args.only or row.name == args.only:
+                print(threaded(row, int(args.poses * row.share), args.workers), flush=True)
+        return
     print("| arm | task | method | hit % | branches | us/pose | one pose us | peer | its us/pose | faster | bars |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for row in ROWS:
         if not args.only or row.name == args.only:
             print(measured(row, int(args.poses * row.share)), flush=True)
+
+
+def threaded(row: Row, poses: int, workers: int) -> str:
+    """One line of the table of threads, by the clock on the wall: wants a quiet machine."""
+    arm = load(row)
+    goal = targets(arm, row.task, random_joints(arm, poses))
+    armkin.ik(arm, goal, row.task, workers=workers)
+    best = [np.inf, np.inf]
+    for _ in range(5):
+        for i, count in enumerate((1, workers)):
+            start = time.perf_counter()
+            armkin.ik(arm, goal, row.task, workers=count)
+            best[i] = min(best[i], time.perf_counter() - start)
+    one, many = (t / poses * 1e6 for t in best)
+    return f"| {arm.name} | {row.task or '-'} | {one:.3f} | {many:.3f} | {one / many:.2f} |"
 
 
 def measured(row: Row, poses: int) -> str:

@@ -48,6 +48,19 @@ def test_json_lines_are_what_single_commands_say() -> None:
     assert branches == [run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches").json]
 
 
+def test_workers_change_no_byte_and_belong_to_a_batch() -> None:
+    q = np.random.default_rng(5).uniform(-170, 170, (600, 6)).round(2)
+    poses = run("fk", "jaco_j2n6s300", "--batch", "-", stdin="\n".join(",".join(map(str, row)) for row in q).encode())
+    axes = ("x", "y", "z", "roll", "pitch", "yaw")
+    goals = "\n".join([",".join(axes), *(",".join(row[axis] for axis in axes) for row in rows_of(poses.out))]).encode()
+    one = run("ik", "jaco_j2n6s300", "--batch", "-", "--all-branches", stdin=goals)
+    two = run("ik", "jaco_j2n6s300", "--batch", "-", "--all-branches", "--workers", 2, stdin=goals)
+    assert one.out == two.out
+    assert one.code == two.code
+    refused = run("ik", THREE_DOF, 390, 80, 300, "--workers", 2)
+    assert (refused.code, refused.err) == (2, "error: --workers belongs to --batch: one target is not shared\n")
+
+
 def test_ik_exits_3_after_all_rows() -> None:
     result = run("ik", THREE_DOF, "--batch", "-", stdin=b"390,80,300\n900,0,0\n0,400,200\n")
     assert result.code == 3

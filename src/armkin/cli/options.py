@@ -48,6 +48,10 @@ Compiled = Annotated[
     bool,
     typer.Option("--compiled", help="By machine code that this computer's C compiler builds: for batches."),
 ]
+Workers = Annotated[
+    int,
+    typer.Option("--workers", metavar="N", min=1, help="With --batch: threads that share the rows, the same answers."),
+]
 Target = Annotated[
     list[str] | None,
     typer.Argument(metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."),

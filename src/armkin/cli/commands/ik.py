@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -24,6 +25,7 @@ from armkin.cli.options import (
     Sweep,
     Target,
     TaskName,
+    Workers,
 )
 from armkin.cli.render import fixed
 from armkin.cli.rows import Chunk, all_rows, one_row
@@ -57,6 +59,7 @@ def ik(
         typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
     ] = False,
     compiled: Compiled = False,
+    workers: Workers = 1,
     json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
@@ -83,10 +86,12 @@ def ik(
         swept=lock_and_sweep.sweeps(arm, sweep, held),
         every=all_branches or continuous,
     )
-    if compiled:
-        if sweep:
-            raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
-        request = replace(request, ik=_compiled)
+    if compiled and sweep:
+        raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
+    if workers > 1 and batch is None:
+        raise UsageError("--workers belongs to --batch: one target is not shared")
+    if compiled or workers > 1:
+        request = replace(request, ik=partial(_compiled if compiled else choose.ik, workers=workers))
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):
@@ -130,11 +135,11 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Solutions:
+def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, workers: int) -> Solutions:
     """`armkin.ik` by machine code."""
     import armkin
 
-    return armkin.compile(arm).ik(targets, task, near)
+    return armkin.compile(arm).ik(targets, task, near, workers=workers)
 
 
 class _Rows:
