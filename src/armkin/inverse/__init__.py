@@ -5,7 +5,8 @@ The way of a target:
 tasks/              what a target prescribes, and which task fits an arm
 recognise.py        which class an arm belongs to
 solve.py            `ik`: candidates -> residuals -> whole turns and limits -> singularities
-singularities.py    boundaries, singular postures, self-motions
+chunks.py           closed forms: chunks of a batch that stay in the cache; workers.py: threads that share it
+singularities.py    boundaries, singular postures, self-motions; clusters.py: roots of higher order
 solutions.py        the answer
 closest.py          the nearest legal pose when there is no branch
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import singularities
+from armkin.inverse.clusters import means
 from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
@@ -57,7 +57,7 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
         clusters = ((away < CLUSTER).sum(axis=2) > 2) & (size[:, 1:] < SEED)
     if clusters.any():  # roots of third or fourth order: their mean is right to rounding
-        mean = singularities.means(arm, q)[clusters]
+        mean = means(arm, q)[clusters]
         clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < size[:, 1:][clusters]
     two = valid[:, :, None] & valid[:, None]
     close = np.triu(two & (away < HAIR) & known[:, None, None], 1)

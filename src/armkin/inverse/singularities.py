@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse import clusters
 from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     BESIDE,
-    CLUSTER,
     DOUBLE,
     HAIR,
     HOPELESS,
@@ -258,7 +258,7 @@ def _onto(
     known = np.flatnonzero(~np.isnan(flat).any(axis=1))
     size = np.full(len(flat), np.inf)
     size[known] = newton.missing(arm, task, flat[known], goals[known])
-    mean = np.concatenate([near[:, None], means(arm, q)], axis=1).reshape(-1, n)
+    mean = np.concatenate([near[:, None], clusters.means(arm, q)], axis=1).reshape(-1, n)
     better = newton.missing(arm, task, mean[known], goals[known]) < size[known]
     flat[known[better]] = mean[known[better]]
     own = np.zeros(both.shape[:2], bool)
@@ -287,23 +287,6 @@ def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: 
         middle = start + 0.5 * newton.difference(arm, q[k[row], column], start) * unit
         same[row, column] = newton.missing(arm, task, middle, target[k[row]]) <= SOLUTION
     return np.asarray(same)
-
-
-def means(arm: Arm, q: Array) -> Array:
-    """Candidates (K, B, n), the mean of its cluster for each that has two others around it.
-
-    Of a root of third or fourth order rounding leaves three or four, off by its third or fourth root; their
-    mean is right to rounding.
-    """
-    if q.shape[1] > 32:
-        return q
-    away = newton.difference(arm, q[:, None], q[:, :, None])  # of the third axis' candidates from the second's
-    with np.errstate(invalid="ignore"):
-        around = np.abs(away).max(axis=3) < CLUSTER
-    count = around.sum(axis=2)
-    shift = np.where(around[..., None], away, 0.0).sum(axis=2) / np.maximum(count, 1)[..., None]
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
-    return np.asarray(q + np.where((count > 2)[..., None], shift, 0.0) * unit)
 
 
 def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:

@@ -158,7 +158,7 @@ def _rows(
             there = around(arm, task, target)
             found = solve(there.reshape(-1, *target.shape[1:])).q
             found = found.reshape(len(target), -1, arm.n)
-            if lost.any():  # few columns let clusters of roots be averaged: see `singularities.means`
+            if lost.any():
                 found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
             return found, np.arange(found.shape[1]) % max(B, 1)
 

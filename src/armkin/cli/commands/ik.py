@@ -91,7 +91,7 @@ def ik(
     if workers > 1 and batch is None:
         raise UsageError("--workers belongs to --batch: one target is not shared")
     if compiled or workers > 1:
-        request = replace(request, ik=partial(_compiled if compiled else choose.ik, workers=workers))
+        request = replace(request, ik=partial(_compiled if compiled else request.ik, workers=workers))
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):
