@@ -10,6 +10,7 @@ from armkin.board.ports import Port
 
 _COPIES = 3  # of every frame, on a bad line
 _LATE = 0.03  # [s] an answer may take
+_ASKING = 50  # [bytes] of a STATUS? and its answer, at least
 
 
 class Line:
@@ -65,6 +66,6 @@ class Line:
             return
         self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
         took = self.port.now() - asked
-        self.slowest = max(self.slowest, took)
+        self.slowest = max(self.slowest, took - _ASKING * 10 / self.port.baud)
         if took > _LATE:
             self.clear = max(self.clear, self.port.now() + took - _LATE)

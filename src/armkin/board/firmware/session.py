@@ -42,7 +42,7 @@ class Session:
         self._digest = 0
         self._status: Status | None = None
         self._error: Ack | Status | None = None
-        self._heard = port.now()
+        self.heard = port.now()
         self._asked = 0.0
         self._until = 0.0  # something has to go on by then
 
@@ -101,7 +101,7 @@ class Session:
         self._digest = info.nonce & 0xFFFF
         self._window.begin(info)
         self._error = None
-        self._heard = self.port.now()
+        self.heard = self.port.now()
         self._patient()
 
     def _patient(self) -> None:
@@ -164,7 +164,7 @@ class Session:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
-        if self.port.now() - self._heard > _GIVE_UP:
+        if self.port.now() - self.heard > _GIVE_UP:
             raise self._silent()
         if self._window:
             self._stalled()
@@ -177,7 +177,7 @@ class Session:
 
     def _hear(self, timeout: float) -> None:
         for reply in self.line.replies(timeout):
-            self._heard = self.port.now()
+            self.heard = self.port.now()
             if isinstance(reply, Info):
                 self._same(reply.nonce & 0xFFFF)
                 continue  # of a HELLO that was repeated

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
-from typing import TYPE_CHECKING
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any
 
 from armkin.board.firmware import protocol
 from armkin.board.firmware.motion_frame import Batch
-from armkin.board.firmware.protocol import Segment, State, Status
+from armkin.board.firmware.protocol import Error, Segment, State, Status
+from armkin.board.firmware.reply_checks import DeviceError
 from armkin.board.firmware.straight_lines import Pieces
+from armkin.board.firmware.window import QUESTION
 
 if TYPE_CHECKING:
     from armkin.board.backend import Progress
@@ -18,10 +21,13 @@ if TYPE_CHECKING:
     from armkin.board.firmware.segments import Counts, Move
     from armkin.board.firmware.session import Session
 
-# Standing still while the queue fills: 100 ms, 250 ms on a busy computer, or half a second on a bad line.
-_LEAD, _LEAD_BUSY, _LEAD_BAD = Segment(80, 20_000, 0, ()), Segment(200, 20_000, 0, ()), Segment(255, 32_000, 0, ())
+# [s] that the arm stands while the queue begins to fill: what the frames of a ramp's first 10 ms take, and 4.5 times
+# the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a busy computer; on a bad line.
+_LEAD, _LEAD_ANSWERS, _LEAD_MOST, _LEAD_BUSY, _LEAD_BAD = 0.003, 4.5, 0.6, 0.25, 0.51
+_TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
+_BEGUN = 0.1  # [s] after its pause, until which a motion that has made no step may begin again
 _FULL = 12  # segments of room: a frame of 6 would wait for as many, and leave the queue short of a ramp's end
 
 
@@ -30,20 +36,24 @@ def carry_out(
 ) -> tuple[Status, Counts | None]:
     """Carry out plans, one after another; None in between: nothing to do yet. axes: the motors' on the board.
 
-    Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session.
+    Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session. If the
+    queue runs dry before the first step, it begins again, with more time to fill.
     """
     end: Counts | None = None
     total = begun = done = 0.0
+    source, first = iter(plans), list[Any]()  # first: at most two plans
 
-    def frames() -> Iterator[Batch | None]:
+    def frames(plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
         nonlocal end, total, begun
         for plan in plans:
             if plan is None:
                 yield None
                 continue
+            if len(first) < 2:
+                first.append(plan)
             total += plan.duration
             for move in plan.moves(lambda: _pieces(session)):
-                for batch in batches(session, move, axes, plan.clock):
+                for batch in batches(session, move, axes, plan.clock, least):
                     begun += batch.seconds
                     yield batch
             end = plan.end
@@ -53,7 +63,18 @@ def carry_out(
         done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
         progress(done, total)
 
-    return stream(session, frames(), tell), end
+    since, pause = session.port.now(), lead(session)
+    try:
+        return stream(session, frames(source, 0.0), tell), end
+    except DeviceError as error:
+        if error.error != Error.DRY or session.port.now() - since > pause + _BEGUN or len(first) != 1:
+            raise
+        status = session.rest()
+        if any(status.counts[axis] != count for axis, count in zip(axes, first[0].start.tolist(), strict=True)):
+            raise
+        session.reopen()
+        total = begun = 0.0
+        return stream(session, frames(chain([first[0]], source), _LEAD_MOST), tell), end
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
@@ -105,24 +126,42 @@ def _busy() -> bool:
     return hasattr(os, "getloadavg") and os.getloadavg()[0] > (os.cpu_count() or 1)
 
 
-def batches(session: Session, move: Move, axes: Sequence[int], clock: int) -> Iterator[Batch]:
-    """A move's segments in frames: as many as a good line takes, fewer on a bad one."""
+def lead(session: Session, least: float = 0.0) -> float:
+    """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry."""
+    if session.line.damaged:
+        return _LEAD_BAD
+    busy = _LEAD_BUSY if _busy() and not session.port.simulated else 0.0
+    return max(least, busy, min(_LEAD + _LEAD_ANSWERS * session.line.slowest, _LEAD_MOST))
+
+
+def _left(session: Session) -> float:
+    """Seconds of motion that the board has, or will have: a guess, by what it said last."""
+    queued = 0.0 if session.state == State.IDLE else session.queued / 1000 - (session.port.now() - session.heard)
+    return session.under_way + max(0.0, queued)
+
+
+def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least: float = 0.0) -> Iterator[Batch]:
+    """A move's segments in frames: as many as a good line takes, fewer on a bad one; least: see `lead`.
+
+    Two frames may be on their way: the second one fits what the board keeps while it is busy with the first.
+    """
     assert session.info is not None
     line = session.line
     moving = sorted(move.moving, key=lambda k: axes[k])
     at = [int(move.start[k]) for k in moving]
-    room = session.info.frame - 4
+    room = min(session.info.frame - 4, session.info.receive - QUESTION - 6)
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = []
-    resting = session.state == State.IDLE and not session.under_way
-    if move.segments and (resting or line.damaged):
-        lead = _LEAD_BAD if line.damaged else _LEAD_BUSY if _busy() and not session.port.simulated else _LEAD
-        todo.append(Segment(lead.ticks, lead.interval, 0, (0,) * len(moving)))
-    begins = not resting  # behind a rest, which may wait for room
+    pause = lead(session, least)
+    stands = line.damaged or _left(session) < pause
+    if move.segments and stands:
+        todo.append(Segment(math.ceil(pause * clock / _TICK), _TICK, 0, (0,) * len(moving)))
+    begins = not stands  # behind a rest, which may wait for room
     while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-        most = _BATCH[0] if line.noisy or (session.pending[1] < _FULL and not begins) else _BATCH[1]
-        n, begins = 1, False
+        full = session.pending[1] < _FULL and not begins
+        most = _BATCH[0] if stands or line.noisy or full else _BATCH[1]
+        n, begins, stands = 1, False, False
         while (
             n < min(most, len(todo))
             and todo[n].narrow == todo[0].narrow

@@ -19,7 +19,7 @@ _GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending 
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 16  # frames
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
-_QUESTION = 12  # [bytes] of a STATUS? on the line
+QUESTION = 12  # [bytes] of a STATUS? on the line
 
 
 @dataclass
@@ -89,7 +89,7 @@ class Window:
 
         What follows the frame that the board is busy with must fit into its receive buffer, a STATUS? included.
         """
-        return min(self._bytes, first + self._receive - _QUESTION) - size
+        return min(self._bytes, first + self._receive - QUESTION) - size
 
     @property
     def credit(self) -> int:

@@ -101,8 +101,12 @@ def send(
     if trace is not None and batch == "-" and not dry_run:
         raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
     if resume:
-        beside = {"--dry-run": dry_run, "--assume": assume, "--batch -": batch == "-", "--port sim": port == SIM}
-        board_link.can_resume(beside)
+        if batch == "-":
+            raise UsageError(
+                "--resume needs the rows that were held once more, and --batch - does not keep what it has read\n"
+                "save the rows in a file and send --batch FILE; or leave --resume out: they start where the arm stands"
+            )
+        board_link.can_resume({"--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM})
     if path is not None:
         from armkin.cli.commands.path import sent
 

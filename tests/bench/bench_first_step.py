@@ -1,0 +1,120 @@
+"""From the first byte of MOTION to the first step, and short moves on a loaded computer, in the emulator, in real time.
+
+    python tests/bench/bench_first_step.py [--runs 40] [--moves 1000] [--load 6]
+
+The sender is armkin's own over a pseudo-terminal, the board the compiled firmware at 250000 baud; times are the board's
+own cycles. The time law has its first step after a time of its own: a fast joint's half step from rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import multiprocessing
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
+
+from emulator import EmulatedBoard
+
+import armkin
+from armkin.board.firmware import streaming
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.ports import SerialPort
+from armkin.errors import LinkError
+
+
+def first_steps(runs: int) -> tuple[list[float], float, list[float]]:
+    """To the first step of a move, of that the law's own, and how long the arm was told to stand [ms]."""
+    arm = armkin.load("three_dof")
+    out, leads, own = [], [], 0.0
+    for _ in range(runs):
+        with EmulatedBoard(trace=True, reset_on_open=False) as board:
+            port = SerialPort(board.port)
+            machine = Machine(port, arm, configure(arm))
+            machine.prepare(assume=arm.home)
+            plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
+            law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
+            own = 1e3 * math.sqrt(law.length / law.accel / int(np.abs(plan.end - plan.start).max()))
+            leads.append(1e3 * streaming.lead(machine.session))
+            time.sleep(0.03)
+            begin = board.control("cycles")["cycle"]
+            machine.run([plan])
+            port.close()
+            trace = board.trace()
+            arrived, _ = trace.edges("uart.in")
+            step = min(int(trace.rises(f"{axis}.STEP")[0]) for axis in "XYZ")
+            out.append(float(step - arrived[arrived > begin][0]) / 16e3)
+    return out, own, leads
+
+
+def short_moves(moves: int, load: int) -> tuple[int, int, float]:
+    """Moves of a few degrees, each from rest, with `load` busy processes: how many arrived, were held, and seconds."""
+    arm = armkin.load("three_dof")
+    busy = [multiprocessing.Process(target=_spin, daemon=True) for _ in range(load)]
+    for one in busy:
+        one.start()
+    arrived = held = 0
+    begin = time.monotonic()
+    try:
+        with EmulatedBoard(reset_on_open=False) as board:
+            port = SerialPort(board.port)
+            machine = Machine(port, arm, configure(arm))
+            machine.prepare(assume=arm.home)
+            rng = np.random.default_rng(1)
+            for _ in range(moves):
+                goal = arm.home + np.deg2rad(rng.uniform(-2, 2, 3))
+                try:
+                    machine.run([machine.plan(machine.counts(), np.clip(goal, arm.lower, arm.upper))])
+                    arrived += 1
+                except LinkError as error:
+                    print(str(error).splitlines()[0], flush=True)
+                    held += 1
+                    machine.session.reopen()
+                    machine.refresh()
+            port.close()
+    finally:
+        for one in busy:
+            one.terminate()
+    return arrived, held, time.monotonic() - begin
+
+
+def _spin() -> None:
+    os.nice(0)
+    while True:
+        sum(range(10_000))
+
+
+def main() -> None:
+    """Print the figures."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--runs", type=int, default=40)
+    options.add_argument("--moves", type=int, default=1000)
+    options.add_argument("--load", type=int, default=6)
+    options.add_argument("--idle", action="store_true", help="lead as on an idle computer, whatever the load is")
+    given = options.parse_args()
+    if given.idle:
+        streaming._busy = lambda: False
+    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    if given.runs:
+        got, own, leads = first_steps(given.runs)
+        figures = " / ".join(f"{np.quantile(got, q):.1f}" for q in (0.0, 0.5, 0.9, 1.0))
+        print(f"first step after the first byte of MOTION, {given.runs} runs: {figures} ms (least, median, 90 %, most)")
+        print(
+            f"  of these the law's own {own:.1f} ms; the arm was told to stand {min(leads):.1f} to {max(leads):.1f} ms"
+        )
+    if given.moves:
+        arrived, held, seconds = short_moves(given.moves, given.load)
+        print(
+            f"{given.moves} short moves beside {given.load} busy ones: {arrived} arrived, {held} held, {seconds:.0f} s"
+        )
+
+
+if __name__ == "__main__":
+    main()

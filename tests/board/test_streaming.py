@@ -1,0 +1,96 @@
+"""How long the arm stands before a motion, how frames fit the line, and a queue that runs dry before the first step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from armkin.board.firmware import framing, streaming
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.protocol import Type
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.port import SimPort
+from armkin.board_kinds import BOARDS
+from armkin.errors import HeldError
+from armkin.model import build as arms
+
+ARM = arms.load("robots/three_dof.yaml")
+
+
+class Stalling(SimPort):
+    """A computer that does nothing for `seconds` behind the MOTION frame with this number; what was sent is kept."""
+
+    def __init__(self, board: SimBoard, frame: int = -1, seconds: float = 0.0) -> None:
+        super().__init__(board)
+        self.sent: list[bytes] = []
+        self._frame, self._seconds = frame, seconds
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+        if payload_of(data)[0] != Type.MOTION:
+            return
+        self.sent.append(data)
+        if len(self.sent) == self._frame:
+            for _ in range(round(1000 * self._seconds)):
+                self.board.advance(0.001)
+                self._now += 0.001
+
+
+def payload_of(data: bytes) -> bytes:
+    """The payload of the first frame on the wire."""
+    whole = framing.cobs_decode(data.strip(b"\0").split(b"\0")[0])
+    assert whole is not None
+    return whole[:-4]
+
+
+def machine_on(port: SimPort) -> Machine:
+    machine = Machine(port, ARM, configure(ARM))
+    machine.prepare()
+    return machine
+
+
+def test_a_stall_before_the_first_step_begins_again() -> None:
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 1, 0.03)
+    machine = machine_on(port)
+    plan = machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))
+    assert machine.run([plan]).error == 0
+    assert machine.counts() == tuple(plan.end.tolist())
+    first, again = (payload_of(data) for data in (port.sent[0], port.sent[-1]))
+    assert first[:2] == bytes([Type.MOTION, first[1]])
+    assert again[4] & 1  # END
+    pauses = [data for data in port.sent if b"\x20\x4e" in payload_of(data)]  # ticks of 20,000 cycles
+    assert len(pauses) >= 2
+
+
+def test_a_stall_behind_the_first_step_is_a_hold() -> None:
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.08)
+    machine = machine_on(port)
+    plan = machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))
+    with pytest.raises(HeldError, match="keep its queue filled"):
+        machine.run([plan])
+    assert machine.counts() != (0, 0, 0)
+
+
+def test_two_frames_fit_the_line() -> None:
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]))
+    machine = machine_on(port)
+    machine.run([machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))])
+    assert len(port.sent) > 8
+    assert max(map(len, port.sent)) <= machine.info.receive - 12  # a STATUS? besides
+
+
+def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = machine_on(SimPort(SimBoard(BOARDS["uno_cnc_shield"])))
+    session = machine.session
+    found = []
+    for slowest in (0.0005, 0.002, 0.016, 0.2):
+        session.line.slowest = slowest
+        found.append(streaming.lead(session))
+    assert found == pytest.approx([0.00525, 0.012, 0.075, 0.6])
+    assert streaming.lead(session, 0.7) == 0.7
+    session.port.simulated, session.line.slowest = False, 0.0  # type: ignore[misc]
+    monkeypatch.setattr(streaming, "_busy", lambda: True)
+    assert streaming.lead(session) == 0.25
+    session.line.resent = 1
+    assert streaming.lead(session) > 0.5
