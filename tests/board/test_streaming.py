@@ -89,7 +89,7 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
         found.append(streaming.lead(session))
     assert found == pytest.approx([0.00525, 0.012, 0.075, 0.6])
     assert streaming.lead(session, 0.7) == 0.7
-    session.port.simulated, session.line.slowest = False, 0.0  # type: ignore[misc]
+    session.port.simulated, session.line.slowest = False, 0.0
     monkeypatch.setattr(streaming, "_busy", lambda: True)
     assert streaming.lead(session) == 0.25
     session.line.resent = 1

@@ -34,6 +34,7 @@ _STEADY = 0.004  # change of speed that is none
 _EVEN = 0.02  # [s] that a piece of one speed lasts whose intervals grow bit by bit: in less that is too great a change
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
 _DRIFT = 0.02  # steps
+_WHOLE = 8  # ticks a step, up to which a ramp's are as many for each step: a tick is felt
 _SLOW = 40  # ticks a step, from where the ticks need not fit the steps
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
@@ -144,7 +145,9 @@ class Cutter:
         ratio = (2 + abs(change)) / (2 - abs(change))
         above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
         change *= max(_LESS, min(1.0, _ACCEL / (1 + above)))
-        if ticks > max(_CHOICE, 1.1 * most):
+        if most >= 4 and (over := int(ticks / most)) <= _WHOLE:
+            ticks = max(round(over * most), math.ceil(most))
+        elif ticks > _CHOICE:
             spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
             ticks = min(spread, key=lambda t: _parabola(exact, t, change, quick)[3])
         interval, add, bend, _ = _parabola(exact, ticks, change, quick)
