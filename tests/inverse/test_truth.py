@@ -107,6 +107,9 @@ def test_rounded_targets(name: str) -> None:
         # axes 1 and 4 in one line, among three lost directions
         ("fanuc_crx10ia", [0, 180, 90, -90, 180, -90]),
         ("fanuc_crx10ia", [90, 0, 90, 180, 180, 0]),
+        # a root of third order on the self-motion of joints 1 and 4: points beside it are no branches
+        ("fanuc_crx10ia", [135, 0, 90, 90, -135, 135]),
+        ("fanuc_crx10ia", [-135, 180, 90, -135, 135, -135]),
     ],
 )
 def test_compound_singularities(name: str, q: list[float]) -> None:

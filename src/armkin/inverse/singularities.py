@@ -159,12 +159,10 @@ def _settle(
             k, b = k[some], b[some]
             asked[k, b] = True
             straight = ~(np.abs(folds(arm, task, q[k, b], target[k]).bend) > BENT)
-            if not straight.any():
-                return
-            k, b = k[straight], b[straight]
-            moves[k, b], which[k, b] = _self_motion(
-                arm, task, q[k, b], V[k, b], np.maximum(nullity[k, b], 1), target[k]
-            )
+            if straight.any():
+                k, b = k[straight], b[straight]
+                lost = np.maximum(nullity[k, b], 1)
+                moves[k, b], which[k, b] = _self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
 
     if (~asked).sum() <= AT_ONCE:
         ask(*np.nonzero(~asked))
@@ -198,7 +196,7 @@ def _settle(
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
-    _drop_contained(arm, q, chosen & (sigma < SOLUTION), chosen, curve)
+    _drop_contained(arm, q, sigma, chosen, curve)
     _drop_twins(arm, task, q, chosen, np.asarray(curve.any(axis=2)), target)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
@@ -216,13 +214,17 @@ def _settle(
     )
 
 
-def _drop_contained(arm: Arm, q: Array, sure: Bool, chosen: Bool, curve: Bool) -> None:
-    """Of self-motions through each other keep the one of more joints: change chosen (K, M), of which sure lie on one.
+def _drop_contained(arm: Arm, q: Array, sigma: Array, chosen: Bool, curve: Bool) -> None:
+    """Of self-motions through each other keep the one of more joints, and no root of high order beside one.
 
-    curve: (K, M, n) the joints that a chosen posture's self-motion moves. `near`, the first candidate, stays.
+    Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves. `near`, the first, stays.
     """
-    for k in np.flatnonzero((sure & curve.any(axis=2)).sum(axis=1) > 1):
-        mine = np.flatnonzero(sure[k] & curve[k].any(axis=1))
+    for k in np.flatnonzero(curve.any(axis=(1, 2))):
+        mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
+        few = mine[curve[k, mine].sum(axis=1) <= arm.n // 2]
+        for i in np.flatnonzero(chosen[k] & (sigma[k] < MOVING) & ~curve[k].any(axis=1)):
+            away = np.where(curve[k, few], 0.0, np.abs(newton.difference(arm, q[k, few], q[k, i])))
+            chosen[k, i] = i == 0 or not (away.max(axis=1) < 10 * TURNED).any()
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
