@@ -25,7 +25,7 @@ from armkin.model.limits import SLACK
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SHARED = 16384  # poses of a chunk where threads share a batch: longer calls of numpy wait less for each other
+SHARED = 8192  # poses of a chunk where threads share a batch: longer calls of numpy wait less for each other
 
 
 class Solved(NamedTuple):
