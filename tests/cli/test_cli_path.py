@@ -183,3 +183,11 @@ def test_a_plan_begins_within_the_limits() -> None:
         done = run(*words)
         assert (done.code, done.out) == (3, ""), words
         assert f"error: {words[-2]}: q1 = 500 deg is outside -120 to 120 deg" in done.err
+
+
+def test_a_start_outside_the_limits_is_refused_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "begin.yaml"
+    path.write_text("start: {joints: [0, 130, 0]}\nmoves:\n  - joint: home\n")
+    done = run("path", THREE_DOF, path)
+    assert done.code == 3
+    assert f"{path}:1: start: q2 = 130 deg is outside" in done.err

@@ -98,6 +98,7 @@ def test_a_path_beyond_the_reach_is_refused_with_what_each_branch_carries(three_
         ([{"lin": [300, 10, 367]}], "unknown key; did you mean line"),
         ([{"line": [300, 10, float("nan")]}], "finite"),
         ([{"spline": [[300, 10, 367], [300, 10, 367]]}], "same point twice"),
+        ([{"spline": [[300, 10, 367], [258, 10, 367]]}], "spline turns back by half a turn near 300, 10, 367"),
     ],
 )
 def test_moves_that_make_no_sense_are_refused_in_words(three_dof: Arm, moves: list[Any], words: str) -> None:

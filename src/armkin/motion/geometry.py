@@ -195,6 +195,12 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
         c0, c1, c2, c3 = (c[i] for c in coefficients)
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
+    v = np.concatenate([np.linspace(x, y, _TABLE, endpoint=False) for x, y in pairwise(u)])
+    tangent = at(v)[1] * _weights(task)
+    back = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
+    if len(back):
+        place = ", ".join(f"{x:.6g}" for x in at(v[back[:1] + 1])[0][0, : task.position])
+        raise UsageError(f"a spline turns back by half a turn near {place}: use lines, which stop there")
     return _unit_speed(task, a, at, u)
 
 

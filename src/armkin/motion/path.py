@@ -24,7 +24,7 @@ from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.plan import check_rates, check_share, straight
+from armkin.motion.plan import check_limits, check_rates, check_share, straight
 from armkin.motion.profile import at_rest
 from armkin.motion.route import joined
 from armkin.motion.trajectory import Straight, Stretch
@@ -174,10 +174,12 @@ class _Walk:
         start = self.file.start
         if start is None:
             return None
-        if isinstance(start, str):
-            return path_numbers.joints(self.arm, self.q, start)
-        if start.joints is not None:
-            return path_numbers.joints(self.arm, self.q, start.joints)
+        value = start if isinstance(start, str) else start.joints
+        if value is not None:
+            q = path_numbers.joints(self.arm, self.q, value)
+            check_limits(self.arm, q[None])
+            return q
+        assert not isinstance(start, str)
         assert start.point is not None
         return self._reached(self._target(start.point), None)
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armkin.motion.path_plan import PathPlan
 
 _SAMPLES = 600
+_WIDE = 84  # characters of a line above the arm
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
 _SINGULAR = "#c0392b"
 
@@ -25,7 +26,8 @@ def plot_path(plan: PathPlan, out: str) -> None:
     t = np.linspace(0.0, plan.duration, _SAMPLES)
     q = plan.q(t)
     with picture(out, 11.5, 7.2) as figure:
-        figure.text(0.03, 0.965, _title(plan), fontsize=11, va="top")
+        figure.text(0.03, 0.975, _title(plan), fontsize=11, va="top")
+        figure.text(0.03, 0.94, _names(plan), fontsize=9, va="top")
         _in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
         _joints(plan, rows[0], t, q)
@@ -43,9 +45,14 @@ def plot_path(plan: PathPlan, out: str) -> None:
 
 
 def _title(plan: PathPlan) -> str:
-    names = [name for run in plan.runs for _, name in run.names if name]
-    branch = f" on {' | '.join(dict.fromkeys(names))}" if names else ""
-    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s{branch}"
+    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s"
+
+
+def _names(plan: PathPlan) -> str:
+    """The branches, as many as there is room for beside the joints."""
+    names = list(dict.fromkeys(name for run in plan.runs for _, name in run.names if name))
+    text = f"on {' | '.join(names)}" if names else ""
+    return text if len(text) <= _WIDE else f"{text[: _WIDE - 4].rstrip(' ,|')} ..."
 
 
 def _breaks(plan: PathPlan) -> list[float]:
@@ -78,7 +85,7 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         near = int(np.argmin(np.abs(plan.s(np.linspace(0.0, plan.duration, len(q))) - one.s)))
         axes.plot(*tips[near : near + 1].T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
     axes.legend(
-        loc="upper left", bbox_to_anchor=(0.03, 0.94), bbox_transform=figure.transFigure, fontsize=8, frameon=False
+        loc="upper left", bbox_to_anchor=(0.03, 0.92), bbox_transform=figure.transFigure, fontsize=8, frameon=False
     )
     true_proportions(axes, points, float(arm.base[2, 3]))
 

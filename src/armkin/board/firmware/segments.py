@@ -115,7 +115,8 @@ class Cutter:
             segment = self._steady(exact, left, most, drift)
         else:
             segment = self._ramp(exact, left, most, change)
-        short = self.min_interval - min(segment.interval, segment.last_interval)
+        least = self.min_interval + (self.min_interval // 4 if segment.quick else 0)  # as the board wants it
+        short = least - min(segment.interval, segment.last_interval)
         if short > 0:
             segment = replace(segment, interval=segment.interval + short)
         self.places = [p + segment.ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
