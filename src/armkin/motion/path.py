@@ -175,13 +175,11 @@ class _Walk:
         if start is None:
             return None
         value = start if isinstance(start, str) else start.joints
-        if value is not None:
-            q = path_numbers.joints(self.arm, self.q, value)
-            check_limits(self.arm, q[None])
-            return q
-        assert not isinstance(start, str)
-        assert start.point is not None
-        return self._reached(self._target(start.point), None)
+        if value is None:
+            return self._reached(self._target(start.point), None)  # type: ignore[union-attr, arg-type]
+        q = path_numbers.joints(self.arm, self.q, value)
+        check_limits(self.arm, q[None])
+        return q
 
     # Moves
 
