@@ -46,10 +46,12 @@ MAY_IMPORT: dict[str, str] = {
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/klipper": "errors formula model motors motion board/ports board/backend",
     "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
+    "board/kinds": "errors board_kinds formula robot_file model motors motion board/ports board/backend board/firmware"
+    " board/grbl board/feetech board/klipper board/sim",
     "board": "errors board_kinds formula robot_file model forward motors motion board/ports board/backend"
-    " board/firmware board/grbl board/feetech board/klipper board/sim",
+    " board/firmware board/grbl board/feetech board/klipper board/kinds board/sim",
     "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/sim",
+    " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/kinds board/sim",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.foreign import foreign
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
+from armkin.board.kinds import foreign
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.robot_file.edit import replaced

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from armkin.board.backend import Backend, StoppedError
 from armkin.board.firmware.machine import Machine
-from armkin.board.foreign import Foreign
+from armkin.board.kinds import Foreign
 from armkin.board.ports import BAUD, SIM, Port, SerialPort
 
 if TYPE_CHECKING:

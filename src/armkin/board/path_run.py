@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.board.firmware import gripping
 from armkin.board.firmware.machine import Machine
-from armkin.board.foreign import Foreign, foreign
+from armkin.board.kinds import Foreign, foreign
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:

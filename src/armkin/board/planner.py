@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware.cutting import cut, plan
-from armkin.board.foreign import Foreign
+from armkin.board.kinds import Foreign
 from armkin.board.report import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk

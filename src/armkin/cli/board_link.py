@@ -17,7 +17,7 @@ from armkin.model import units
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, Progress
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.board.resuming import Note
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
@@ -81,7 +81,7 @@ def backend(
     simulated: what to say of a board in this process.
     """
     from armkin.board.backend import StoppedError
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.board.opening import open_backend
     from armkin.board.stopping import stoppable
 
@@ -140,7 +140,7 @@ def held(machine: Backend, resume: bool) -> Note | None:
 def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
     """The arm's board: one with armkin's firmware, or a foreign one; rehearsal: see `configure`."""
     from armkin.board.firmware.configuration import configure
-    from armkin.board.foreign import foreign
+    from armkin.board.kinds import foreign
 
     return foreign(arm) or configure(arm, rehearsal=rehearsal)
 

@@ -12,7 +12,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
 
 PortName = Annotated[
     str | None,

@@ -1,1 +1,22 @@
-"""Waypoints -> trajectory."""
+"""Waypoints and paths to a trajectory: joint values over time.
+
+The way of a path (`path.py`, `armkin.path`):
+
+path_numbers.py     the moves of a path file, in degrees, as joint values and targets
+geometry.py         lines, arcs, helices, splines and blends of the tool, each at unit speed
+route.py            one after another, with rests at corners
+linked_branches.py  every branch along the route, linked from sample to sample by a certificate
+branch_chains.py    how far each carries, and the fewest runs that carry all
+branch_path.py      the branch that is taken: joint values along the route
+time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
+path_plan.py        the answer; report.py: what is said of its branches; held.py: with joints held
+
+The way of waypoints:
+
+plan.py             straight moves of all joints; profile.py: their law, speed up, cruise, slow down
+corners.py          waypoints without a stop
+
+What both make, and boards take:
+
+trajectory.py       stretches from rest to rest; curve.py: a curved one; remainder.py: the rest of one that was held
+"""

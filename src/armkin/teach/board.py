@@ -15,7 +15,7 @@ import numpy as np
 from armkin.board import path_run
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.machine import Machine
-from armkin.board.foreign import Foreign
+from armkin.board.kinds import Foreign
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.motion.plan import check_limits

@@ -16,7 +16,7 @@ from armkin.board.backend import Backend, StoppedError
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.homing import switches
 from armkin.board.firmware.machine import Machine
-from armkin.board.foreign import Foreign, foreign
+from armkin.board.kinds import Foreign, foreign
 from armkin.board.opening import open_port
 from armkin.board.ports import BAUD, SIM, SerialPort
 from armkin.board.sim.port import Paced

@@ -16,7 +16,7 @@ from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Grip
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.cli.answers import Grip as Answer
     from armkin.model.arm import Arm
 
@@ -43,7 +43,7 @@ def grip(
     """Open or close the gripper."""
     from armkin.board.firmware import gripping
     from armkin.board.firmware.machine import Machine
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
 
     arm = inputs.load(robot)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)

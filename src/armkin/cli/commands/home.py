@@ -49,7 +49,7 @@ def home(
     """
     from armkin.board.firmware import homing
     from armkin.board.firmware.machine import Machine
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.board.planner import where
 
     arm = inputs.load(robot)

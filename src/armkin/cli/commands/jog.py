@@ -34,7 +34,7 @@ def jog(
     """
     from armkin.board.firmware import jogging
     from armkin.board.firmware.machine import Machine
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.board.planner import where
     from armkin.model.lock import joint_index
 

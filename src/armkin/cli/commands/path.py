@@ -259,7 +259,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
 
     from armkin.board import path_run
     from armkin.board.firmware.cutting import cut
-    from armkin.board.foreign import Foreign
+    from armkin.board.kinds import Foreign
     from armkin.motors import pulses
 
     try:

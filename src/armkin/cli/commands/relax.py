@@ -35,7 +35,7 @@ def relax(
     for --seconds; `armkin send ROBOT --batch FILE` plays them back.
     """
     from armkin.board.feetech.machine import ServoMachine
-    from armkin.board.foreign import foreign
+    from armkin.board.kinds import foreign
 
     arm = inputs.load(robot)
     other = foreign(arm)

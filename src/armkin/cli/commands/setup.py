@@ -13,8 +13,8 @@ from armkin.cli.options import Json, Robot
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
-    from armkin.board.foreign import Foreign
     from armkin.board.grbl.settings import Difference
+    from armkin.board.kinds import Foreign
     from armkin.model.arm import Arm
 
 
@@ -34,7 +34,7 @@ def setup(
     the sections that printer.cfg needs. armkin's own firmware takes its settings from the robot file at every command,
     and bus servos have none that matter here.
     """
-    from armkin.board.foreign import foreign
+    from armkin.board.kinds import foreign
 
     arm = inputs.load(robot)
     other = foreign(arm)

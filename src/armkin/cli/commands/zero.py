@@ -42,7 +42,7 @@ def zero(
 
     from armkin.board.feetech import gripping
     from armkin.board.feetech.machine import ServoMachine
-    from armkin.board.foreign import foreign
+    from armkin.board.kinds import foreign
     from armkin.model import units
     from armkin.motors import motor_names
     from armkin.robot_file import parse
