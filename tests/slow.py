@@ -30,9 +30,18 @@ SLOW: dict[str, tuple[str, ...]] = {
     "board/test_machine.py": (
         "test_a_noisy_line_ends_at_exact_counts",
         "test_coupled_joints_home_one_after_another",
+        "test_the_boards_rows_are_the_joint_limits",
     ),
-    "board/test_resuming.py": ("test_a_motion_that_was_held_goes_on_and_ends_where_it_should",),
+    "board/test_protocol.py": ("test_a_stream_in_pieces_gives_its_payloads",),
+    "board/test_resuming.py": (
+        "test_a_motion_that_was_held_goes_on_and_ends_where_it_should",
+        "test_what_is_left_of_a_curve_keeps_to_the_joints_limits",
+    ),
     "board/test_smooth.py": ("test_no_tick_is_faster_than_102_percent_however_short_the_ramp",),
+    "board/test_tick_acceleration.py": (
+        "test_no_tick_is_faster_or_speeds_up_faster_than_102_percent",
+        "test_the_board_takes_random_lines",
+    ),
     "calibration/test_calibration.py": (),
     "cli/test_cli_batch.py": (
         "test_memory_does_not_grow_with_the_rows",
@@ -46,8 +55,10 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_workspace_json_is_the_survey",
         "test_workspace_usage",
     ),
+    "cli/test_completion.py": ("test_an_offered_branch_is_understood",),
     "cli/test_home.py": (),
     "cli/test_inputs_kept.py": ("test_what_comes_through_standard_input_is_not_replaced",),
+    "cli/test_new.py": ("test_the_example_shows_every_key",),
     "cli/test_new_words.py": (
         "test_teach_refuses_a_port_that_is_none",
         "test_teach_says_how_it_ends",
@@ -67,7 +78,10 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "compiled/test_compiled.py": (),
     "export/test_c.py": (),
-    "formula/test_recorder.py": ("test_exact_operations_are_numpys_to_the_last_bit",),
+    "formula/test_recorder.py": (
+        "test_exact_operations_are_numpys_to_the_last_bit",
+        "test_other_operations_are_numpys_to_rounding",
+    ),
     "fuzz/test_fuzz_command_lines.py": (),
     "fuzz/test_fuzz_devices.py": (),
     "fuzz/test_fuzz_robot_files.py": (),
@@ -78,6 +92,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_regular.py": ("test_all_at_once_is_as_one_by_one",),
     "inverse/test_sweep.py": ("test_what_is_dropped_is_not_shown",),
     "inverse/test_truth.py": (),
+    "inverse/test_workers.py": ("test_results_do_not_depend_on_the_workers",),
     "motion/test_every_way.py": (),
     "motion/test_singular_paths.py": (),
     "plot/test_plot.py": (),
