@@ -161,6 +161,18 @@ def test_a_pose_that_only_a_moved_target_settled_is_not_complete() -> None:
     assert not s.complete[0]
 
 
+def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:
+    """Where another one crosses, postures 1e-6 rad beside it solve the target to rounding."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(168)), "pose")
+    task, _ = solver(arm, "pose")
+    q = np.array([[1.94395758534494, -0.2752189104766, 1.68745465008634, 9.1e-11, 1.93145804841238, 0.17129731932685]])
+    for near in (None, q):
+        verdict = truth.judge(arm, screw, "pose", q, goal(task, screw, q).array(), near)
+        assert verdict, verdict
+        assert verdict.solutions.free[0].tolist() == [False, False, True, False, True, False]
+    assert armkin.ik(arm, goal(task, screw, q).array(), "pose").valid.sum() == 2
+
+
 @pytest.mark.parametrize("twist", [90.0, -90.0])
 def test_a_quartic_that_says_nothing_leaves_its_joint_free(twist: float) -> None:
     """Joint 3 in one line with joint 1: any value will do."""

@@ -222,7 +222,7 @@ def _drop_contained(arm: Arm, q: Array, sigma: Array, chosen: Bool, curve: Bool)
     for k in np.flatnonzero(curve.any(axis=(1, 2))):
         mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
         few = mine[curve[k, mine].sum(axis=1) <= arm.n // 2]
-        for i in np.flatnonzero(chosen[k] & (sigma[k] < MOVING) & ~curve[k].any(axis=1)):
+        for i in np.flatnonzero(chosen[k] & (sigma[k] < WEAK) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, few], 0.0, np.abs(newton.difference(arm, q[k, few], q[k, i])))
             chosen[k, i] = i == 0 or not (away.max(axis=1) < 10 * TURNED).any()
         for i in mine[mine > 0]:
