@@ -67,12 +67,13 @@ static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     }
     s->add = (sfine_t)(int16_t)get16(p + 3) * 256 + p[2];
     s->bend = (int16_t)get16(p + 5);
-    s->fine = (get16(p + 7) & (axes_t)~QUICK) | (p[8] & 0x80 ? QUICK : 0);
+    s->fine = get16(p + 7);
+    s->back = p[8] & 0x80 ? QUICK : 0;
 }
 
 // An interval one tick past the end must fit as well, as the interrupt has it ready; and it must not turn within the segment.
 static bool times_valid(const struct segment *s, int32_t *last) {
-    const bool quick = s->fine & QUICK;
+    const bool quick = s->back & QUICK;
     const uint16_t least = quick ? QUICK_INTERVAL : MIN_INTERVAL;
     if (s->ticks == 0 || s->interval < least) {
         return false;

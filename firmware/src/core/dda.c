@@ -17,7 +17,6 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.left = s->ticks;
     dda.interval = (uint32_t)s->interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
-    dda.block = s->fine & QUICK ? 0 : BLOCK - 1;
     if (dda.back & LAST) {
         dda_rest();
     }
@@ -40,6 +39,9 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
 }
 
 __attribute__((noinline)) void dda_bend(void) {
-    const int32_t bend = dda.now->bend;
-    dda.add += dda.block ? bend * 4 : bend * 128;
+    const int16_t bend = dda.now->bend;
+    if (!bend) {  // at the highest rates there is none, and no time
+        return;
+    }
+    dda.add += dda.back & QUICK ? (int32_t)bend * 128 : (int32_t)bend * 4;
 }

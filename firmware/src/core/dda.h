@@ -14,16 +14,16 @@
 #include "../board.h"
 #include "../chip.h"
 
-// One bit an axis, and one for LAST.
-#if AXES <= 7
+// One bit an axis, and two for LAST and QUICK.
+#if AXES <= 6
 typedef uint8_t axes_t;
 #else
 typedef uint16_t axes_t;
 #endif
 
 enum { LAST = 1 << (8 * sizeof(axes_t) - 1) };  // in `back`: the motion may rest after this segment
-enum { QUICK = LAST };                          // in `fine`: `bend` counts with every tick
-_Static_assert(AXES < 8 * sizeof(axes_t), "one bit is LAST");
+enum { QUICK = LAST >> 1 };                     // in `back`: `bend` counts with every tick
+_Static_assert(AXES < 8 * sizeof(axes_t) - 1, "two bits are LAST and QUICK");
 
 enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
 
@@ -37,8 +37,8 @@ struct segment {
     uint16_t interval;    // cycles to the first tick
     sfine_t add;          // 2^-16 cycle a tick
     int16_t bend;         // 2^-22 cycle a tick, with every 16th; QUICK: 2^-17, with each
-    axes_t back;          // axes that count down; LAST
-    axes_t fine;          // axes whose rate is in the small unit; QUICK
+    axes_t back;          // axes that count down; LAST; QUICK
+    axes_t fine;          // axes whose rate is in the small unit
     uint16_t rate[AXES];  // 2^-24 step (fine) or 2^-16
 };
 
@@ -54,7 +54,6 @@ struct dda {
     int32_t add;                // 2^-24 cycle a tick
     fine_t phase[STEPPERS + 1], rate[STEPPERS + 1];
     axes_t back;                // as in the segment taken up last
-    uint8_t block;              // ticks with the same `add`, less 1
     uint8_t bits;               // STEP pins of the next tick
     uint8_t overruns;
 
@@ -93,7 +92,7 @@ void dda_bend(void);
 static inline uint16_t dda_interval(void) {
     uint16_t planned;
     DDA_ADVANCE(planned)
-    if (((uint8_t)dda.left & dda.block) == 0) {
+    if ((uint8_t)dda.left % BLOCK == 0 || dda.back & QUICK) {
         dda_bend();
     }
     if (dda.stretch == 256) {

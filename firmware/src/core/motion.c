@@ -28,7 +28,7 @@ int32_t motion_interval(const struct segment *s, uint16_t ticks) {
     }
     const uint32_t coarse = (uint32_t)(int32_t)(s->add >> 8) * ticks, fine = (uint32_t)(uint8_t)s->add * ticks >> 8;
     int32_t change = (int32_t)(coarse + fine) >> 8;
-    if (s->fine & QUICK) {
+    if (s->back & QUICK) {
         const uint32_t bends = (uint32_t)ticks * (ticks - 1) / 2;
         change += (s->bend * (int32_t)(bends >> 8) + (s->bend * (int32_t)(bends & 0xFF) >> 8)) >> 9;
     } else if (s->bend) {
