@@ -100,7 +100,7 @@ def main() -> None:
     options.add_argument("--idle", action="store_true", help="lead as on an idle computer, whatever the load is")
     given = options.parse_args()
     if given.idle:
-        streaming._busy = lambda: False
+        streaming._load = lambda session: 0.0
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     if given.runs:
         got, own, leads = first_steps(given.runs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -90,7 +92,8 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
     assert found == pytest.approx([0.00525, 0.012, 0.075, 0.6])
     assert streaming.lead(session, 0.7) == 0.7
     session.port.simulated, session.line.slowest = False, 0.0
-    monkeypatch.setattr(streaming, "_busy", lambda: True)
-    assert streaming.lead(session) == 0.25
+    for load, seconds in ((1.5, 0.25), (0.7, 0.1), (0.3, 0.003)):
+        monkeypatch.setattr("os.getloadavg", lambda load=load: (load * (os.cpu_count() or 1), 0.0, 0.0))
+        assert streaming.lead(session) == seconds
     session.line.resent = 1
     assert streaming.lead(session) > 0.5

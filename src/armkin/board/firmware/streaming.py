@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from armkin.board.firmware.session import Session
 
 # [s] that the arm stands while the queue begins to fill: what the frames of a ramp's first 10 ms take, and 4.5 times
-# the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a busy computer; on a bad line.
-_LEAD, _LEAD_ANSWERS, _LEAD_MOST, _LEAD_BUSY, _LEAD_BAD = 0.003, 4.5, 0.6, 0.25, 0.51
+# the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a bad line.
+_LEAD, _LEAD_ANSWERS, _LEAD_MOST, _LEAD_BAD = 0.003, 4.5, 0.6, 0.51
+_LEAD_BUSY = ((1.0, 0.25), (0.5, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
@@ -118,19 +119,21 @@ def _pieces(session: Session) -> Pieces:
     """How finely ramps are cut."""
     if session.line.noisy:
         return Pieces.ROUGH
-    return Pieces.FEW if _busy() and not session.port.simulated else Pieces.FINE
+    return Pieces.FEW if _load(session) > 1 else Pieces.FINE
 
 
-def _busy() -> bool:
-    """Whether more programs want to run than there are processors: then this one may have to wait for its turn."""
-    return hasattr(os, "getloadavg") and os.getloadavg()[0] > (os.cpu_count() or 1)
+def _load(session: Session) -> float:
+    """Programs that want to run, for each processor: above 1 this one may have to wait for its turn."""
+    if session.port.simulated or not hasattr(os, "getloadavg"):
+        return 0.0
+    return os.getloadavg()[0] / (os.cpu_count() or 1)
 
 
 def lead(session: Session, least: float = 0.0) -> float:
     """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry."""
     if session.line.damaged:
         return _LEAD_BAD
-    busy = _LEAD_BUSY if _busy() and not session.port.simulated else 0.0
+    busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
     return max(least, busy, min(_LEAD + _LEAD_ANSWERS * session.line.slowest, _LEAD_MOST))
 
 
