@@ -9,6 +9,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoSolutionError
+from armkin.model.rotation import rpy
 
 
 def with_rates(name: str) -> armkin.Arm:
@@ -72,3 +73,20 @@ def test_a_limit_ends_the_run_and_split_changes_the_branch_there() -> None:
     assert np.all((q >= arm.lower - 1e-6) & (q <= arm.upper + 1e-6))
     end = armkin.fk(arm, plan.q(plan.duration))[:3, 3]
     assert end == pytest.approx(ends[1, :3, 3], abs=0.001)
+
+
+@pytest.mark.parametrize("name", ["puma560", "irb120"])
+def test_free_joints_stay_where_the_whole_way_is_singular(name: str) -> None:
+    """The wrist is straight (the forearm keeps its direction while joint 2 turns): joints 4 and 6 are free."""
+    arm = with_rates(name)
+    a, via, b = (armkin.fk(arm, [0.3, x, 0.2 - x, 0.5, 0.0, 0.3]) for x in (0.1, 0.3, 0.5))
+    turned = np.rad2deg(rpy(a[:3, :3])).tolist()
+    arc = {"via": via[:3, 3].tolist(), "to": [*b[:3, 3].tolist(), *turned]}
+    moves = [{"point": [*a[:3, 3].tolist(), *turned]}, {"arc": arc}]
+    plan = armkin.path(arm, {"task": "pose", "moves": moves}, hold=None)
+    assert len(plan.runs) == 1
+    curve = plan.motion.stretches[-1]
+    q = curve.at(np.linspace(0.0, curve.duration, 500))
+    assert np.ptp(q[:, [3, 5]], axis=0).max() < 1e-6
+    assert np.abs(q[:, 4]).max() < 1e-6
+    assert np.ptp(q[:, 1]) == pytest.approx(0.4, abs=1e-6)
