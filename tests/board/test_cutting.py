@@ -115,7 +115,8 @@ def off(s: Segment) -> float:
     cycles: less than one a tick. Where `add` makes at most three cycles of difference in all, it is there to make up
     for that: rounding it to 2^-16 cycle moves its thresholds by T^2 / 2^17 ticks, and a cycle or two are left.
     """
-    rate, even = abs(s.rates[0]), abs(s.add) * s.ticks <= 3 << 16
+    long = segments.cycles_of(s) > segments._EVEN * CLOCK  # a shorter one's ticks are of one length, in whole cycles
+    rate, even = abs(s.rates[0]), long and abs(s.add) * s.ticks <= 3 << 16
     cycles = min(s.ticks, s.ticks**2 / 2**17 + 2) if even else s.ticks
     return float(
         s.ticks * 2.0 ** (-24 if rate < 2**15 else -16) + rate / 2**23 * s.ticks * cycles / segments.cycles_of(s)
