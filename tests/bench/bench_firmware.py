@@ -1,7 +1,8 @@
 """What the compiled firmware does, in the emulator, beside GRBL 1.1h's figures: `python tests/bench/bench_firmware.py`.
 
-Simulated time: the figures repeat to the cycle, whatever the machine. `--noise SEEDS`: noise runs (20); `--curves
-PLACES`: planned curves, each held and its cable cut at so many places (20); `--only ROWS`: these alone.
+Simulated time: the figures repeat to the cycle, whatever the machine; only `waypoints` runs in real time. `--noise
+SEEDS`: noise runs (20); `--curves PLACES`: planned curves, each held and its cable cut at so many places (20); `--only
+ROWS`: these alone.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 import curve_on_pins
 import measure
 import measure_pico as pico
 import numpy as np
+import waypoints_on_pins
 from emulator import BUILD, PICO, build_firmware
 
 
@@ -61,6 +64,19 @@ def curves(places: int) -> None:
             off, accel = max(g.off_way_mm for g in got), max(g.accel for g in got)
             figures = f"known {known}, go on {on}, off {off:.3f} mm, {accel:.2f} of max_accel"
             row(f"{name}: {'cable cut' if cable else 'held'} at {places} places", figures)
+
+
+def waypoint_rows() -> None:
+    """`armkin send --batch ROWS --blend` through 1,000 waypoints, in real time."""
+    got = waypoints_on_pins.stream(1000)
+    row(
+        "waypoints streamed, this far apart, within",
+        f"{got.waypoints}, {got.apart[0]:.1f} to {got.apart[1]:.1f} deg, {got.seconds:.1f} s",
+    )
+    row("  longest without a step / as planned", f"{got.gap_ms:.2f} / {got.planned_gap_ms:.2f} ms")
+    row("  slowest between the ramps at either end", f"{got.slowest:.1f} deg/s")
+    row("  off PROTOCOL.md's arithmetic, segments/s", f"{got.late_us:.1f} us, {got.segments_a_second:.0f}")
+    row("  stops, faults", "none" if got.good else f"FAULTS {got.error}")
 
 
 def pico_rows() -> None:
@@ -145,6 +161,7 @@ def main() -> None:
     options.add_argument("--curves", type=int, default=20, metavar="PLACES")
     rows: dict[str, Callable[[], None]] = {
         "curves": lambda: curves(given.curves),
+        "waypoints": waypoint_rows,
         "chip": chip_rows,
         "smooth": smooth_rows,
         "pico": pico_rows,

@@ -122,21 +122,24 @@ def whole_run(laid: Laid) -> Run:
         axes = [stats["axes"][name] for name in "XYZ"]
         end = list(laid.work[-1].end)
         exact = list(status.counts[:3]) == end and [c + a["net"] for c, a in zip(laid.start, axes, strict=True)] == end
-        wanted = predicted(laid.segments, laid.start)
-        seen = [trace.rises(f"{name}.STEP") for name in "XYZ"]
-        late = np.inf
-        if [len(x) for x in seen] == [len(x) for x in wanted]:
-            apart = np.concatenate([a - b for a, b in zip(seen, wanted, strict=True)])
-            late = float(np.ptp(apart)) / 2 / CLOCK * 1e6  # the motion's begin is that which makes it least
         return Run(
             exact,
             status.overruns,
             sum(sum(a["violations"].values()) for a in axes),
             status.error,
-            late,
+            late_us(trace, predicted(laid.segments, laid.start)),
             float(laid.off(counts_of(trace, laid.start)[1][::7]).max()),
             len(laid.segments) / laid.curve.duration,
         )
+
+
+def late_us(trace: Trace, wanted: Sequence[Array]) -> float:
+    """A step's distance [us] from when it is wanted, at most; infinite if there are more steps or fewer."""
+    seen = [trace.rises(f"{name}.STEP") for name in "XYZ"]
+    if [len(x) for x in seen] != [len(x) for x in wanted]:
+        return float(np.inf)
+    apart = np.concatenate([a - b for a, b in zip(seen, wanted, strict=True)])
+    return float(np.ptp(apart)) / 2 / CLOCK * 1e6  # the motion's begin is that which makes it least
 
 
 def counts_of(trace: Trace, start: Sequence[int]) -> tuple[Array, Array]:

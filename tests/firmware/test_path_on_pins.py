@@ -11,6 +11,7 @@ from pathlib import Path
 import curve_on_pins
 import numpy as np
 import pytest
+import waypoints_on_pins
 from emulator import EmulatedBoard
 from pins import net
 
@@ -82,3 +83,11 @@ def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
     assert got.goes_on
     assert got.off_way_mm <= 0.05 + HALF_A_STEP
     assert got.accel <= 1.6
+
+
+def test_waypoints_are_streamed_without_a_stop() -> None:
+    got = waypoints_on_pins.stream(60)
+    assert got.good, got
+    assert got.waypoints == 60
+    assert got.late_us <= 50
+    assert got.segments_a_second <= 100

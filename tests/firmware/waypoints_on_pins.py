@@ -1,0 +1,94 @@
+"""Joint waypoints that `armkin send --batch --blend` streams to the compiled firmware in real time, read from the pins.
+
+`tests/bench/bench_firmware.py --only waypoints` prints the figures of 1,000, `test_path_on_pins.py` holds 60 to bars.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from curve_on_pins import counts_of, late_us, predicted
+from emulator import EmulatedBoard
+
+import armkin
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.cutting import Cut
+from armkin.board.firmware.segments import CLOCK
+from armkin.board.planner import Planner
+from armkin.formula.arrays import Array
+from command_line import THREE_DOF, process
+
+BLEND = 1.5  # [deg]
+WINDOW = 0.05  # [s] in which a speed is read from counts
+RAMP = 0.3  # [s] at either end, where the arm speeds up from rest and slows down to it
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """All waypoints sent: what the command says, what the pins did."""
+
+    error: str  # the command's, "" if it ended well: a queue that runs dry and late ticks are errors
+    waypoints: int
+    apart: tuple[float, float]  # [deg] from a waypoint to the next, least and most
+    exact: bool  # counts, pins and plan agree at the end
+    violations: int
+    late_us: float  # a step's distance from PROTOCOL.md's arithmetic, at most
+    gap_ms: float  # longest without a step of any motor, from the first step to the last
+    planned_gap_ms: float
+    slowest: float  # [deg/s] all joints together, in any WINDOW but in the ramps
+    seconds: float  # from the first step to the last
+    segments_a_second: float
+
+    @property
+    def good(self) -> bool:
+        """No stop and no fault. A stop between ramps of 120 deg/s2 is at most 2.6 deg/s in its window."""
+        flows = self.gap_ms <= self.planned_gap_ms + 1 and self.slowest >= 6
+        return flows and self.exact and not self.error and not self.violations
+
+
+def rows(count: int) -> Array:
+    """Joint values [deg] on a wavy ring around the middle of three_dof's limits, some degrees apart and off it."""
+    i = 0.1 * np.arange(1, count + 1)
+    ring = np.stack([35 * np.sin(i), 75 + 30 * np.cos(i), -70 + 35 * np.sin(0.37 * i)], axis=-1)
+    return np.round(ring + np.random.default_rng(7).uniform(-0.3, 0.3, ring.shape), 4)
+
+
+def stream(count: int, *, blend: float = BLEND) -> Streamed:
+    """Send so many waypoints from home, look at every edge."""
+    arm, q = armkin.load("three_dof"), rows(count)
+    plan = Planner(arm, configure(arm), 1.0, blend).plan([0, 0, 0], np.deg2rad(q))
+    assert isinstance(plan, Cut)
+    segments = [one for move in plan.moves() for one in move.segments]
+    wanted = predicted(segments, [0, 0, 0])
+    with EmulatedBoard(trace=True) as board, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rows.csv"
+        file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))
+        words = ["send", THREE_DOF, "--batch", file, "--port", board.port, "--assume-home", "--json"]
+        done = process(*words, *(["--blend", blend] if blend else []), timeout=60 + 3 * plan.duration)
+        said: dict[str, Any] = done.json if done.code == 0 else {"waypoints": 0, "pulses": None}
+        trace, axes = board.trace(), board.stats()["axes"]
+    cycle, counts = counts_of(trace, [0, 0, 0])
+    ends = [counts[-1].tolist(), [axes[name]["net"] for name in "XYZ"], said["pulses"]]
+    at = np.arange(cycle[0] + RAMP * CLOCK, cycle[-1] - RAMP * CLOCK, WINDOW / 5 * CLOCK)
+    there, here = (
+        np.rad2deg(armkin.joints(arm, counts[np.searchsorted(cycle, at + half)]))
+        for half in (WINDOW / 2 * CLOCK, -WINDOW / 2 * CLOCK)
+    )
+    apart = np.linalg.norm(np.diff(q, axis=0), axis=1)
+    return Streamed(
+        "" if done.code == 0 else done.err,
+        said["waypoints"],
+        (float(apart.min()), float(apart.max())),
+        all(end == plan.end.tolist() for end in ends),
+        sum(sum(axes[name]["violations"].values()) for name in "XYZ"),
+        late_us(trace, wanted),
+        float(np.diff(cycle).max()) / CLOCK * 1e3,
+        float(np.diff(np.sort(np.concatenate(wanted))).max()) / CLOCK * 1e3,
+        float(np.linalg.norm(there - here, axis=1).min()) / WINDOW,
+        float(cycle[-1] - cycle[0]) / CLOCK,
+        len(segments) / plan.duration,
+    )
