@@ -54,7 +54,9 @@ Workers = Annotated[
 ]
 Target = Annotated[
     list[str] | None,
-    typer.Argument(metavar="TARGET...", help="What the arm's task asks for, in mm and deg: x y z, or x y z phi, ..."),
+    typer.Argument(
+        metavar="TARGET...", help="What the arm's task asks for (armkin info), in mm and deg: x y z, or x y z phi, ..."
+    ),
 ]
 AllBranches = Annotated[bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")]
 Near = Annotated[

@@ -45,7 +45,9 @@ def new(
     ] = None,
     convention: Annotated[
         str | None,
-        typer.Option("--convention", metavar="NAME", help="standard, or modified (Craig). Never guessed."),
+        typer.Option(
+            "--convention", metavar="NAME", help="standard, or modified (Craig). Needed with --dh and --batch."
+        ),
     ] = None,
     source: Annotated[str, typer.Option("--source", metavar="TEXT", help="Where the numbers come from.")] = "",
     out: Out = None,

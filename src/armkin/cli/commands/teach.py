@@ -23,7 +23,8 @@ def teach(
     """A page in the browser: see the arm, choose a branch, send it.
 
     It is served on 127.0.0.1 until Ctrl-C; its address holds the key that every action needs. A board is touched
-    with --port alone.
+    with --port alone. Keys: Esc stops, 1 to 8 choose a branch, arrows, PageUp and PageDown move the tip, R records,
+    P plays, G grips.
     """
     import threading
 
