@@ -162,7 +162,7 @@ def boxes(figure: Any) -> tuple[Any, Any]:
     """What is seen of the axes in space, and the legend: [pixels]."""
     from armkin.plot.canvas import _seen
 
-    [axes] = figure.axes
+    axes = figure.axes[0]
     legend = axes.get_legend()
     renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     return _seen(axes), None if legend is None else legend.get_window_extent(renderer)
@@ -234,6 +234,9 @@ def test_workspace_picture(tmp_path: Path, drawn: list[Any], surveyed: Workspace
     assert low <= 0
     assert high > np.hypot(*surveyed.tips[:, :2].T).max() * 0.99
     assert any("40,000 samples" in text and "m³ ±" in text for text in texts(figure))
+    (least, greatest), _ = boxes(figure)
+    assert np.all(least >= 0)
+    assert greatest[0] < figure.bbox.width * 0.6
 
 
 def test_workspace_of_a_planar_arm(tmp_path: Path, drawn: list[Any]) -> None:

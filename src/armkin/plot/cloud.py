@@ -49,7 +49,7 @@ def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulabil
         else:
             base = workspace.arm.base
             round_base = (tips - base[:3, 3]) @ base[:3, :3]
-            cloud = space(figure, (-0.01, 0.13, 0.56, 0.76), (20.0, -60.0))
+            cloud = space(figure, (0.01, 0.13, 0.54, 0.76), (20.0, -60.0))
             order = _far_to_near(tips[:_CLOUD], -60.0)
             cloud.scatter(
                 *tips[order].T,
