@@ -234,10 +234,10 @@ def joints_per_pulse(arm: Arm) -> Array:
     """
     gain, still = arm.motor_gain, undriven(arm)
     if len(still) == arm.n:
-        raise UsageError(f"{arm.name} has no drives; add drive: to its joints, or motors:")
+        raise UsageError(f"{arm.name} has no drives; add drive: to its joints, or motors:", undriven=still)
     if still:
         names = ", ".join(still)
-        raise UsageError(f"{arm.name} has no motor for {names}; add drive: to each joint, or motors:")
+        raise UsageError(f"{arm.name} has no motor for {names}; add drive: to each joint, or motors:", undriven=still)
     # In units of each joint's own pulse, so that rad and mm, or coarse and fine drives, compare.
     scale = np.abs(gain).max(axis=0)
     if np.linalg.matrix_rank(gain / scale) < arm.n:

@@ -12,12 +12,16 @@ from command_line import ROOT, THREE_DOF, run
 from sim_wire import plug_in
 
 
-def test_status_says_that_a_power_cut_cannot_be_seen() -> None:
-    said = run("status", THREE_DOF, "--port", "sim")
-    assert "motor power" in said.out
-    assert "not sensed" in said.out
-    assert "armkin stop --power-cut" in said.out
-    assert run("status", THREE_DOF, "--port", "sim", "--json").json["motor_power"] is None
+def test_status_says_that_a_power_cut_cannot_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A position that is lost anyway cannot be made wrong by a cut."""
+    plug_in(SimBoard(BOARDS["uno_cnc_shield"]), monkeypatch)
+    lost = run("status", THREE_DOF, "--port", "COM3").out
+    assert "motor power  not sensed\n" in lost
+    assert "--power-cut" not in lost
+    assert run("send", THREE_DOF, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
+    known = run("status", THREE_DOF, "--port", "COM3").out
+    assert "motor power  not sensed: after a cut the position above is wrong; armkin stop --power-cut" in known
+    assert run("status", THREE_DOF, "--port", "COM3", "--json").json["motor_power"] is None
 
 
 def test_status_tells_the_power_that_an_input_senses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -57,7 +57,9 @@ def _redundant(error: ArmkinError) -> str:
 
 
 def _incomplete(error: ArmkinError) -> str:
-    """What a shipped robot lacks is added to a copy of its file."""
+    """Where the lines to add are shown; what a shipped robot lacks is added to a copy of its file."""
+    if error.fields.get("undriven"):
+        return "armkin info ROBOT shows lines to add"
     name = error.fields.get("robot_file")
     if not error.fields.get("lines_to_add") or not name or shipped(name) is None or os.path.isfile(name):
         return error.advice

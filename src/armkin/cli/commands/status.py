@@ -59,7 +59,7 @@ def _grbl(found: dict[str, Any]) -> str:
 _POWER = {
     True: "on",
     False: "off: the position is lost",
-    None: "not sensed: after a cut the position above is wrong; armkin stop --power-cut declares it lost",
+    None: "not sensed",
 }
 
 
@@ -67,6 +67,9 @@ def _text(found: dict[str, Any]) -> str:
     high = [name for name, level in found["switches"].items() if level]
     low = [name for name, level in found["switches"].items() if not level]
     on = {True: "on", False: "off"}
+    power = _POWER[found["motor_power"]]
+    if found["motor_power"] is None and found["joints"] is not None:
+        power += ": after a cut the position above is wrong; armkin stop --power-cut declares it lost"
     rows = [
         ["board", f"{found['board']} on {found['port']}, firmware {found['firmware']}"],
         ["configured", "for this robot file" if found["configured"] else "not for this robot file"],
@@ -74,6 +77,6 @@ def _text(found: dict[str, Any]) -> str:
         ["drivers", f"{on[found['drivers_on']]}, servo pulses {on[found['servo_pulses_on']]}"],
         ["switches", f"high: {', '.join(high) or 'none'}; low: {', '.join(low) or 'none'}"],
         ["abort input", "active" if found["abort_input"] else "not active"],
-        ["motor power", _POWER[found["motor_power"]]],
+        ["motor power", power],
     ]
     return render.table(rows, left=(0, 1)) + "\n"
