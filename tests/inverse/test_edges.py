@@ -291,3 +291,13 @@ def test_no_target_is_too_odd() -> None:
         T[:, :3, 3] = targets
         s = armkin.ik(load(name), T)
         assert np.isfinite(s.q[s.valid]).all()
+
+
+def test_a_corner_of_a_self_motion_is_not_listed_beside_it() -> None:
+    """Four parallel axes in line: the self-motion ends in a posture where three directions are lost at once."""
+    arm = armkin.load("mycobot_280")
+    target = armkin.fk(arm, np.radians([180, 180, 180, 0, -90, 0]))
+    s = armkin.ik(arm, target)
+    assert s.status == Status.SINGULAR
+    assert s.free[[1, 2, 3, 5]].all()
+    assert s.valid.sum() == 1

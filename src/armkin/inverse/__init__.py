@@ -6,7 +6,8 @@ tasks/              what a target prescribes, and which task fits an arm
 recognise.py        which class an arm belongs to
 solve.py            `ik`: candidates -> residuals -> whole turns and limits -> singularities
 chunks.py           closed forms: chunks of a batch that stay in the cache; workers.py: threads that share it
-singularities.py    boundaries, singular postures, self-motions; clusters.py: roots of higher order
+singularities.py    boundaries and singular postures; clusters.py: roots of higher order
+self_motions.py     whether joints can move while the target is kept, and what lies on one self-motion
 solutions.py        the answer
 closest.py          the nearest legal pose when there is no branch
 

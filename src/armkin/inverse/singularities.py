@@ -8,19 +8,17 @@ its postures, two postures between which a third solves the target as well are o
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import clusters
+from armkin.inverse import clusters, self_motions
 from armkin.inverse.folds import BENT, folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
-    BESIDE,
     DOUBLE,
     HAIR,
     HOPELESS,
@@ -29,7 +27,6 @@ from armkin.inverse.numeric.tolerances import (
     SEED,
     SOLUTION,
     TURNED,
-    WEAK,
 )
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
@@ -38,12 +35,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
-NO_GROWTH = 1e-12  # residual that stays as it is
-STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
-STALLED = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 SURE = 1e-14  # residuals below this are equal
 OWN = -1  # label of a posture that comes from `near`
 
@@ -162,7 +155,7 @@ def _settle(
             if straight.any():
                 k, b = k[straight], b[straight]
                 lost = np.maximum(nullity[k, b], 1)
-                moves[k, b], which[k, b] = _self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
+                moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
 
     if (~asked).sum() <= AT_ONCE:
         ask(*np.nonzero(~asked))
@@ -196,8 +189,8 @@ def _settle(
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
-    _drop_contained(arm, q, sigma, chosen, curve)
-    _drop_twins(arm, task, q, chosen, np.asarray(curve.any(axis=2)), target)
+    self_motions.drop_contained(arm, task, q, sigma, chosen, curve, target)
+    self_motions.drop_twins(arm, task, q, chosen, np.asarray(curve.any(axis=2)), target)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
     out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
@@ -212,42 +205,6 @@ def _settle(
         free,
         np.asarray((loose & ~valid[:, 1:]).any(axis=1)),
     )
-
-
-def _drop_contained(arm: Arm, q: Array, sigma: Array, chosen: Bool, curve: Bool) -> None:
-    """Of self-motions through each other keep the one of more joints, and no root of high order beside one.
-
-    Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves. `near`, the first, stays.
-    """
-    for k in np.flatnonzero(curve.any(axis=(1, 2))):
-        mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
-        few = mine[curve[k, mine].sum(axis=1) <= arm.n // 2]
-        for i in np.flatnonzero(chosen[k] & (sigma[k] < WEAK) & ~curve[k].any(axis=1)):
-            away = np.where(curve[k, few], 0.0, np.abs(newton.difference(arm, q[k, few], q[k, i])))
-            chosen[k, i] = i == 0 or not (away.max(axis=1) < 10 * TURNED).any()
-        for i in mine[mine > 0]:
-            wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
-            away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
-            if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
-                chosen[k, i] = False
-
-
-def _drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, moving: Bool, target: Array) -> None:
-    """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
-
-    Groups are found around their first candidate, and reported by the one nearest to `near`.
-    """
-    for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
-        kept: list[int] = []
-        for i in np.flatnonzero(chosen[k] & moving[k]):
-            apart = newton.difference(arm, q[k, kept], q[k, i])
-            close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
-            between = q[k, i] + 0.5 * apart[close] * np.where(arm.prismatic, arm.reach, 1.0)
-            there = np.repeat(target[k : k + 1], len(between), axis=0)
-            if (newton.missing(arm, task, between, there) <= SOLUTION).any():
-                chosen[k, i] = False
-            else:
-                kept.append(int(i))
 
 
 def _onto(
@@ -289,95 +246,3 @@ def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: 
         middle = start + 0.5 * newton.difference(arm, q[k[row], column], start) * unit
         same[row, column] = newton.missing(arm, task, middle, target[k[row]]) <= SOLUTION
     return np.asarray(same)
-
-
-def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
-    """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
-    return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
-
-
-def _self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
-    """Whether the joints can move while the target is kept, and which do.
-
-    Steps along each null direction, both ways, pulled back onto the target: on a self-motion
-    they stay about as far from q as they went, and apart; from a double root they fall back, and
-    from a branch of weak Jacobian they may arrive at its neighbour. The residual may grow by `GROWTH`: a
-    target that close to a singular one is singular.
-    """
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
-    moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
-    pushes = list(_null_directions(arm.n, V, nullity))
-    who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
-    # most candidates fall back at once
-    first = STEP * (10 if len(pushes) > 1 else 1)
-    there, size = _follow(arm, task, q[who] + first * push * unit, target[who])
-    size -= newton.missing(arm, task, q, target)[who]
-    far = (np.abs(there - q[who]) / unit).max(axis=1) > 0.3 * first * np.abs(push).max(axis=1)
-    some = np.flatnonzero(far & (size <= GROWTH * first))
-    if not len(some):
-        return moving, joints
-    if len(pushes) == 1:  # of these, most do not stay on a longer way
-        who, push, grown = who[some], push[some], size[some]
-        there, size = _follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
-        size -= newton.missing(arm, task, q, target)[who]
-        far = (np.abs(there - q[who]) / unit).max(axis=1) > 3 * STEP * np.abs(push).max(axis=1)
-        some = np.flatnonzero((grown <= NO_GROWTH) | (far & (size <= GROWTH * 10 * STEP)))
-        if not len(some):
-            return moving, joints
-    who, push = who[some], push[some]
-    # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
-    sizes, ways, parts = np.ix_(*([STEP, 10 * STEP], [1.0, -1.0], [1.0, 0.6], [0.0], [0.0]))[:3]
-    start = q[who] + sizes * ways * parts * push * unit
-    goal = np.concatenate([target[who]] * 8)
-    there, size = _follow(arm, task, start.reshape(-1, arm.n), goal)
-    there, size = there.reshape(start.shape), size.reshape(start.shape[:4])
-    moved = np.abs(there[:, :, 0] - q[who]) / unit  # (2, 2, m, n)
-    least = 0.3 * np.array([[STEP], [10 * STEP]]) * np.abs(push).max(axis=1)  # (2, m)
-    apart = (np.abs(there[:, :, 0] - there[:, :, 1]) / unit).max(axis=3) > 0.3 * least[:, None]
-    grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
-    short, long = (apart & (moved.max(axis=3) > least[:, None])).all(axis=1) & (
-        grown <= GROWTH * np.array([[STEP], [10 * STEP]])
-    )
-    # Where several directions are lost at once, a short step is drawn back into the corner. Where the residual grows
-    # at all, it must do so slowly as far as the long step: near a fold the first tenth of a radian costs nothing.
-    along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & (len(pushes) > 1))
-    np.logical_or.at(moving, who, along)
-    np.logical_or.at(joints, who, along[:, None] & (moved > 1e-3 * STEP).any(axis=(0, 1)))
-    return moving, joints
-
-
-def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
-    """Which branches to push, and where: (m,) indices and (m, n) directions.
-
-    In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
-    is pushed as far as the null space lets it, pairs of joints that do without the others are, and in a plane
-    of them every joint is held.
-    """
-    for index in range(int(nullity.max())):
-        who = np.flatnonzero(nullity > index)
-        yield who, V[who, n - 1 - index]
-    plane = np.flatnonzero(nullity == 2)
-    for joint in range(n if len(plane) else 0):
-        u, v = V[plane, n - 1], V[plane, n - 2]
-        hold = v[:, joint, None] * u - u[:, joint, None] * v
-        size = np.linalg.norm(hold, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield plane[some], hold[some] / size[some, None]
-    many = np.flatnonzero(nullity > 1)
-    in_null = np.arange(n) >= n - nullity[many][:, None]
-    rest = np.eye(n) - np.einsum("mij,mi,mik->mjk", V[many], in_null, V[many])  # projection out of the null space
-    for i, j in itertools.combinations(range(n) if len(many) else (), 2):
-        # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
-        a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
-        some = (a * b - c * c < 1e-10) & (a + b > 1e-3) & (np.abs(c) > 1e-3)
-        if some.any():
-            push = np.zeros((int(some.sum()), n))
-            push[:, i], push[:, j] = b[some], -c[some]
-            yield many[some], push / np.linalg.norm(push, axis=1, keepdims=True)
-    for joint in range(n if len(many) else 0):
-        push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
-        size = np.linalg.norm(push, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield many[some], push[some] / size[some, None]

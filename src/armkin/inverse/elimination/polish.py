@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, cos_sin
+from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.linalg import nudged
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
@@ -35,7 +35,7 @@ def turn(frame: Array, q: Array, prismatic: bool) -> Array:
         out[:, :3] = frame[:, :3]
         out[:, 3] = frame[:, 3] + q * frame[:, 2]
         return out
-    c, s = cos_sin(q)
+    c, s = np.cos(q), np.sin(q)
     x, y = frame[:, 0], frame[:, 1]
     out[:, 0] = c * x + s * y
     out[:, 1] = c * y - s * x
