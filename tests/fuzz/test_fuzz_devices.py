@@ -8,6 +8,9 @@ from collections.abc import Callable
 import pytest
 from attack import attack
 
+from armkin import load
+from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.settings import wanted
 from armkin.board.ports import Port
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.grbl import Grbl
@@ -16,10 +19,12 @@ from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.board_kinds import BOARDS
 from command_line import ROOT
 
-BOARDS_OF: dict[str, Callable[[], Port]] = {
-    str(ROOT / "robots/three_dof.yaml"): lambda: SimPort(SimBoard(BOARDS["uno_cnc_shield"])),
-    str(ROOT / "tests/robots/three_dof_grbl.yaml"): lambda: Grbl(axes=4),
-    str(ROOT / "tests/robots/bus_arm.yaml"): lambda: ServoBus([Servo(number) for number in range(8)]),
+GRBL_ARM = ROOT / "tests/robots/three_dof_grbl.yaml"
+FITS = {number: value for number, (_, value) in wanted(axes_of(load(GRBL_ARM))).items()}
+BOARDS_OF: dict[str, Callable[[random.Random], Port]] = {
+    str(ROOT / "robots/three_dof.yaml"): lambda rng: SimPort(SimBoard(BOARDS["uno_cnc_shield"])),
+    str(GRBL_ARM): lambda rng: Grbl(axes=4, settings=rng.choice((FITS, {}))),
+    str(ROOT / "tests/robots/bus_arm.yaml"): lambda rng: ServoBus([Servo(number) for number in range(8)]),
 }
 SAID = (
     b"ok\r\n",
@@ -79,24 +84,30 @@ class Unreliable:
 def test_any_device(robot: str, rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = random.Random(robot.rpartition("/")[2])
     make = BOARDS_OF[robot]
-    monkeypatch.setattr("armkin.board.opening.SerialPort", lambda *given, **options: Unreliable(make(), rng))
+    for module in ("armkin.board.opening", "armkin.board.ports"):  # our firmware's; boards of others, and stop
+        monkeypatch.setattr(f"{module}.SerialPort", lambda *given, **options: Unreliable(make(rng), rng))
     codes = []
+    moved = 0
     for _ in range(rounds):
+        assume = rng.choice(((), ("--assume-home",))) if "bus" not in robot else ()
         words = rng.choice(
             (
                 ("send", robot, "home", "--assume-home"),
-                ("send", robot, *(round(rng.uniform(-20, 20), 1) for _ in range(2 if "bus" in robot else 3))),
-                ("send", robot, "--batch", "-"),
+                ("send", robot, *(round(rng.uniform(-20, 20), 1) for _ in range(2 if "bus" in robot else 3)), *assume),
+                ("send", robot, "--batch", "-", *assume),
                 ("status", robot),
                 ("home", robot),
-                ("jog", robot, "q1" if "bus" not in robot else "shoulder", rng.choice((-5, 5))),
+                ("jog", robot, "q1" if "bus" not in robot else "j1", rng.choice((-5, 5))),
                 ("stop",),
                 ("grip", robot, "closed", "--assume", "open"),
                 ("setup", robot),
-                ("path", robot, "--via", "390,80,300", "--via", "390,100,300"),
+                ("path", robot, "--via", "390,80,300", "--via", "390,100,300", *assume),
             )
         )
         stdin = b"0,85,-85\n5,80,-80\n" if "bus" not in robot else b"1,2\n3,4\n"
         done = attack(*words, "--port", "fuzzed", *(["--json"] if words[0] != "stop" else []), stdin=stdin)
+        assert "no port fuzzed" not in done.err, words
         codes.append(done.code)
+        moved += done.code == 0 and words[0] in ("send", "path") and "home" not in words
     assert {0, 5} <= set(codes)
+    assert moved
