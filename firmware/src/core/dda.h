@@ -22,8 +22,9 @@ typedef uint16_t axes_t;
 #endif
 
 enum { LAST = 1 << (8 * sizeof(axes_t) - 1) };  // in `back`: the motion may rest after this segment
-enum { QUICK = LAST >> 1 };                     // in `back`: `bend` counts with every tick
+enum { QUICK = 1 << (8 * sizeof(axes_t) - 2) };  // in `back`: `bend` counts with every tick
 _Static_assert(AXES < 8 * sizeof(axes_t) - 1, "two bits are LAST and QUICK");
+_Static_assert(((axes_t)LAST & (axes_t)QUICK) == 0, "one is not the other, where an int has 16 bits, too");
 
 enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
 
