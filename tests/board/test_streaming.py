@@ -92,8 +92,10 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
     assert found == pytest.approx([0.00525, 0.012, 0.075, 0.6])
     assert streaming.lead(session, 0.7) == 0.7
     session.port.simulated, session.line.slowest = False, 0.0
-    for load, seconds in ((1.5, 0.25), (0.7, 0.1), (0.3, 0.003)):
-        monkeypatch.setattr("os.getloadavg", lambda load=load: (load * (os.cpu_count() or 1), 0.0, 0.0))
+    cores = os.cpu_count() or 1
+    for mean, now, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.003), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
+        monkeypatch.setattr("os.getloadavg", lambda mean=mean: (mean * cores, 0.0, 0.0))
+        monkeypatch.setattr(streaming, "_others_running", lambda now=now: now * cores)
         assert streaming.lead(session) == seconds
     session.line.resent = 1
     assert streaming.lead(session) > 0.5

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.firmware import protocol
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 # [s] that the arm stands while the queue begins to fill: what the frames of a ramp's first 10 ms take, and 4.5 times
 # the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a bad line.
 _LEAD, _LEAD_ANSWERS, _LEAD_MOST, _LEAD_BAD = 0.003, 4.5, 0.6, 0.51
-_LEAD_BUSY = ((1.0, 0.25), (0.5, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
+_LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
@@ -126,7 +127,15 @@ def _load(session: Session) -> float:
     """Programs that want to run, for each processor: above 1 this one may have to wait for its turn."""
     if session.port.simulated or not hasattr(os, "getloadavg"):
         return 0.0
-    return os.getloadavg()[0] / (os.cpu_count() or 1)
+    return max(os.getloadavg()[0], _others_running()) / (os.cpu_count() or 1)
+
+
+def _others_running() -> int:
+    """Programs besides this one that run at this moment, which the mean over a minute tells late; 0 if not known."""
+    try:
+        return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0]) - 1
+    except (OSError, LookupError, ValueError):  # Linux alone has it
+        return 0
 
 
 def lead(session: Session, least: float = 0.0) -> float:
