@@ -35,13 +35,13 @@ class Result(NamedTuple):
         return [json.loads(line) for line in self.out.splitlines()]
 
 
-def run(*words: object, stdin: bytes = b"") -> Result:
-    """Run a command line in this process, from the project's folder."""
+def run(*words: object, stdin: bytes = b"", cwd: Path = ROOT) -> Result:
+    """Run a command line in this process, from the project's folder or another."""
     from armkin.cli.app import run as run_app
 
     out, err, before, folder = io.StringIO(), io.StringIO(), sys.stdin, Path.cwd()
     sys.stdin = io.TextIOWrapper(io.BytesIO(stdin))
-    os.chdir(ROOT)
+    os.chdir(cwd)
     try:
         with redirect_stdout(out), redirect_stderr(err):
             code = run_app([str(word) for word in words])

@@ -95,11 +95,10 @@ def test_the_comments_become_keys_when_they_are_taken_out() -> None:
     ],
 )
 def test_what_is_wrong_is_told_and_nothing_is_written(words: list[str], says: str, tmp_path: Path) -> None:
-    before = sorted(ROOT.iterdir())
-    result = run("new", *words)
+    result = run("new", *words, cwd=tmp_path)
     assert result.code == 2
     assert says in result.err
-    assert sorted(ROOT.iterdir()) == before
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
