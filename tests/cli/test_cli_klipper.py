@@ -98,7 +98,7 @@ def test_what_cannot_be_done_is_refused(
 def test_a_socket_that_nobody_listens_on_and_one_that_is_not_klipper_s(tmp_path: Path) -> None:
     class Other(Klipper):
         def write(self, data: bytes) -> None:
-            self._said += b"HTTP/1.1 400 Bad Request\r\n\r\n\x03"
+            self._out += b"HTTP/1.1 400 Bad Request\r\n\r\n\x03"
 
     board, path = Other(settings_of(AXES)), tmp_path / "other.sock"
     with UnixPort(board, path) as port:

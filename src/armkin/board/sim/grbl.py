@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from armkin.board.grbl.replies import LETTERS, RX_BUFFER
+from armkin.board.sim.clock import SimulatedTime
 
-STEP = 0.004  # [s] of simulated time
 BLOCKS = 15  # planner blocks
 
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
@@ -36,17 +36,17 @@ class Block:
 
 
 @dataclass
-class Grbl:
+class Grbl(SimulatedTime):
     """The port of a simulated GRBL board."""
 
     axes: int = 3
     name: str = "sim"
     settings: dict[int, float] = field(default_factory=dict)
     ends: Mapping[int, int] = field(default_factory=dict)  # axis -> steps where its switch closes
-    simulated: bool = True
     baud: int = 115_200
 
     def __post_init__(self) -> None:
+        super().__init__()
         defaults = {1: 25, 3: 0, 10: 1, 13: 0, 20: 0, 21: 0, 22: 0, 23: 0, 25: 20, 27: 1, 30: 1000, 31: 0, 32: 0}
         for k in range(self.axes):
             defaults |= {100 + k: 250, 110 + k: 500, 120 + k: 10, 130 + k: 200}
@@ -54,8 +54,6 @@ class Grbl:
         self.steps = [0] * self.axes
         self.history: list[tuple[float, tuple[int, ...]]] = []  # every change of the steps
         self.dead = False  # unplugged
-        self._now = 0.0
-        self._out = bytearray()
         self.boot()
 
     def boot(self, *, power: bool = True) -> None:
@@ -76,21 +74,6 @@ class Grbl:
         """Send bytes: single-byte commands act at once, lines wait their turn."""
         for byte in b"" if self.dead else data:
             self._receive(byte)
-
-    def read(self, timeout: float) -> bytes:
-        """What GRBL has said; simulated time passes while it says nothing."""
-        end = self._now + timeout
-        while not self._out and self._now < end:
-            self.advance(STEP)
-        data, self._out = bytes(self._out), bytearray()
-        return data
-
-    def now(self) -> float:
-        """Simulated seconds."""
-        return self._now
-
-    def close(self) -> None:
-        """Nothing to give back."""
 
     def advance(self, seconds: float) -> None:
         """Let time pass: run blocks, take lines that have room."""

@@ -12,11 +12,12 @@ import math
 import re
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+from armkin.board.sim.clock import SimulatedTime
+
 END = b"\x03"
-STEP = 0.004  # [s] of simulated time
 AHEAD = 1.0  # [s] that the queue holds
 
 
@@ -46,19 +47,16 @@ class Move:
 
 
 @dataclass
-class Klipper:
+class Klipper(SimulatedTime):
     """The port of a simulated Klipper."""
 
     settings: Mapping[str, Mapping[str, Any]]  # of printer.cfg: section -> option -> value
     name: str = "sim"
-    simulated: bool = True
     baud: int = 0
 
-    _now: float = 0.0
-    _heard: bytes = b""
-    _said: bytearray = field(default_factory=bytearray)
-
     def __post_init__(self) -> None:
+        super().__init__()
+        self._heard = b""
         self.dead = False  # unplugged
         self.restart()
 
@@ -87,20 +85,9 @@ class Klipper:
             self._requests.append(json.loads(part))
 
     def read(self, timeout: float) -> bytes:
-        """What Klipper has said; simulated time passes while it says nothing."""
-        end = self._now + timeout
+        """What Klipper has said, requests that wait for no time answered first."""
         self.advance(0.0)
-        while not self._said and self._now < end:
-            self.advance(STEP)
-        data, self._said = bytes(self._said), bytearray()
-        return data
-
-    def now(self) -> float:
-        """Simulated seconds."""
-        return self._now
-
-    def close(self) -> None:
-        """Nothing to give back."""
+        return super().read(timeout)
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""
@@ -150,7 +137,7 @@ class Klipper:
         return True
 
     def _say(self, message: dict[str, Any]) -> None:
-        self._said += json.dumps(message).encode() + END
+        self._out += json.dumps(message).encode() + END
 
     def _status(self) -> dict[str, Any]:
         letters = {self.steppers[name].letter: 4 + k for k, name in enumerate(self.axes)}

@@ -21,8 +21,8 @@ from armkin.board.feetech.registers import (
     VOLTAGE,
     Register,
 )
+from armkin.board.sim.clock import SimulatedTime
 
-STEP = 0.001  # [s] of simulated time
 PAUSE = 0.002  # [s] between the bytes of a packet at most
 FASTEST = 3400  # [counts/s] that a servo makes
 
@@ -77,21 +77,21 @@ class Noise(NamedTuple):
     seed: int = 1
 
 
-class ServoBus:
+class ServoBus(SimulatedTime):
     """The port of a bus of simulated servos; whatever the host writes echoes nowhere."""
 
-    simulated = True
+    step = 0.001
     baud = 1_000_000
 
     def __init__(self, servos: Iterable[Servo], name: str = "sim", noise: Noise | None = None) -> None:
+        super().__init__()
         self.name = name
         self.servos = {servo.number: servo for servo in servos}
         self.log: list[tuple[float, dict[int, float]]] = []  # where the shafts stood: every millisecond of a motion
         self._noise = noise or Noise()
         self._random = random.Random(self._noise.seed)
         self._splitter = Splitter()
-        self._out = bytearray()
-        self._now = self._heard = 0.0
+        self._heard = 0.0
 
     def write(self, data: bytes) -> None:
         """Send bytes to the bus; a servo forgets the beginning of a packet after a pause."""
@@ -100,21 +100,6 @@ class ServoBus:
         self._heard = self._now
         for question in self._splitter.feed(self._spoilt(data)):
             self._obey(question.id, question.errors, question.data)
-
-    def read(self, timeout: float) -> bytes:
-        """What servos have answered; simulated time passes while nothing has come."""
-        end = self._now + timeout
-        while not self._out and self._now < end:
-            self.advance(STEP)
-        data, self._out = bytes(self._out), bytearray()
-        return data
-
-    def now(self) -> float:
-        """Simulated seconds."""
-        return self._now
-
-    def close(self) -> None:
-        """Nothing to give back."""
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass."""
