@@ -6,7 +6,7 @@ at once; the servos' own regulators follow. A lost packet is made up for by the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, braking
+from armkin.board.backend.job import Job, JobMachine, braking
 from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
 from armkin.errors import LinkError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
-from armkin.motion.plan import plan as plan_joints
-from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ def servo_ids(arm: Arm) -> list[int]:
     return ids
 
 
-class ServoMachine:
+class ServoMachine(JobMachine):
     """An arm of bus servos behind an open port."""
 
     differences = (
@@ -93,14 +91,6 @@ class ServoMachine:
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)
-
-    def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
-        return joints_of(self.arm, self._counts)
-
-    def refresh(self) -> None:
-        """Read again where the arm stands."""
-        self._read()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -158,11 +148,6 @@ class ServoMachine:
         return not self._stop()
 
     # Moving
-
-    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
-        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        counts = np.asarray(start, dtype=np.int64)
-        return job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job
+from armkin.board.backend.job import Job, JobMachine
 from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.session import GrblError, Session
@@ -22,8 +22,6 @@ from armkin.board.grbl.spindle import Spindle
 from armkin.board.grbl.watch import Watch
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
-from armkin.motion.plan import plan as plan_joints
-from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
@@ -40,7 +38,7 @@ _REST = 30.0  # [s] that a hold may take
 _FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second
 
 
-class GrblMachine:
+class GrblMachine(JobMachine):
     """An arm on the GRBL board behind an open port."""
 
     differences = (
@@ -69,14 +67,6 @@ class GrblMachine:
         """Counts of the arm's motors, as last read."""
         offset = np.zeros(len(self.axes), dtype=np.int64) if self._offset is None else self._offset
         return tuple(int(steps) for steps in _steps(self.session.report, self.axes) - offset)
-
-    def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
-        return joints_of(self.arm, self.counts())
-
-    def refresh(self) -> None:
-        """Read again where the arm stands."""
-        self._read()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -152,11 +142,6 @@ class GrblMachine:
         self.session.ask(f"G92{words}")
 
     # Moving
-
-    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
-        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        counts = np.asarray(start, dtype=np.int64)
-        return gcode.job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""

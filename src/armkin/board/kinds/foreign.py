@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.job import planned
 from armkin.board_kinds import ForeignBoard
 from armkin.errors import LinkError, UsageError
-from armkin.motion.plan import plan as plan_joints
-from armkin.motors import joints
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
@@ -81,8 +80,7 @@ class Foreign(ABC):
 
     def plan(self, start: Sequence[int], targets: Array, speed: float) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        counts = np.asarray(start, dtype=np.int64)
-        return self.lay(plan_joints(self.arm, joints(self.arm, counts), targets, speed=speed), counts)
+        return self.lay(*planned(self.arm, start, targets, speed))
 
     def go_home(self, machine: Backend) -> None:
         """Move to the home pose from where the arm stands."""

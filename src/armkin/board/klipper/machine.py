@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, braking
+from armkin.board.backend.job import Job, JobMachine, braking
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
 from armkin.board.klipper.axes import Axis, Difference, axes_of, differences
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
-from armkin.motion.plan import plan as plan_joints
-from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
@@ -42,7 +40,7 @@ def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     return Job(trajectory, start, gcode.segments(trajectory))
 
 
-class KlipperMachine:
+class KlipperMachine(JobMachine):
     """An arm behind the socket of Klipper's API server."""
 
     differences = (
@@ -71,14 +69,6 @@ class KlipperMachine:
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)
-
-    def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
-        return joints_of(self.arm, self._counts)
-
-    def refresh(self) -> None:
-        """Read again where the arm stands."""
-        self._read()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -133,11 +123,6 @@ class KlipperMachine:
             raise LinkError("Klipper did not take the arm's position: is it older than November 2025? Update it")
 
     # Moving
-
-    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
-        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        counts = np.asarray(start, dtype=np.int64)
-        return job(plan_joints(self.arm, joints_of(self.arm, counts), targets, speed=speed), counts)
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
