@@ -6,6 +6,7 @@ import os
 import threading
 import time
 import tty
+from collections.abc import Callable
 from typing import Protocol, Self
 
 
@@ -22,18 +23,17 @@ class Simulated(Protocol):
         """Simulated seconds."""
 
 
-class Pty:
-    """A pseudo-terminal from `with` to the end of its block, served by a thread; `name` is what a program opens."""
+class Served:
+    """What serves a name that other programs open, from `with` to the end of its block, in a thread."""
+
+    name: str
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self._end = threading.Event()
 
     def __enter__(self) -> Self:
-        self._master, self._slave = os.openpty()  # the slave stays open: else the master fails between programs
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.name = os.ttyname(self._slave)
+        self._open()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
         return self
@@ -41,32 +41,57 @@ class Pty:
     def __exit__(self, *error: object) -> None:
         self._end.set()
         self._thread.join()
-        os.close(self._slave)
-        os.close(self._master)
+        self._close()
+
+    def _open(self) -> None:
+        raise NotImplementedError
+
+    def _close(self) -> None:
+        raise NotImplementedError
 
     def _serve(self) -> None:
         raise NotImplementedError
 
+    def _talk(self, board: Simulated, receive: Callable[[], bytes], send: Callable[[bytes], object]) -> None:
+        """Let the board and a program talk, the board's seconds being real ones, until the program closes its end."""
+        began = time.monotonic() - board.now()
+        while not self._end.is_set():
+            try:
+                heard = receive()
+                if not heard:
+                    return
+            except BlockingIOError:
+                heard = b""
+            with self.lock:
+                if heard:
+                    board.write(heard)
+                said = board.read(max(0.0, time.monotonic() - began - board.now()))
+            if said:
+                send(said)
+            elif not heard:
+                time.sleep(0.0005)
+
+
+class Pty(Served):
+    """A pseudo-terminal."""
+
+    def _open(self) -> None:
+        self._master, self._slave = os.openpty()  # the slave stays open: else the master fails between programs
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.name = os.ttyname(self._slave)
+
+    def _close(self) -> None:
+        os.close(self._slave)
+        os.close(self._master)
+
 
 class PtyPort(Pty):
-    """A simulated port behind it."""
+    """A simulated port behind a pseudo-terminal."""
 
     def __init__(self, board: Simulated) -> None:
         super().__init__()
         self.board = board
 
     def _serve(self) -> None:
-        began = time.monotonic() - self.board.now()
-        while not self._end.is_set():
-            try:
-                heard = os.read(self._master, 4096)
-            except BlockingIOError:
-                heard = b""
-            with self.lock:
-                if heard:
-                    self.board.write(heard)
-                said = self.board.read(max(0.0, time.monotonic() - began - self.board.now()))
-            if said:
-                os.write(self._master, said)
-            elif not heard:
-                time.sleep(0.0005)
+        self._talk(self.board, lambda: os.read(self._master, 4096), lambda said: os.write(self._master, said))
