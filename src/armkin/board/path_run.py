@@ -66,4 +66,4 @@ def _grip(machine: Backend, name: str, value: str | float) -> None:
         return
     board = foreign(machine.arm)
     assert board is not None
-    board.grip(machine, board.grip_value(value))
+    board.grip(machine, value)

@@ -139,10 +139,9 @@ def held(machine: Backend, resume: bool) -> Note | None:
 
 def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
     """The arm's board: one with armkin's firmware, or a foreign one; rehearsal: see `configure`."""
-    from armkin.board.firmware.configuration import configure
-    from armkin.board.kinds import foreign
+    from armkin.board import kinds
 
-    return foreign(arm) or configure(arm, rehearsal=rehearsal)
+    return kinds.board_of(arm, rehearsal=rehearsal)
 
 
 def simulated(assume: str | None) -> str:

@@ -213,7 +213,7 @@ class BoardActions:
     def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
         board = self.thread.board
         if isinstance(board, Foreign):
-            board.grip(machine, board.grip_value(value))
+            board.grip(machine, value)
             return
         assert isinstance(machine, Machine)
         grip = gripping.gripper_of(self.arm.name, machine.configuration)

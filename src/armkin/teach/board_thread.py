@@ -13,10 +13,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, StoppedError
-from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.homing import switches
 from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import Foreign, foreign
+from armkin.board.kinds import Foreign, board_of
 from armkin.board.opening import open_port
 from armkin.board.ports import BAUD, SIM, SerialPort
 from armkin.board.sim.port import Paced
@@ -42,7 +41,7 @@ class BoardThread:
     def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
         self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
-        self.board: Configuration | Foreign = foreign(arm) or configure(arm, rehearsal=port == SIM)
+        self.board: Configuration | Foreign = board_of(arm, rehearsal=port == SIM)
         self.link: Port | None = None
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it

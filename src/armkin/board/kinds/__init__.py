@@ -10,9 +10,20 @@ from armkin.errors import UsageError
 from armkin.motion.plan import rate_lines
 
 if TYPE_CHECKING:
+    from armkin.board.firmware.configuration import Configuration
     from armkin.model.arm import Arm
 
-__all__ = ["Foreign", "foreign"]
+__all__ = ["Foreign", "board_of", "foreign"]
+
+
+def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
+    """The arm's board: a foreign one, or one with armkin's firmware; rehearsal: see `configure`.
+
+    Raises UsageError, naming what is missing, if the arm cannot be driven.
+    """
+    from armkin.board.firmware.configuration import configure
+
+    return foreign(arm) or configure(arm, rehearsal=rehearsal)
 
 
 def foreign(arm: Arm) -> Foreign | None:

@@ -60,7 +60,7 @@ class ServoBusBoard(Foreign):
         """Raise UsageError: servos need no homing."""
         raise UsageError("bus servos know their position: there is nothing to home")
 
-    def grip(self, machine: Backend, value: float) -> float:
+    def grip(self, machine: Backend, value: str | float) -> float:
         """Move the gripper, and return where it comes to rest."""
         assert isinstance(machine, ServoMachine)
         return machine.grip(self.gripper(), self.grip_value(value))

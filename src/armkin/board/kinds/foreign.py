@@ -60,7 +60,7 @@ class Foreign(ABC):
         Raises UsageError, before anything moves, for what does not home, or not this arm.
         """
 
-    def grip(self, machine: Backend, value: float) -> float:
+    def grip(self, machine: Backend, value: str | float) -> float:
         """Move the gripper, and return where it comes to rest; of GRBL, which measures nothing, what was sent."""
         raise self._no_gripper()
 

@@ -71,7 +71,7 @@ class GrblBoard(Foreign):
         at = units.joints_in(arm, [homing.at for homing in arm.homing if homing is not None])
         machine.home(pulses(arm, at).tolist())
 
-    def grip(self, machine: Backend, value: float) -> float:
+    def grip(self, machine: Backend, value: str | float) -> float:
         """Move the gripper, and return what was sent: GRBL measures nothing."""
         assert isinstance(machine, GrblMachine)
         return machine.grip(self.gripper(), self.grip_value(value))
