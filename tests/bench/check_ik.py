@@ -27,7 +27,7 @@ from checks import Array, Report, examine, not_found, random_joints
 from geometries import CLASSES, random_case, right_angles
 from geometries import case as case_of
 from test_every_branch import NAMES, shipped
-from test_near import OFF, moved
+from test_nearly_special import OFF, moved
 
 import armkin
 from armkin.errors import UsageError

@@ -1,151 +1,67 @@
-"""Classification that does not break: axes off by anything between rounding and a thousandth."""
+"""`near`: a batch of them is one by one, and a posture that solves its target stays, on its limits, too."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from checks import Report, examine, random_joints
-from geometries import random_case
-from oracle import Screws, rotation, shift
-from test_every_branch import shipped
+import truth
+from oracle import distance, goal
+from test_every_branch import NAMES, shipped
 
 import armkin
-from armkin.model.arm import Arm
-
-OFF = (1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3)
-
-
-def moved(arm: Arm, off: float, seed: int) -> tuple[Arm, Screws]:
-    """Every axis turned and shifted a little, by up to `off` [rad] and a third of `off` [of the reach]."""
-    rng = np.random.default_rng(seed)
-    link = arm.link.copy()
-    for i in range(1, arm.n):
-        x, y = np.degrees(off * rng.uniform(-1, 1, 2))
-        link[i] = link[i] @ rotation("x", x) @ rotation("y", y) @ shift(*(off * arm.reach / 3 * rng.uniform(-1, 1, 3)))
-    P, w, p = np.eye(4), [], []
-    for i in range(arm.n):
-        P = P @ link[i]
-        w.append(P[:3, 2])
-        p.append(P[:3, 3])
-    return replace(arm, link=link), Screws(np.array(w), np.array(p), arm.prismatic, P @ link[-1])
+from armkin import Status
+from armkin.inverse.recognise import solver
 
 
-def check(name: str, off: float, seed: int, count: int) -> Report:
-    case = random_case(name, seed)
-    arm, screw = moved(case.arm, off, seed)
-    report = examine(arm, screw, case.task, random_joints(screw, count, seed))
-    assert not report.lost.any(), f"{off:.0e}: {report.lost.sum()} lost; {report.weak[report.lost]}"
-    assert report.mm < 1e-9 * arm.reach
-    assert report.deg < 1e-9
-    assert report.duplicates == 0
-    return report
+@pytest.mark.parametrize("name", NAMES)
+def test_near_as_a_batch_is_near_one_by_one(name: str) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(4)
+    q = rng.uniform(-1, 1, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 4, np.pi)
+    q = np.concatenate([q, truth.round_postures(arm, 90, 8, seed=3), truth.round_postures(arm, 45, 8, seed=3)])
+    target = goal(task, screw, q).array()
+    near = q + (rng.random((32, 1)) < 0.7) * rng.normal(size=q.shape) * np.where(arm.prismatic, 50.0, 1.0)
+    many = armkin.ik(arm, target, near=near)
+    for k in range(32):
+        one = armkin.ik(arm, target[k], near=near[k])
+        assert (one.status, one.complete) == (many.status[k], many.complete[k])
+        assert one.free.tolist() == many.free[k].tolist()
+        assert one.valid.sum() == many.valid[k].sum()
+        assert one.within_limits.sum() == many.within_limits[k].sum()
+        assert (one.best < 0) == (many.best[k] < 0)
+        if one.best >= 0:
+            assert abs(one.motion[one.best] - many.motion[k, many.best[k]]) < 1e-4
+        if one.valid.any():  # roots of a round target come in any order
+            apart = distance(screw, one.q[one.valid][:, None], many.q[k][many.valid[k]][None])
+            assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-5
 
 
-@pytest.mark.parametrize("off", OFF)
-@pytest.mark.parametrize(
-    "name",
-    [
-        "RRR 1 || 2", "RRR 2 || 3", "RRR 1 meets 2", "RRR 2 meets 3", "RRR orthogonal, 1 meets 2",
-        "RRR anthropomorphic",
-        "RPR right angles", "PRR right angles", "RRP spherical", "RPP cylindrical",
-        "planar RR", "planar RRR", "planar RRP", "planar PRR", "planar PRP", "SCARA, P at 1", "SCARA, P at 3",
-        "pitch arm, 4 joints, usual table", "pitch arm, 5 joints, usual table", "pitch arm, 4 joints, slide first",
-    ],
-)  # fmt: skip
-def test_short_arms(name: str, off: float) -> None:
-    for seed in range(2):
-        check(name, off, seed, 40)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_posture_on_its_limits_stays_where_its_target_is_rounded(name: str) -> None:
+    """The exact answer for a rounded target may lie beyond the limit that `near`, which solves it, too, is on."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(12)
+    q = rng.uniform(np.clip(arm.lower, -np.pi, np.pi), np.clip(arm.upper, -np.pi, np.pi), (30, arm.n))
+    on = rng.random(q.shape) < 0.5
+    ends = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
+    q = np.where(on & np.isfinite(ends), ends, q)
+    target = goal(task, screw, q).array()
+    kinds = {f"{n} digits": truth.typed(task, target, n) for n in (11, 12)}
+    verdict, what = truth.judged(
+        arm, screw, dict.fromkeys(kinds, q), np.concatenate(list(kinds.values())), np.tile(q, (2, 1))
+    )
+    verdict.lost = []
+    assert verdict, what
 
 
-@pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
-@pytest.mark.parametrize(
-    "name",
-    [
-        "spherical wrist, elbow",
-        "RPR and spherical wrist",
-        "spherical shoulder",
-        "UR table",
-        "three parallel axes 3, 4, 5",
-    ],
-)
-def test_six_joints(name: str, off: float) -> None:
-    report = check(name, off, 1, 30)
-    # nobody claims to have proved what rests on the neighbour of an arm
-    s = report.solutions
-    assert s.complete.any() == (not s.method.startswith("near"))
-    if off > 1e-12 and s.method.startswith("near"):
-        assert "corrected on the true arm" in s.why
-
-
-@pytest.mark.parametrize(
-    "name", ["spherical wrist, elbow", "UR table", "pitch arm, 5 joints, usual table", "RRR 1 || 2"]
-)
-def test_as_many_branches_as_the_ideal_arm(name: str) -> None:
-    """Away from singular postures a small change of the arm neither makes nor loses branches."""
-    case = random_case(name, 3)
-    q = random_joints(case.screw, 60, 2)
-    ideal = examine(case.arm, case.screw, case.task, q)
-    arm, screw = moved(case.arm, 1e-8, 4)
-    report = examine(arm, screw, case.task, q)
-    strong = (ideal.weak > 1e-2) & (report.weak > 1e-2)
-    assert strong.sum() > 20
-    same = ideal.counts[strong] == report.counts[strong]
-    assert same.mean() > 0.95  # others of their branches may be near a singularity
-
-
-def test_names_of_near_arms_are_those_of_the_ideal_one() -> None:
-    case = random_case("spherical wrist, elbow", 0)
-    q = random_joints(case.screw, 50, 3)
-    ideal = examine(case.arm, case.screw, case.task, q).solutions
-    arm, screw = moved(case.arm, 1e-7, 0)
-    near = examine(arm, screw, case.task, q).solutions
-    assert not near.method.startswith("spherical")  # the elimination, or the class's own branches corrected
-    for k in range(50):
-        for b in np.flatnonzero(near.valid[k]):
-            d = ideal.q[k] - near.q[k, b]
-            d = np.abs(d - 2 * np.pi * np.rint(d / (2 * np.pi))).max(axis=1)
-            if np.nanmin(d) < 1e-4:
-                twin = int(np.nanargmin(d))
-                assert ideal.names[ideal.branch[k, twin]] == near.names[near.branch[k, b]]
-
-
-def test_rounded_tables() -> None:
-    """pi/2 as 1.5708 and 90 as 89.99998: all eight branches of a Puma."""
-    from geometries import case
-
-    angle = float(np.degrees(1.5708))
-    rows = [(angle, 0, 0), (0, 431.8, 0), (-angle, 20.3, 150.05), (angle, 0, 431.8), (-angle, 0, 0), (0, 0, 56.25)]
-    joints = [{"dh": {"alpha": al, "a": a, "d": d, "theta": 0}} for al, a, d in rows]
-    c = case({"convention": "standard", "joints": joints}, "pose")
-    report = examine(c.arm, c.screw, c.task, random_joints(c.screw, 200, 7))
-    assert not report.lost.any()
-    assert report.counts.mean() > 7.9
-    assert report.mm < 1e-9
-
-
-@pytest.mark.parametrize("off", [1e-8, 1e-5, 1e-3])
-@pytest.mark.parametrize("name", ["three_dof", "labvolt_5150", "ur5e", "irb120"])
-def test_singular_neighbourhoods(name: str, off: float) -> None:
-    """Some poses of thousands lie as close to a singularity as the arm to its class; none is lost."""
-    arm, screw = moved(shipped(name)[0], off, 1)
-    report = examine(arm, screw, None, random_joints(screw, 3000, 1))
-    assert not report.lost.any(), f"{report.weak[report.lost]}"
-
-
-def test_folds_far_apart() -> None:
-    """A sliding pitch arm 1e-3 off: the two branches of a fold lie half a radian apart."""
-    case = random_case("pitch arm, 5 joints, slide first", 12)
-    arm, screw = moved(case.arm, 1e-3, 12)
-    report = examine(arm, screw, case.task, random_joints(screw, 1000, 12))
-    assert not report.lost.any()
-
-
-@pytest.mark.parametrize("name", ["planar RR", "SCARA, P at 1", "pitch arm, 5 joints", "UR table"])
-def test_no_target_at_all(name: str) -> None:
-    case = random_case(name, 1)
-    arm, screw = moved(case.arm, 1e-5, 1)
-    one = examine(arm, screw, case.task, random_joints(screw, 1, 1))
-    s = armkin.ik(arm, one.goals.array()[:0], case.task)
-    assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), one.solutions.method)
+def test_a_posture_on_its_limit_stays_alone_and_in_a_batch() -> None:
+    arm = shipped("kuka_kr6_r700")[0]
+    q = np.radians([0.0, 45.0, 0.0, 0.0, 90.0, 0.0])
+    T = armkin.fk(arm, q)
+    T[:3, 3] = np.round(T[:3, 3], 6)
+    one, many = armkin.ik(arm, T, near=q), armkin.ik(arm, np.stack([T] * 3), near=q)
+    np.testing.assert_allclose(one.q[one.best], q, atol=1e-12)
+    np.testing.assert_allclose(many.q[np.arange(3), many.best], [q] * 3, atol=1e-12)
+    assert one.status == Status.EXACT

@@ -43,6 +43,22 @@ def test_nearest_legal_copy(limits: tuple[float, float], value: float, near: flo
         assert abs(got[0] - near) == pytest.approx(np.abs(legal - near).min(), abs=1e-8)
 
 
+def test_copies_are_the_legal_ones_nearest_to_near() -> None:
+    """Against all copies, for limits of every kind."""
+    rng = np.random.default_rng(5)
+    value = np.concatenate([rng.uniform(-np.pi, np.pi, 300), [np.pi, -np.pi, 0.0]])
+    near = rng.uniform(-10, 10, len(value))
+    turns = value[:, None] + 2 * np.pi * np.arange(-6, 7)
+    for low, high in ((-np.pi, 2.0), (-2.0, np.pi), (-np.pi, np.pi), (-7, 1), (-1, 7), (-20, 20), (2, 5), (-9, -4)):
+        copy, ok = nearest_copy(value, near, float(low), float(high))
+        legal = (turns >= low - 1e-9) & (turns <= high + 1e-9)
+        assert (np.broadcast_to(ok, value.shape) == legal.any(axis=1)).all(), (low, high)
+        apart = np.where(legal, np.abs(turns - near[:, None]), np.inf).min(axis=1)
+        some = legal.any(axis=1)
+        np.testing.assert_allclose(np.abs(copy - near)[some], apart[some], atol=1e-9)
+        np.testing.assert_allclose(copy[~some], value[~some], atol=1e-12)
+
+
 def planar(limits: list[tuple[float, float]]) -> armkin.Arm:
     """Two planar links of 200 and 300 mm with these limits [deg]."""
     link = np.tile(np.eye(4), (3, 1, 1))

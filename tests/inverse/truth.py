@@ -235,6 +235,17 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     return verdict
 
 
+def judged(
+    arm: Arm, screw: Screws, kinds: dict[str, Array], target: Array, near: Array | None = None
+) -> tuple[Verdict, str]:
+    """Postures of several kinds and their targets, all judged in one call; and of which kind the wrong ones are."""
+    q = np.concatenate(list(kinds.values()))
+    verdict = judge(arm, screw, None, q, target, near)
+    kind = np.repeat(list(kinds), [len(each) for each in kinds.values()])
+    wrong = {*verdict.unreachable, *verdict.lost, *verdict.false, *verdict.twice, *verdict.moves}
+    return verdict, f"{sorted({str(kind[k]) for k in wrong})}: {verdict}"
+
+
 def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     """Whether the posture between two (M, n) solves the target: (M,)."""
     return np.asarray(miss_of(arm, screw, goals, a + 0.5 * _way(screw, a, b)) < 0.9 * SOLVES)

@@ -1,0 +1,174 @@
+"""Targets at which several things meet: crossing self-motions, roots of high order, pencils that say nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import truth
+from geometries import case, right_angles
+from oracle import goal
+from test_every_branch import shipped
+
+import armkin
+from armkin import Status
+from armkin.inverse.recognise import solver
+
+
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        # two postures of one self-motion, grouped around others
+        ("thor", [-135, 135, 0, 0, 0, 90]),
+        ("iiwa7", [135, 135, 0, 180, 180, 90]),
+        ("ur10e", [90, 90, 0, 90, 180, 180]),
+        # a self-motion that meets the one which the preferred joint 1 gives
+        ("wx250s", [-90, -90, 90, 180, 180, -90]),
+        ("wx250s", [-135, 90, 90, 45, 0, -45]),
+        # self-motions and double roots that the elimination misses at the target itself
+        ("fanuc_crx10ia", [0, 90, -90, 0, 0, 90]),
+        ("fanuc_crx10ia", [0, 0, 180, -90, 180, 90]),
+        ("fanuc_crx10ia", [0, 0, 135, 90, 0, -45]),
+        ("fanuc_crx10ia", [180, 90, -90, 0, 45, 180]),
+        ("fanuc_crx10ia", [0, -90, 45, -90, 0, -135]),
+        ("jaco_j2n6s300", [-90, 180, 0, -90, 0, 0]),
+        ("jaco_j2n6s300", [45, 45, -135, 90, 0, -45]),
+        # axes 1 and 4 in one line, among three lost directions
+        ("fanuc_crx10ia", [0, 180, 90, -90, 180, -90]),
+        ("fanuc_crx10ia", [90, 0, 90, 180, 180, 0]),
+        # a root of third order on the self-motion of joints 1 and 4: points beside it are no branches
+        ("fanuc_crx10ia", [135, 0, 90, 90, -135, 135]),
+        ("fanuc_crx10ia", [-135, 180, 90, -135, 135, -135]),
+    ],
+)
+def test_compound_singularities(name: str, q: list[float]) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    joints = np.radians([q])
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, None, joints, goal(task, screw, joints).array(), near)
+        assert verdict, verdict
+
+
+@pytest.mark.parametrize("q", [[0, -90, 0, -90, 0, 90], [180, 180, 0, 180, 180, 180], [-90, -90, 0, 0, 180, -90]])
+def test_compound_singularities_of_a_ur5e(q: list[float]) -> None:
+    arm = shipped("ur5e")[0]
+    joints = np.radians(q)
+    s = armkin.ik(arm, armkin.fk(arm, joints))
+    assert s.status in (Status.SINGULAR, Status.BOUNDARY)  # stretched straight up it cannot move
+    assert s.valid.any()
+    assert {"J2", "J3", "J4", "J6"} >= {name for name, free in zip(arm.joint_names, s.free, strict=True) if free}
+    s = armkin.ik(arm, armkin.fk(arm, joints), near=joints)
+    np.testing.assert_allclose(s.q[s.best], joints, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("seed", "q"),
+    [
+        (0, [-90, -90, 180, 90, 180, -90]),  # a corner of the workspace: no target beside it can be reached
+        (0, [-45, -90, 45, -135, 0, -135]),
+        (4, [90, 90, 0, 180, 0, 180]),  # regular, but the main pencil is singular at this target
+        (4, [-90, -90, 0, 180, 90, -90]),
+        (4, [-135, -90, 45, -135, -90, 90]),
+        # nothing settles these: only Newton's method from many starts tells that they are reached
+        (0, [0, -90, 90, -90, 90, 90]),
+        (4, [180, 90, 180, -90, 180, -90]),
+        (4, [180, 90, 180, -90, 180, 90]),
+        (4, [0, 90, -90, 90, 90, 180]),  # and these are roots of sixth order, which it only approaches
+        (4, [0, -90, -90, 90, 90, -90]),
+        (80, [0, 90, 0, -90, -90, 0]),  # a self-motion of which a target moved a little shows nothing
+    ],
+)
+def test_singular_pencils_of_right_angled_arms(seed: int, q: list[float]) -> None:
+    """What the elimination finds for the target itself is no proof that there is nothing."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(seed)), "pose")
+    task, geometry = solver(arm, "pose")
+    assert geometry.name == "general elimination"
+    joints = np.radians([q])
+    target = goal(task, screw, joints).array()
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, "pose", joints, target, near)
+        truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 60, 1)
+        assert verdict, verdict
+
+
+def test_a_pose_that_only_a_moved_target_settled_is_not_complete() -> None:
+    arm, screw, *_ = case(right_angles(np.random.default_rng(80)), "pose")
+    task, _ = solver(arm, "pose")
+    s = armkin.ik(arm, goal(task, screw, np.radians([[0, 90, 0, -90, -90, 0]])).array(), "pose")
+    assert s.status[0] == Status.SINGULAR
+    assert s.free[0].tolist() == [False, True, True, True, False, True]
+    assert s.valid.sum() == 3
+    assert not s.complete[0]
+
+
+def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:
+    """Where another one crosses, postures 1e-6 rad beside it solve the target to rounding."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(168)), "pose")
+    task, _ = solver(arm, "pose")
+    q = np.array([[1.94395758534494, -0.2752189104766, 1.68745465008634, 9.1e-11, 1.93145804841238, 0.17129731932685]])
+    for near in (None, q):
+        verdict = truth.judge(arm, screw, "pose", q, goal(task, screw, q).array(), near)
+        assert verdict, verdict
+        assert verdict.solutions.free[0].tolist() == [False, False, True, False, True, False]
+    assert armkin.ik(arm, goal(task, screw, q).array(), "pose").valid.sum() == 2
+
+
+@pytest.mark.parametrize("twist", [90.0, -90.0])
+def test_a_quartic_that_says_nothing_leaves_its_joint_free(twist: float) -> None:
+    """Joint 3 in one line with joint 1: any value will do."""
+    rows = [(90.0, 100.0, 50.0), (twist, 100.0, 0.0), (0.0, 200.0, 0.0)]
+    joints = [{"dh": {"alpha": alpha, "a": a, "d": d, "theta": 0.0}} for alpha, a, d in rows]
+    arm, screw, *_ = case({"convention": "standard", "joints": joints}, "xyz")
+    task, geometry = solver(arm, "xyz")
+    assert geometry.why == "RRR: a quartic gives joint 3"
+    q = np.radians([[20.0, 180.0, 70.0], [-100.0, 180.0, -130.0]])
+    target = goal(task, screw, q).array()
+    for near in (None, q):
+        verdict = truth.judge(arm, screw, "xyz", q, target, near)
+        assert verdict, verdict
+        s = verdict.solutions
+        assert (s.status == Status.SINGULAR).all()
+        assert s.free.tolist() == [[True, False, True]] * 2
+        assert (s.valid.sum(axis=1) == 1).all()
+    s = armkin.ik(arm, target, near=np.radians([40.0, 170.0, 50.0]))
+    np.testing.assert_allclose(np.degrees(s.q[:, 0, 1:]), [[180.0, 50.0]] * 2, atol=1e-9)
+
+
+@pytest.mark.parametrize("q", [[180, 90, -90, -90, -90, 0], [180, 90, 180, -90, -90, 180], [0, -90, 0, -90, -90, 180]])
+def test_complex_roots_of_a_quartic_are_no_branches(q: list[float]) -> None:
+    """Of a spherical shoulder: put back onto the unit circle they were a real root for the second and third time."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(39)), "pose")
+    task, geometry = solver(arm, "pose")
+    assert geometry.name == "spherical shoulder"
+    joints = np.radians([q])
+    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    assert verdict, verdict
+    assert verdict.solutions.status[0] == Status.EXACT
+    assert verdict.solutions.valid.sum() == 4
+
+
+def test_two_roots_a_hair_apart_are_one_branch() -> None:
+    arm = shipped("three_dof")[0]
+    s = armkin.ik(arm, [342.9180457599, 209.5308314133, 383.6095610676])
+    assert s.status == Status.BOUNDARY
+    assert s.valid.sum() == 2  # left and right, each with its elbow straight
+    rng = np.random.default_rng(6)
+    q = rng.uniform(-3, 3, (400, 3))
+    q[:, 2] = 0.0
+    T = armkin.fk(arm, q)[:, :3, 3]
+    for digits in (9, 10, 12):
+        s = armkin.ik(arm, np.round(T, digits))
+        inside = s.status != Status.UNREACHABLE
+        assert (s.valid.sum(axis=1)[inside] == 2).all()
+        assert (s.status[inside] == Status.BOUNDARY).all()
+
+
+def test_a_lost_branch_is_no_complete_answer() -> None:
+    """A JACO posture with an isolated branch of singular value 9e-4, beside a singular one."""
+    arm, screw = shipped("jaco_j2n6s300")
+    task, _ = solver(arm, None)
+    q = np.radians([[0, -90, 90, 90, 0, -90]])
+    target = goal(task, screw, q).array()
+    verdict = truth.judge(arm, screw, None, q, target)
+    truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 250, 1)
+    assert verdict
