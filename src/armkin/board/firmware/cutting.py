@@ -19,6 +19,7 @@ from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.model import units
 from armkin.motion.plan import check_limits, check_rates
 from armkin.motion.plan import plan as plan_joints
 from armkin.motion.trajectory import Straight
@@ -159,7 +160,7 @@ def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateE
     k = int(rates.argmax())
     top = stretch.top_speed
     joint = int(np.argmax(np.abs(arm.motor_gain[k]) * top))
-    unit, word = (1.0, "mm/s") if arm.prismatic[joint] else (math.pi / 180, "deg/s")
+    unit, word = float(units.scale(arm)[joint]), f"{units.names(arm)[joint]}/s"
     return RateError(
         f"joint {arm.joint_names[joint]} at {top[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
         f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}",

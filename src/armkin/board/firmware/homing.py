@@ -17,6 +17,7 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock import joint_index
+from armkin.model.units import scale
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
@@ -214,11 +215,11 @@ def _at(arm: Arm, joint: int) -> float:
     """Joint value at the switch's edge [rad | mm]."""
     homing = arm.homing[joint]
     assert homing is not None
-    return homing.at * (1.0 if arm.prismatic[joint] else math.pi / 180)
+    return float(homing.at * scale(arm)[joint])
 
 
 def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
-    name, unit, homing = arm.joint_names[j], 1.0 if arm.prismatic[j] else math.pi / 180, arm.homing[j]
+    name, unit, homing = arm.joint_names[j], float(scale(arm)[j]), arm.homing[j]
     assert homing is not None
     board = configuration.board
     gain = arm.motor_gain[:, j]

@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import cutting, protocol, streaming
 from armkin.board.firmware.motion_frame import WHY
@@ -280,8 +278,7 @@ class Machine:
 
 def describe(arm: Arm, q: Array) -> str:
     """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
-    unit = np.where(arm.prismatic, 1.0, np.pi / 180)
-    values = [f"{name} = {value:.4f}" for name, value in zip(arm.joint_names, q / unit + 0.0, strict=True)]
+    values = [f"{name} = {value:.4f}" for name, value in zip(arm.joint_names, joints_out(arm, q), strict=True)]
     words = "mm" if arm.prismatic.all() else "deg" if not arm.prismatic.any() else "(deg, mm)"
     return f"{', '.join(values)} {words}"
 
