@@ -173,8 +173,8 @@ def missing(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
         off = q @ goals.sums.T + goals.offsets - goals.sum_values
         parts.append(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
     if goals.orientation != "none":
-        columns = slice(2, 3) if goals.orientation == "axis" else slice(0, 3)
-        parts.append((T - goals.T)[:, :3, columns].reshape(len(q), -1))
+        first = 2 if goals.orientation == "axis" else 0
+        parts.append((T - goals.T)[:, :3, first:3].reshape(len(q), 3 * (3 - first)))
     return mm, np.linalg.norm(np.concatenate(parts, axis=1), axis=1)
 
 

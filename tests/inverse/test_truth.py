@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import truth
+from geometries import random_case
 from oracle import goal, newton
 from test_every_branch import NAMES, shipped
 
@@ -47,6 +48,29 @@ def test_singular_surfaces(name: str) -> None:
     verdict, what = truth.judged(arm, screw, kinds, truth.typed(task, target, 9))
     verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
     assert verdict, f"9 digits, {what}"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "RRR and spherical wrist",
+        "spherical wrist, oblique",
+        "spherical shoulder",
+        "three parallel axes 2, 3, 4",
+        "three parallel axes 3, 4, 5",
+        "axis, pitch arm",
+    ],
+)
+def test_singular_surfaces_of_oblique_wrists(name: str) -> None:
+    """Two roots of joint 5 merge at its extremes, at which a wrist of right angles moves by itself."""
+    arm, screw, task, *_ = random_case(name, 0)
+    definition, _ = solver(arm, task)
+    kinds = truth.singular_postures(arm, screw, task, 24, seed=1)
+    q = np.concatenate(list(kinds.values()))
+    target = goal(definition, screw, q).array()
+    for near in (None, q):
+        verdict, what = truth.judged(arm, screw, kinds, target, near, task)
+        assert verdict, what
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -236,11 +236,16 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
 
 
 def judged(
-    arm: Arm, screw: Screws, kinds: dict[str, Array], target: Array, near: Array | None = None
+    arm: Arm,
+    screw: Screws,
+    kinds: dict[str, Array],
+    target: Array,
+    near: Array | None = None,
+    task: str | None = None,
 ) -> tuple[Verdict, str]:
     """Postures of several kinds and their targets, all judged in one call; and of which kind the wrong ones are."""
     q = np.concatenate(list(kinds.values()))
-    verdict = judge(arm, screw, None, q, target, near)
+    verdict = judge(arm, screw, task, q, target, near)
     kind = np.repeat(list(kinds), [len(each) for each in kinds.values()])
     wrong = {*verdict.unreachable, *verdict.lost, *verdict.false, *verdict.twice, *verdict.moves}
     return verdict, f"{sorted({str(kind[k]) for k in wrong})}: {verdict}"

@@ -30,7 +30,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
 )
 from armkin.inverse.closed.three_joints import Position
-from armkin.inverse.numeric.tolerances import EXACT, SHARP
+from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -122,6 +122,7 @@ class SphericalWrist:
         self.rest5 = float(A[2, 2] * b[2])
         self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
@@ -138,7 +139,7 @@ class SphericalWrist:
         if self.mirrored:
             return self._mirrored(pairs, doubt, miss, x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc, SHARP)
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc, self.tangent)
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
 
