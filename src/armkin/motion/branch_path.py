@@ -19,9 +19,10 @@ from armkin.inverse.branches.names import find
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.hold_cap import hold_cap
 from armkin.motion.linked_branches import Columns, change, chord_bound, levers, linked
 from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, Knots, finer, hold_cap, knots, optimal
+from armkin.motion.time_optimal import Bounds, Knots, finer, knots, optimal
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:

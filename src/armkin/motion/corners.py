@@ -12,8 +12,9 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve
+from armkin.motion.hold_cap import hold_cap
 from armkin.motion.plan import check_limits, check_rates
-from armkin.motion.time_optimal import Bounds, Knots, hold_cap, optimal
+from armkin.motion.time_optimal import Bounds, Knots, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:

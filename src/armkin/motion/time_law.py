@@ -12,8 +12,9 @@ from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.hold_cap import hold_cap
 from armkin.motion.plan import check_rates
-from armkin.motion.time_optimal import Bounds, finer, hold_cap, knots, optimal
+from armkin.motion.time_optimal import Bounds, finer, knots, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -1,0 +1,55 @@
+"""How fast a path may be so that a hold on it asks no joint for too much."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.motion.time_optimal import TINY, Knots, in_parts
+from armkin.motors import motor_accel
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
+    """Greatest x at which a hold on the path asks no joint for more than `share` of its max_accel: (N,).
+
+    On a hold the board lets the leading motor m (the one with the longest way to a stop) slow down with its
+    greatest acceleration, along the path: u = -a_m / |n'_m| - n''_m x / n'_m, and a joint then accelerates with
+    -q'_j a_m / |n'_m| + x (q''_j - q'_j n''_m / n'_m). The two parts have their signs: where the path bends a joint
+    forward and the hold slows it down they take from each other. At x = 0 the first is at most max_accel, so that
+    what is kept at x is kept on the whole way down to rest.
+    """
+    parts = [
+        _hold_cap(arm, Knots(path.s[a : b + 1], path.q[a : b + 1], path.d[a : b + 1]), share)
+        for a, b in ((some.start, some.stop) for some in in_parts(len(path.s) - 1))
+    ]
+    for before, after in pairwise(parts):
+        after[0] = min(before[-1], after[0])
+    return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
+
+
+def _hold_cap(arm: Arm, path: Knots, share: float) -> Array:
+    """`hold_cap` of a part of the way."""
+    gain = arm.motor_gain
+    brakes = motor_accel(arm)
+    ends = path.second()
+    out = np.full(len(path.s), np.inf)
+    rate = path.d @ gain.T
+    m = (np.abs(rate) / brakes).argmax(axis=1)
+    lead = rate[np.arange(len(m)), m]
+    lead = np.where(np.abs(lead) < TINY, TINY, lead)
+    ratio = path.d / lead[:, None]  # q'_j / n'_m
+    slowing = -ratio * np.sign(lead)[:, None] * brakes[m][:, None]
+    most = share * arm.max_accel
+    for second, part in ((ends[0], slice(None, -1)), (ends[1], slice(1, None))):
+        turned = (second * gain[m[part]]).sum(axis=1)
+        bend = second - ratio[part] * turned[:, None]
+        left = most - np.sign(bend) * slowing[part]
+        cap = np.maximum(left, 0.0) / np.maximum(np.abs(bend), TINY)
+        out[part] = np.minimum(out[part], cap.min(axis=1))
+    return out
