@@ -17,6 +17,7 @@ from general_arms import (
     random_joints,
 )
 
+import armkin
 from armkin.inverse.elimination import line_features, method
 from armkin.inverse.elimination.polish import refine, shrink
 from armkin.inverse.numeric.linalg import nudged
@@ -395,3 +396,12 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     found, doubtful, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
     assert found.shape[1] <= 16
     assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
+
+
+def test_answers_of_equal_keys_are_not_taken_for_one() -> None:
+    """Eight regular branches, two of which have the same number in the projection that sorts them."""
+    arm = armkin.load("jaco_j2n6s300")
+    q = np.deg2rad([-108.9918203, 6.12739868, -75.65079096, 170.20650872, -116.97452296, 22.97350995])
+    for found in (armkin.ik(arm, armkin.fk(arm, q)), armkin.compile(arm).ik(armkin.fk(arm, q))):
+        assert found.valid.sum() == 8
+        assert bool(found.complete)

@@ -20,6 +20,7 @@ from armkin.inverse.elimination.method import SHAKES, Elimination, _shaken
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
     from armkin.inverse.elimination.pencil import Pencil
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
@@ -79,10 +80,10 @@ def _pencil(number: int, pencil: Pencil) -> str:
     slot, ends = pencil.role.slot, pencil.ends
     arrays = {
         "links": np.concatenate([_frame(link) for link in pencil.links]),
-        "first": ends.factors[0] if slot != 1 else None,
-        "second": ends.factors[1] if slot == 0 else None,
-        "N": ends.N if slot == 1 else None,
-        "recover": ends.recover if slot == 1 else None,
+        "first": _first(slot, ends.factors) if slot != 1 else None,
+        "second": _by_fours(ends.factors[1]) if slot == 0 else None,
+        "N": _by_fours(ends.N) if slot == 1 else None,
+        "recover": _by_fours(ends.recover) if slot == 1 else None,
         "columns": pencil.columns,
         "mix": pencil.mix,
         "K_re": pencil.K_re if pencil.K_re.size else None,
@@ -100,6 +101,19 @@ def _pencil(number: int, pencil: Pencil) -> str:
         *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),
     ]
     return "\n".join([*texts, f"#define ARM_PENCIL_{number} {{{', '.join(fields)}}}", ""])
+
+
+def _first(slot: int, factors: tuple[Array, ...]) -> Array:
+    """The first factor of Q, its matrices transposed: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
+    matrices = factors[0].reshape(-1, 15, 15)
+    if slot == 0:
+        return _by_fours(matrices.swapaxes(1, 2))
+    return _by_fours(np.moveaxis(matrices, 2, 0)).reshape(15, -1)
+
+
+def _by_fours(rows: Array) -> Array:
+    """Rows (..., k) with zeros behind, to a length that four divides."""
+    return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, -rows.shape[-1] % 4)])
 
 
 def _with_virtual_joint() -> str:

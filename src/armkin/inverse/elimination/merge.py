@@ -50,6 +50,12 @@ def projection(prismatic: Bool, q: Array) -> Array:
     return np.asarray(cosine @ _WEIGHTS[0] + sine @ _WEIGHTS[1])
 
 
+def difference(prismatic: Bool, end: Array, start: Array) -> Array:
+    """Joint values (M, 6) less others, turns the short way round."""
+    step = end - start
+    return np.where(prismatic, step, step - 2 * np.pi * np.round(step / (2 * np.pi)))
+
+
 def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple[Answers, Bool]:
     """Sort answers by pose and keep one of each set of equal ones.
 
@@ -78,8 +84,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         if first.size == 0:
             break
         second = first + gap
-        step = q[second] - q[first]
-        step = np.where(prismatic, step, step - 2 * np.pi * np.round(step / (2 * np.pi)))
+        step = difference(prismatic, q[second], q[first])
         distance = np.abs(step).max(axis=1)
         near = np.flatnonzero((distance < EXAMINED) & keep[first] & keep[second])
         if near.size == 0:

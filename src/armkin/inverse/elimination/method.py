@@ -40,11 +40,11 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import closed_loop, roots, three_prismatic
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.merge import Answers, best, concatenate, merge, pack, projection
+from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
 from armkin.inverse.elimination.walks import Role, roles
-from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SEED
+from armkin.inverse.numeric.tolerances import ELIMINATED, EXAMINED, GRAZING, SEED
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
@@ -311,6 +311,10 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
     twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
+    if twice.any():  # different answers may have the same key: about one pose in 10,000
+        pairs = np.flatnonzero(twice)
+        step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
+        twice[pairs] = np.abs(step).max(axis=1) < EXAMINED
     unsettled[real.pose[order][1:][twice]] = True
     guesses = _answers(closed, seed.pose, done, ~good & (done.residual < SEED))
     return answers, unsettled, touching, guesses

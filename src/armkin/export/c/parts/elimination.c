@@ -1,3 +1,17 @@
+/* The largest difference of two postures' joint values, modulo whole turns. */
+static double arm_apart(const double *a, const double *b)
+{
+    double most = 0;
+    int k;
+    for (k = 0; k < 6; k++) {
+        double step = b[k] - a[k];
+        if (!arm_loop_slides[k])
+            step -= ARM_TURN * rint(step / ARM_TURN);
+        most = fabs(step) > most ? fabs(step) : most;
+    }
+    return most;
+}
+
 /* One pass over a pose: its answers (`found`, from `count` on), and whether the pass leaves it open; *touching: two
    roots just touch, or just miss each other. */
 static int arm_attempt(const double *goal, int pass, arm_answer *found, int *count, int *touching)
@@ -5,10 +19,11 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
     const arm_pencil *pencil = &arm_pencils[arm_plan[pass]];
     const double shake = arm_shakes[pass];
     const int careful = pass > 0;
+    const double pair = 1e-4 + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
     const int size = pencil->size, lead = 12, c = 12 + size, wide = 12 + ARM_MOST, begin = *count;
     double moved[12], back[12], E[12 * (12 + ARM_MOST)], G[12 * (12 + ARM_MOST)], C[ARM_MOST * ARM_MOST];
     double re[ARM_MOST], im[ARM_MOST], most = 0, hidden[ARM_MOST];
-    unsigned char blurred[ARM_MOST], real[ARM_MOST];
+    unsigned char stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
     arm_ends ends;
     int i, j, k, open = 0;
     arm_times(arm_shaking + 12 * pass, goal, moved);
@@ -55,9 +70,10 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
         hidden[*count - begin] = one->q[pencil->order[2 + pencil->hidden]];
         arm_refine(goal, careful ? 12 : 4, careful, one);
         good = one->residual < (careful ? 3e-9 : 1e-10);
-        if (!good && (tilt < 1e-4 || one->residual < (careful ? 1e-5 : 1e-3)))
+        if (!good && (tilt < 1e-4 || (careful ? one->residual < 1e-5 && tilt < (pair > 1e-3 ? pair : 1e-3)
+                                              : one->residual < 1e-3)))
             open = 1; /* a complex pair that steps brought near the pose may be a real one, seen through rounding */
-        if (good && tilt > 0 && tilt < 1e-4 + 10 * sqrt(shake))
+        if (good && tilt > 0 && tilt < pair)
             open = 1; /* a move of the pose may turn two close real roots into such a pair */
         if (good && !(tilt > 0) && one->guess > 1e-3 + 30 * shake)
             open = 1; /* a real root far from the answer it led to may have stood for another one */
@@ -65,6 +81,7 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
             *touching = 1;
         if (!good)
             continue;
+        stands[*count - begin] = tilt < pair; /* of others damped steps bring many to an answer that has its own root */
         blurred[*count - begin] = one->guess > 1e-5 + 10 * shake;
         real[*count - begin] = !(tilt > 0);
         arm_sortable(one);
@@ -74,9 +91,12 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
        the same. */
     for (j = begin; j < *count; j++)
         for (k = begin; k < j; k++) {
-            const int close = fabs(hidden[j - begin] - hidden[k - begin]) < 1e-4;
-            const int same = fabs(found[j].key - found[k].key) < 1e-5 && real[j - begin] && real[k - begin];
-            if ((close && (blurred[j - begin] || blurred[k - begin])) || same)
+            const int one = j - begin, other = k - begin;
+            if (stands[one] && stands[other] && (blurred[one] || blurred[other])
+                && fabs(hidden[one] - hidden[other]) < 1e-4)
+                open = 1;
+            if (real[one] && real[other] && fabs(found[j].key - found[k].key) < 1e-5
+                && arm_apart(found[j].q, found[k].q) < 1e-2)
                 open = 1;
         }
     return open;

@@ -1,5 +1,5 @@
 /* Frames are 3 x 4, row by row: a rotation and a translation. */
-static void arm_times(const double *a, const double *b, double *out)
+ARM_INLINE void arm_times(const double *a, const double *b, double *out)
 {
     int i, j;
     for (i = 0; i < 3; i++)
@@ -8,24 +8,40 @@ static void arm_times(const double *a, const double *b, double *out)
                 + (j == 3 ? a[4 * i + 3] : 0.0);
 }
 
-/* Z(q): a turn about z or a shift along it; the frame after it. */
-static void arm_move(const double *a, double q, int slides, double *out)
+/* Cosines and sines of eight angles up to 1e5 rad, as one straight line, of which compilers make vectors. Coefficients:
+   S. L. Moshier, Cephes Mathematical Library (sin.c). */
+static void arm_turns(const double *ARM_RESTRICT q, double *ARM_RESTRICT cosine, double *ARM_RESTRICT sine)
 {
     int i;
-    if (slides) {
-        for (i = 0; i < 12; i++)
-            out[i] = a[i];
-        for (i = 0; i < 3; i++)
-            out[4 * i + 3] += q * a[4 * i + 2];
-    } else {
-        const double c = cos(q), s = sin(q);
-        for (i = 0; i < 3; i++) {
-            const double x = a[4 * i], y = a[4 * i + 1];
-            out[4 * i] = c * x + s * y;
-            out[4 * i + 1] = c * y - s * x;
-            out[4 * i + 2] = a[4 * i + 2];
-            out[4 * i + 3] = a[4 * i + 3];
-        }
+    for (i = 0; i < 8; i++) {
+        const double k = rint(q[i] * 0.6366197723675814);
+        const double r = ((q[i] - k * 1.570796310901641845703125) - k * 1.589325471229585673428e-8)
+            - k * 6.12323399573676588614e-17;
+        const double z = r * r;
+        const double s = r + r * z * (((((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z
+            + 2.75573136213857245213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3) * z
+            - 1.66666666666666307295e-1);
+        const double c = 1 - z / 2 + z * z * (((((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z
+            - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3) * z
+            + 4.16666666666665929218e-2);
+        const double half = rint(k / 2), odd = k - 2 * half; /* odd: -1, 0 or 1 quarter turns beside whole halves */
+        const double sign = 1 - 2 * fabs(half - 2 * rint(half / 2));
+        const double across = odd * sign, along = (1 - fabs(odd)) * sign;
+        cosine[i] = along * c - across * s;
+        sine[i] = along * s + across * c;
+    }
+}
+
+/* Z(q): a shift by q along z, or a turn about it with this cosine and sine; the frame after it. */
+ARM_INLINE void arm_move(const double *a, int slides, double q, double c, double s, double *out)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        const double x = a[4 * i], y = a[4 * i + 1];
+        out[4 * i] = slides ? x : c * x + s * y;
+        out[4 * i + 1] = slides ? y : c * y - s * x;
+        out[4 * i + 2] = a[4 * i + 2];
+        out[4 * i + 3] = slides ? a[4 * i + 3] + q * a[4 * i + 2] : a[4 * i + 3];
     }
 }
 
@@ -39,7 +55,8 @@ static void arm_invert(const double *a, double *out)
     }
 }
 
-/* The fifteen numbers of a frame's z axis, a line: p, l, p.p, p.l, p x l, (p.p) l - 2 (p.l) p, 1. */
+/* The fifteen numbers of a frame's z axis, a line: p, l, p.p, p.l, p x l, (p.p) l - 2 (p.l) p, 1; and a zero: rows of
+   fifteen are kept sixteen apart, by fours. */
 static void arm_features(const double *frame, double *out)
 {
     const double p[3] = {frame[3], frame[7], frame[11]}, l[3] = {frame[2], frame[6], frame[10]};
@@ -54,14 +71,15 @@ static void arm_features(const double *frame, double *out)
     out[6] = square;
     out[7] = along;
     out[14] = 1;
+    out[15] = 0;
 }
 
-/* The 15 x 15 matrix by which a rigid motion acts on these numbers. */
+/* The 15 x 15 matrix by which a rigid motion acts on these numbers; a last column of zeros. */
 static void arm_rep(const double *motion, double *out)
 {
     double t[3], tR[3], square;
     int i, j;
-    for (i = 0; i < 225; i++)
+    for (i = 0; i < 240; i++)
         out[i] = 0;
     for (i = 0; i < 3; i++)
         t[i] = motion[4 * i + 3];
@@ -73,17 +91,17 @@ static void arm_rep(const double *motion, double *out)
             const double R = motion[4 * i + j];
             const double across = t[(i + 1) % 3] * motion[4 * ((i + 2) % 3) + j]
                 - t[(i + 2) % 3] * motion[4 * ((i + 1) % 3) + j];
-            out[15 * i + j] = out[15 * (3 + i) + 3 + j] = out[15 * (8 + i) + 8 + j] = out[15 * (11 + i) + 11 + j] = R;
-            out[15 * (8 + i) + 3 + j] = across;
-            out[15 * (11 + i) + 8 + j] = -2 * across;
-            out[15 * (11 + i) + 3 + j] = square * R - 2 * t[i] * tR[j];
+            out[16 * i + j] = out[16 * (3 + i) + 3 + j] = out[16 * (8 + i) + 8 + j] = out[16 * (11 + i) + 11 + j] = R;
+            out[16 * (8 + i) + 3 + j] = across;
+            out[16 * (11 + i) + 8 + j] = -2 * across;
+            out[16 * (11 + i) + 3 + j] = square * R - 2 * t[i] * tR[j];
         }
-        out[15 * i + 14] = t[i];
-        out[15 * 6 + i] = 2 * tR[i];
-        out[15 * 7 + 3 + i] = tR[i];
-        out[15 * (11 + i) + 7] = -2 * t[i];
+        out[16 * i + 14] = t[i];
+        out[16 * 6 + i] = 2 * tR[i];
+        out[16 * 7 + 3 + i] = tR[i];
+        out[16 * (11 + i) + 7] = -2 * t[i];
     }
-    out[15 * 6 + 14] = square;
-    out[15 * 6 + 6] = out[15 * 7 + 7] = out[15 * 14 + 14] = 1;
+    out[16 * 6 + 14] = square;
+    out[16 * 6 + 6] = out[16 * 7 + 7] = out[16 * 14 + 14] = 1;
 }
 

@@ -8,31 +8,64 @@ ARM_INLINE void arm_subtract(double *ARM_RESTRICT to, const double *ARM_RESTRICT
             to[j] -= factor * what[j];
 }
 
+/* Exchange two rows likewise. */
+ARM_INLINE void arm_swap(double *ARM_RESTRICT a, double *ARM_RESTRICT b, int from, int end)
+{
+    int k, j;
+    for (k = from & ~3; k < end; k += 4) {
+        double kept[4];
+        for (j = 0; j < 4; j++)
+            kept[j] = a[k + j];
+        for (j = 0; j < 4; j++)
+            a[k + j] = b[k + j];
+        for (j = 0; j < 4; j++)
+            b[k + j] = kept[j];
+    }
+}
+
+/* The sum of products from `from` to `end`, multiples of four, in four partial sums. */
+ARM_INLINE double arm_along(const double *a, const double *b, int from, int end)
+{
+    double sum[4] = {0, 0, 0, 0};
+    int i, j;
+    for (i = from; i < end; i += 4)
+        for (j = 0; j < 4; j++)
+            sum[j] += a[i + j] * b[i + j];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+/* The row from k to n with the largest entry in column k; rows m long. No branch: which row it is cannot be foreseen. */
+ARM_INLINE int arm_pivot(const double *a, int k, int n, int m)
+{
+    double most = fabs(a[k * m + k]);
+    int best = k, i;
+    for (i = k + 1; i < n; i++) {
+        const double size = fabs(a[i * m + k]);
+        best ^= (best ^ i) & -(size > most);
+        most = size > most ? size : most;
+    }
+    return best;
+}
+
 /* Gaussian elimination with row pivots of an n x n system whose right sides stand from the column `right` on, rows m long;
    right and m are multiples of four. Afterwards the right sides hold the solution. Returns 0 if a pivot vanishes. */
 ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
 {
+    double over[12]; /* one over the pivots: n is at most twelve */
     int i, j, k;
     for (k = 0; k < n; k++) {
-        int best = k;
-        for (i = k + 1; i < n; i++)
-            if (fabs(a[i * m + k]) > fabs(a[best * m + k]))
-                best = i;
+        const int best = arm_pivot(a, k, n, m);
         if (!(fabs(a[best * m + k]) > 1e-300))
             return 0;
         if (best != k)
-            for (j = k; j < m; j++) {
-                const double swap = a[k * m + j];
-                a[k * m + j] = a[best * m + j];
-                a[best * m + j] = swap;
-            }
+            arm_swap(a + k * m, a + best * m, k, m);
+        over[k] = 1 / a[k * m + k];
         for (i = k + 1; i < n; i++)
-            arm_subtract(a + i * m, a + k * m, a[i * m + k] / a[k * m + k], k, m);
+            arm_subtract(a + i * m, a + k * m, a[i * m + k] * over[k], k, m);
     }
     for (k = n - 1; k >= 0; k--) {
-        const double scale = 1 / a[k * m + k];
         for (j = right; j < m; j++)
-            a[k * m + j] *= scale;
+            a[k * m + j] *= over[k];
         for (i = 0; i < k; i++)
             arm_subtract(a + i * m, a + k * m, a[i * m + k], right, m);
     }
@@ -42,54 +75,46 @@ ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
 /* The right singular vector of the smallest singular value of a 12 x 12 matrix: inverse iteration on A^T A. */
 static void arm_null_vector(double *a, double *v)
 {
-    int row[12], i, j, k;
-    double w[12], lower[144], size = 0;
-    for (i = 0; i < 12; i++)
-        row[i] = i;
-    for (k = 0; k < 12; k++) { /* P A = L U, U in place; row[i]: where the i-th row stands */
-        int best = k;
-        double pivot;
-        for (i = k + 1; i < 12; i++)
-            if (fabs(a[row[i] * 12 + k]) > fabs(a[row[best] * 12 + k]))
-                best = i;
-        i = row[k];
-        row[k] = row[best];
-        row[best] = i;
-        pivot = a[row[k] * 12 + k];
-        if (!(fabs(pivot) > 1e-14)) /* rounding's size, and not zero: an exact root has no last pivot */
-            pivot = a[row[k] * 12 + k] = 1e-14;
+    double w[12], lower[144], over[12], size = 0;
+    int i, k;
+    for (i = 0; i < 144; i++)
+        lower[i] = 0;
+    for (k = 0; k < 12; k++) { /* P A = L U, U in place */
+        const int best = arm_pivot(a, k, 12, 12);
+        if (best != k) {
+            arm_swap(a + 12 * k, a + 12 * best, 0, 12);
+            arm_swap(lower + 12 * k, lower + 12 * best, 0, 12);
+        }
+        if (!(fabs(a[12 * k + k]) > 1e-14)) /* rounding's size, and not zero: an exact root has no last pivot */
+            a[12 * k + k] = 1e-14;
+        over[k] = 1 / a[12 * k + k];
         for (i = k + 1; i < 12; i++) {
-            const double factor = a[row[i] * 12 + k] / pivot;
-            lower[row[i] * 12 + k] = factor;
-            arm_subtract(a + row[i] * 12, a + row[k] * 12, factor, k, 12);
+            const double factor = a[12 * i + k] * over[k];
+            lower[12 * i + k] = factor;
+            arm_subtract(a + 12 * i, a + 12 * k, factor, 0, 12);
         }
     }
     for (i = 0; i < 12; i++)
         v[i] = 1.0 + 0.37 * i - 0.11 * i * i; /* any start that no arm is made for */
     for (i = 0; i < 12; i++) { /* U^T y = v */
-        const double *high = a + row[i] * 12;
-        w[i] = v[i] / high[i];
-        for (j = i + 1; j < 12; j++)
-            v[j] -= high[j] * w[i];
+        w[i] = v[i] * over[i];
+        arm_subtract(v, a + 12 * i, w[i], 0, 12);
     }
-    for (k = 11; k >= 0; k--) { /* L^T z = y; the permutations of A^-T and A^-1 cancel */
-        const double *low = lower + row[k] * 12;
-        for (i = 0; i < k; i++)
-            w[i] -= low[i] * w[k];
-    }
+    for (k = 11; k > 0; k--) /* L^T z = y; the permutations of A^-T and A^-1 cancel */
+        arm_subtract(w, lower + 12 * k, w[k], 0, 12);
     for (i = 0; i < 12; i++)
         size = fabs(w[i]) > size ? fabs(w[i]) : size;
     for (i = 0; i < 12; i++)
         w[i] /= size;
-    for (i = 0; i < 12; i++) /* L y = z */
+    for (i = 1; i < 12; i++) /* L y = z */
         for (k = 0; k < i; k++)
-            w[i] -= lower[row[i] * 12 + k] * w[k];
+            w[i] -= lower[12 * i + k] * w[k];
     size = 0;
-    for (i = 11; i >= 0; i--) { /* U v = y */
+    for (i = 11; i >= 0; i--) { /* U v = y; the unknown that was found last comes last into the sum */
         double sum = w[i];
-        for (k = i + 1; k < 12; k++)
-            sum -= a[row[i] * 12 + k] * v[k];
-        v[i] = sum / a[row[i] * 12 + i];
+        for (k = 11; k > i; k--)
+            sum -= a[12 * i + k] * v[k];
+        v[i] = sum * over[i];
         size = fabs(v[i]) > size ? fabs(v[i]) : size;
     }
     for (i = 0; i < 12; i++)
@@ -130,35 +155,32 @@ static void arm_balance(double *a, int n)
 /* To upper Hessenberg form by eliminations with row pivots (Wilkinson, The Algebraic Eigenvalue Problem, 6.8). */
 static void arm_hessenberg(double *a, int n)
 {
+    double factor[ARM_MOST], over;
     int i, j, m;
+    for (i = 0; i < ARM_MOST; i++)
+        factor[i] = 0;
     for (m = 1; m < n - 1; m++) {
-        int best = m;
-        for (i = m + 1; i < n; i++)
-            if (fabs(a[i * ARM_MOST + m - 1]) > fabs(a[best * ARM_MOST + m - 1]))
-                best = i;
+        const int best = 1 + arm_pivot(a + ARM_MOST, m - 1, n - 1, ARM_MOST);
         if (best != m) {
-            for (j = m - 1; j < n; j++) {
-                const double swap = a[best * ARM_MOST + j];
-                a[best * ARM_MOST + j] = a[m * ARM_MOST + j];
-                a[m * ARM_MOST + j] = swap;
-            }
+            arm_swap(a + best * ARM_MOST, a + m * ARM_MOST, m - 1, ARM_MOST);
             for (j = 0; j < n; j++) {
                 const double swap = a[j * ARM_MOST + best];
                 a[j * ARM_MOST + best] = a[j * ARM_MOST + m];
                 a[j * ARM_MOST + m] = swap;
             }
         }
-        if (!(fabs(a[m * ARM_MOST + m - 1]) > 0))
+        if (!(fabs(a[m * ARM_MOST + m - 1]) > 1e-300))
             continue;
+        over = 1 / a[m * ARM_MOST + m - 1];
+        for (i = 0; i <= m; i++)
+            factor[i] = 0;
         for (i = m + 1; i < n; i++) {
-            const double factor = a[i * ARM_MOST + m - 1] / a[m * ARM_MOST + m - 1];
-            if (!(fabs(factor) > 0))
-                continue;
-            arm_subtract(a + i * ARM_MOST, a + m * ARM_MOST, factor, m, ARM_MOST);
+            factor[i] = a[i * ARM_MOST + m - 1] * over;
+            arm_subtract(a + i * ARM_MOST, a + m * ARM_MOST, factor[i], m, ARM_MOST);
             a[i * ARM_MOST + m - 1] = 0;
-            for (j = 0; j < n; j++)
-                a[j * ARM_MOST + m] += factor * a[j * ARM_MOST + i];
         }
+        for (j = 0; j < n; j++)
+            a[j * ARM_MOST + m] += arm_along(a + j * ARM_MOST, factor, m & ~3, ARM_MOST);
     }
 }
 
@@ -234,10 +256,10 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
             p = (r * u - w) / d[ARM_MOST] + d[1];
             q = d[ARM_MOST + 1] - z - r - u;
             r = d[2 * ARM_MOST + 1];
-            size = fabs(p) + fabs(q) + fabs(r);
-            p /= size;
-            q /= size;
-            r /= size;
+            size = 1 / (fabs(p) + fabs(q) + fabs(r));
+            p *= size;
+            q *= size;
+            r *= size;
             if (m == l)
                 break;
             u = fabs(d[-1]) * (fabs(q) + fabs(r));
@@ -251,35 +273,32 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
                 a[i * ARM_MOST + i - 3] = 0;
         }
         for (k = m; k < last; k++) {
-            double *up = a + k * ARM_MOST, *mid = up + ARM_MOST, *low = mid + ARM_MOST, size;
+            double *up = a + k * ARM_MOST, *mid = up + ARM_MOST, *low = mid + ARM_MOST, size, u;
             const int three = k < last - 1, end = last < k + 3 ? last : k + 3;
             if (k > m) {
                 p = up[k - 1];
                 q = mid[k - 1];
                 r = three ? low[k - 1] : 0;
-                x = fabs(p) + fabs(q) + fabs(r);
-                if (!(x > 0))
-                    continue;
-                p /= x;
-                q /= x;
-                r /= x;
             }
-            size = sqrt(p * p + q * q + r * r);
-            if (p < 0)
-                size = -size;
+            size = sqrt(p * p + q * q + r * r); /* of a balanced matrix: no square over- or underflows unnoticed */
+            if (!(size > 0))
+                continue;
+            size = p < 0 ? -size : size;
             if (k > m)
-                up[k - 1] = -size * x;
+                up[k - 1] = -size;
             else if (l < m)
                 up[k - 1] = -up[k - 1];
             p += size;
-            x = p / size;
-            y = q / size;
-            z = r / size;
-            q /= p;
-            r /= p;
+            w = 1 / size;
+            u = 1 / p;
+            x = p * w;
+            y = q * w;
+            z = r * w;
+            q *= u;
+            r *= u;
             if (three) {
                 const double below = k > 0 ? up[k - 1] : 0;
-                for (b = k & ~3; b < ARM_MOST; b += 4) /* by fours; what lies outside the block is not read again */
+                for (b = k & ~3; b <= last; b += 4) /* by fours; what lies outside the block is not read again */
                     for (j = b; j < b + 4; j++) {
                         const double t = up[j] + q * mid[j] + r * low[j];
                         up[j] -= t * x;
@@ -288,7 +307,7 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
                     }
                 if (k > 0)
                     up[k - 1] = below;
-                for (i = l; i <= end; i++) {
+                for (i = end; i >= l; i--) { /* first the rows that the next step begins with */
                     double *c = a + i * ARM_MOST + k;
                     const double t = x * c[0] + y * c[1] + z * c[2];
                     c[0] -= t;

@@ -2,14 +2,17 @@
    returns the Frobenius norm of the difference. */
 static double arm_missing(const double *q, const double *goal, double *frame, double *joints, double *error)
 {
-    double moved[12], square = 0;
+    double moved[12], value[8], cosine[8], sine[8], square = 0;
     int i, j, k;
+    for (i = 0; i < 8; i++)
+        value[i] = i < 6 ? q[i] : 0;
+    arm_turns(value, cosine, sine);
     for (i = 0; i < 12; i++)
         frame[i] = i % 5 == 0 ? 1 : 0;
     for (k = 0; k < 6; k++) {
         for (i = 0; i < 12; i++)
             joints[12 * k + i] = frame[i];
-        arm_move(frame, q[k], arm_loop_slides[k], moved);
+        arm_move(frame, arm_loop_slides[k], q[k], cosine[k], sine[k], moved);
         if (k < 5)
             arm_times(moved, arm_loop_links + 12 * k, frame);
     }
@@ -110,14 +113,18 @@ static void arm_refine(const double *goal, int steps, int damped, arm_answer *ou
 /* Turns in (-pi, pi], and the number by which answers are sorted. */
 static void arm_sortable(arm_answer *answer)
 {
+    double value[8] = {0, 0, 0, 0, 0, 0, 0, 0}, cosine[8], sine[8];
     int k;
-    answer->key = 0;
     for (k = 0; k < 6; k++) {
         double *q = &answer->q[k];
         if (!arm_loop_slides[k])
             *q -= ARM_TURN * floor((*q + ARM_PI) / ARM_TURN);
-        answer->key += arm_weights[k] * (arm_loop_slides[k] ? *q : cos(*q));
-        answer->key += arm_weights[6 + k] * (arm_loop_slides[k] ? 0 : sin(*q));
+        value[k] = *q;
+    }
+    arm_turns(value, cosine, sine);
+    answer->key = 0;
+    for (k = 0; k < 6; k++) {
+        answer->key += arm_weights[k] * (arm_loop_slides[k] ? value[k] : cosine[k]);
+        answer->key += arm_weights[6 + k] * (arm_loop_slides[k] ? 0 : sine[k]);
     }
 }
-

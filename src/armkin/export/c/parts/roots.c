@@ -2,17 +2,16 @@
 static void arm_equations(const arm_pencil *pencil, const double *Y, const double *N, double *out)
 {
     const int m = pencil->rows, width = 2 * (12 + pencil->size);
-    double moved[ARM_ROWS * 15], rows[ARM_ROWS * 2 * (12 + ARM_MOST)];
+    double moved[ARM_ROWS * 16], rows[ARM_ROWS * 2 * (12 + ARM_MOST)];
     int i, j, k;
     if (pencil->slot == 1) {
-        double R[225];
+        double R[15 * 16];
         arm_rep(Y, R);
+        for (i = 0; i < m * 16; i++)
+            moved[i] = 0;
         for (i = 0; i < m; i++)
-            for (j = 0; j < 15; j++) {
-                moved[15 * i + j] = 0;
-                for (k = 0; k < 15; k++)
-                    moved[15 * i + j] += N[15 * i + k] * R[15 * k + j];
-            }
+            for (k = 0; k < 15; k++)
+                arm_subtract(moved + 16 * i, R + 16 * k, -N[16 * i + k], 0, 16);
         N = moved;
     }
     for (i = 0; i < m; i++) {
@@ -20,7 +19,7 @@ static void arm_equations(const arm_pencil *pencil, const double *Y, const doubl
         for (j = 0; j < width; j++)
             row[j] = 0;
         for (k = 0; k < 15; k++)
-            arm_subtract(row, pencil->columns + k * width, -N[15 * i + k], 0, width);
+            arm_subtract(row, pencil->columns + k * width, -N[16 * i + k], 0, width);
     }
     if (!pencil->mix) {
         for (i = 0; i < 12 * (12 + pencil->size); i++)
@@ -55,7 +54,7 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
     const int of_hidden = 2 + pencil->hidden, of_dialytic = 2 + pencil->dialytic;
     const int third = 3 - pencil->hidden - pencil->dialytic;
     const double y = far ? 1 / x : x, scale = (far ? x : 1) / (1 + x * x);
-    double A[144], u[12], v[12], middle[3], a[12], b[12], f[15], m[5], part[6];
+    double A[144], u[12], v[12], middle[3], a[12], b[12], f[16], m[5], part[8], cosine[8], sine[8];
     double most = 0;
     int i, j, k, row = 0, column = 0;
     for (i = 0; i < 12; i++) { /* the equations at x, divided by x^2 if x is large */
@@ -109,32 +108,33 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
     for (i = 0; i < 3; i++)
         if (!(fabs(middle[i]) < 1e4))
             return 0;
+    for (i = 0; i < 8; i++)
+        part[i] = i < 3 ? middle[i] : 0;
+    arm_turns(part, cosine, sine);
 #define ARM_LINK(i) ((i) == pencil->slot ? Y : pencil->links + 12 * (i))
     for (i = 0; i < 12; i++)
         a[i] = ARM_LINK(1)[i];
     for (k = 0; k < 3; k++) {
-        arm_move(a, middle[k], pencil->slides[2 + k], b);
+        arm_move(a, pencil->slides[2 + k], middle[k], cosine[k], sine[k], b);
         arm_times(b, ARM_LINK(2 + k), a);
     }
     arm_features(a, f);
-    for (i = 0; i < 5; i++) { /* 1, b1, b2, a1, a2 */
-        m[i] = 0;
-        for (k = 0; k < 15; k++)
-            m[i] += ends->recover[15 * i + k] * f[k];
-    }
+    for (i = 0; i < 5; i++) /* 1, b1, b2, a1, a2 */
+        m[i] = arm_along(ends->recover + 16 * i, f, 0, 16);
     {
         const double sign = m[0] < 0 ? -1 : 1, one = fabs(m[0]) < 1e-300 ? 1 : m[0];
-        double before[12], step[12], sine = 0, cosine = 0;
+        double before[12], step[12], across = 0, along = 0;
         part[0] = pencil->slides[0] ? m[3] / one : atan2(sign * m[4], sign * m[3]);
         part[1] = pencil->slides[1] ? m[1] / one : atan2(sign * m[2], sign * m[1]);
-        arm_move(ARM_LINK(5), part[0], pencil->slides[0], step);
+        arm_turns(part, cosine, sine);
+        arm_move(ARM_LINK(5), pencil->slides[0], part[0], cosine[0], sine[0], step);
         arm_times(step, ARM_LINK(0), before);
-        arm_move(before, part[1], pencil->slides[1], step);
+        arm_move(before, pencil->slides[1], part[1], cosine[1], sine[1], step);
         for (j = 0; j < 3; j++) { /* step A = Je^-1, a turn by -e about z */
-            sine += step[j] * a[4 * j + 1] - step[4 + j] * a[4 * j];
-            cosine += step[j] * a[4 * j] + step[4 + j] * a[4 * j + 1];
+            across += step[j] * a[4 * j + 1] - step[4 + j] * a[4 * j];
+            along += step[j] * a[4 * j] + step[4 + j] * a[4 * j + 1];
         }
-        part[5] = atan2(sine, cosine);
+        part[5] = atan2(across, along);
     }
 #undef ARM_LINK
     for (k = 0; k < 3; k++)
