@@ -67,6 +67,7 @@ def frames() -> str:
     add_motion(4, 7, 1, [0, 0, 0], ramp())
     add_motion(5, 7, 3, [-40, -217, 122], back())
     add_motion(6, 16, 3, [1500], grip())
+    add_motion(7, 7, 13, [0, 0, 0], ramp())
     add_motion(255, 1, 0, [-128], [whole(255, 400, -1, [127]), whole(255, 65535, 1, [-128])])
     add(
         "HOME tag=7 switch=2 flags=1 slow=26 backoff=200 travel=100000 time=300 rate=0,-4000,0,0,0",
@@ -143,7 +144,7 @@ def talks(name: str, suffix: str = "") -> None:
     t.raw("wait 400")
     t.say(status(7), report(7, 6, 0, 0, 0, 7, everything, vector(*end, 1500)))
     t.note("wide segments, back home; then the gripper: an axis like the others")
-    t.say(motion(6, 7, 3, end, [0, 0, 0], back()), ack(7, 0, 0, 1, messages.board.queue - 1, units(back())))
+    t.say(motion(6, 7, 15, end, [0, 0, 0], back()), ack(7, 0, 0, 1, messages.board.queue - 1, units(back())))
     t.raw("wait 300")
     t.say(motion(7, mask(-1), 3, [1500], [1590], grip()), ack(8, 0, 0, 1, messages.board.queue - 1, units(grip())))
     t.raw("wait 450")
@@ -184,7 +185,7 @@ def talks(name: str, suffix: str = "") -> None:
         (1000, b"\x17\x00", 3, 0),
         (1001, motion(0, 1, 1, [0], [5], [whole(*slow, [5])]) + b"\0", 4, 0),
         (1002, motion(0, 1, 1, [0], [5], [whole(*slow, [5])])[:-1], 4, 0),
-        (1003, motion(0, 1, 4, [0], [5], [whole(*slow, [5])]), 4, 0),
+        (1003, motion(0, 1, 32, [0], [5], [whole(*slow, [5])]), 4, 0),
         (1004, struct.pack("<BBHBBii", 0x14, 0, 1, 1, 0, 0, 0), 4, 0),
         (1005, motion(0, 8, 1, [0], [5], [whole(*slow, [5])]), 5, 3),
         (1006, motion(0, 32, 1, [0], [5], [whole(*slow, [5])]), 5, 5),

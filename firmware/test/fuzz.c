@@ -82,7 +82,7 @@ static size_t obeyed(uint8_t *payload) {
             return 2;
         default:
             payload[0] = 0x14;
-            flags |= rnd(2) ? HOST_WIDE : 0;
+            flags |= (rnd(2) ? HOST_WIDE : 0) | 4 * rnd(8);
             for (uint8_t k = 0; k < n; k++) {
                 s[k].ticks = 1 + rnd(200);
                 s[k].interval = 2000 + rnd(30000);

@@ -27,7 +27,7 @@ struct status {
     int32_t counts[AXES];
 };
 
-enum { HOST_END = 1, HOST_WIDE = 2 };
+enum { HOST_END = 1, HOST_WIDE = 2, HOST_GENTLE = 4 * 3 };  // gentle: 3/8
 
 // Whole steps in whole ticks, from half a step to half a step as near as the rates come.
 struct host_segment {

@@ -85,10 +85,17 @@ class Host:
         assert isinstance(status, Status)
         return status
 
-    def move(self, axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], at_rest: bool) -> Error:
+    def move(
+        self,
+        axes: Sequence[int],
+        start: Sequence[int],
+        segments: Sequence[Segment],
+        at_rest: bool,
+        brake: float = 1.0,
+    ) -> Error:
         plan = [self.board.motors.queue.plan[axis] for axis in axes]  # 2^-23 step
         ends = [(p + sum(s.ticks * s.rates[i] for s in segments)) >> 23 for i, p in enumerate(plan)]
-        return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest))
+        return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest, brake=brake))
 
 
 AXIS = AxisImage(True, False, -20_000, 20_000, 0, 20_000, 200_000)
@@ -111,29 +118,33 @@ def ready(switch=None, image: Image | None = None) -> Host:  # type: ignore[no-u
 CRUISE = [whole(500, 1600, 0, (250, -500))] * 8  # 0.4 s at 5 and 10 kHz
 
 
-def test_a_hold_stops_on_the_path_within_the_ramp() -> None:
+@pytest.mark.parametrize("brake", [1.0, 0.625])
+def test_a_hold_stops_on_the_path_within_the_ramp(brake: float) -> None:
     host = ready()
-    assert host.move([0, 1], [0, 0], CRUISE, at_rest=False) == Error.OK
+    assert host.move([0, 1], [0, 0], CRUISE, at_rest=False, brake=brake) == Error.OK
     host.board.advance(0.1)
     before = host.status()
     assert before.state == State.MOVING
     held = host.ask(protocol.hold(1))
     assert isinstance(held, protocol.Ack)
     assert held.error == Error.HELD
-    host.board.advance(0.05 * 1.1)
+    host.board.advance(0.05 * 0.9 / brake)
+    assert host.status().state == State.HOLDING
+    host.board.advance(0.05 * 0.2)
     after = host.status()
     assert (after.state, after.error, after.queued) == (State.IDLE, Error.HELD, 0)
     assert after.known == 7
     assert after.counts[1] == pytest.approx(-2 * after.counts[0], abs=2)
     # 10 kHz down at 200 kHz/s: 250 steps; a queue that holds less is a plan slower than that.
-    assert 230 <= abs(after.counts[1] - before.counts[1]) <= 260
+    assert 230 / brake <= abs(after.counts[1] - before.counts[1]) <= 260 / brake
     host.board.advance(1)
     assert host.status().counts == after.counts
 
 
-def test_a_queue_that_runs_dry_stops_in_time() -> None:
+@pytest.mark.parametrize("brake", [1.0, 0.125])
+def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
     host = ready()
-    assert host.move([0, 1], [0, 0], CRUISE[:5], at_rest=False) == Error.OK
+    assert host.move([0, 1], [0, 0], CRUISE[:5], at_rest=False, brake=brake) == Error.OK
     for _ in range(10):
         host.board.advance(0.1)
         host.status()
@@ -145,7 +156,7 @@ def test_a_queue_that_runs_dry_stops_in_time() -> None:
 def test_a_queue_that_ends_abruptly_is_lost() -> None:
     host = ready()
     assert host.move([0, 1], [0, 0], CRUISE[:1], at_rest=False) == Error.OK
-    host.board.motors.queue.dry = lambda: False  # type: ignore[method-assign]  # a board too busy to notice in time
+    host.board.motors.queue.dry = lambda u: False  # type: ignore[method-assign]  # a board too busy to notice in time
     host.board.advance(0.2)
     status = host.status()
     assert (status.error, status.state, status.known) == (Error.DRY, State.IDLE, 4)

@@ -74,6 +74,7 @@ def built(name: str, field: dict[str, str]) -> bytes:
             segments,
             at_rest=bool(flags & 1),
             wide=bool(flags & 2),
+            brake=1 - (flags >> 2) / 8,
         )
     if name == "HOME":
         return protocol.home(

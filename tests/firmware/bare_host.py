@@ -42,6 +42,7 @@ class Batch:
     segments: tuple[Segment, ...]
     at_rest: bool = False
     places: tuple[int, ...] = ()  # 2^-23 step; from rest unless given
+    brake: float = 1.0
     end: tuple[int, ...] = field(init=False)
     end_places: tuple[int, ...] = field(init=False)
 
@@ -52,18 +53,24 @@ class Batch:
         self.end = tuple(p // STEP for p in self.end_places)
 
     def payload(self, tag: int) -> bytes:
-        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=self.at_rest)
+        rest, brake = self.at_rest, self.brake
+        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
 
 
 def batches(
-    axes: Sequence[int], start: Sequence[int], segments: Sequence[Segment], size: int, at_rest: bool = True
+    axes: Sequence[int],
+    start: Sequence[int],
+    segments: Sequence[Segment],
+    size: int,
+    at_rest: bool = True,
+    brake: float = 1.0,
 ) -> list[Batch]:
     """One motion cut into batches of `size` segments, the last one with END."""
     out: list[Batch] = []
     at: tuple[int, ...] = tuple(start)
     places: tuple[int, ...] = ()
     for i in range(0, len(segments), size):
-        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size]), places=places))
+        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size]), places=places, brake=brake))
         at, places = out[-1].end, out[-1].end_places
     if at_rest:
         out[-1].at_rest = True

@@ -67,7 +67,8 @@ def lay(moves: dict[str, Any], size: int = 4) -> Laid:
     laid = cut(Trajectory(arm, curve.start, (curve,)), start, clock=board.clock, min_interval=board.min_interval)
     [move] = laid.moves()
     segments = list(move.segments)
-    return Laid(plan, curve, segments, batches((0, 1, 2), start.tolist(), segments, size), start.tolist())
+    work = batches((0, 1, 2), start.tolist(), segments, size, brake=move.brake)
+    return Laid(plan, curve, segments, work, start.tolist())
 
 
 def ready(board: EmulatedBoard, laid: Laid) -> BareHost:

@@ -15,11 +15,11 @@ CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [30
 def asked(plan: armkin.PathPlan) -> float:
     """Greatest share of max_accel that a joint is asked for when the arm is held anywhere on the plan's curves.
 
-    By finite differences of the way alone: the leading motor slows down with its greatest acceleration, the others
-    follow along the path.
+    By finite differences of the way alone: the leading motor slows down with 5/8 of its greatest acceleration, as the
+    frames ask the board to, the others follow along the path.
     """
     arm, worst = plan.arm, 0.0
-    brakes = motor_accel(arm)
+    brakes = motor_accel(arm) * 5 / 8
     for curve in plan.motion.stretches:
         if not isinstance(curve, Curve):
             continue
@@ -36,15 +36,15 @@ def asked(plan: armkin.PathPlan) -> float:
     return worst
 
 
-@pytest.mark.parametrize(("hold", "most"), [(1.5, 1.52), (1.2, 1.22)])
+@pytest.mark.parametrize(("hold", "most"), [(1.5, 1.52), (1.0, 1.02)])
 def test_a_hold_asks_for_no_more_than_it_may(hold: float, most: float) -> None:
     arm = armkin.load("three_dof")
     assert asked(armkin.path(arm, CIRCLE, hold=hold)) <= most
-    assert asked(armkin.path(arm, CIRCLE, hold=None)) > 1.6  # without the cap it does
+    assert asked(armkin.path(arm, CIRCLE, hold=None)) > most + 0.1  # without the cap it does
 
 
 def test_the_cap_costs_little() -> None:
     arm = armkin.load("three_dof")
     free, held = (armkin.path(arm, CIRCLE, hold=hold).duration for hold in (None, 1.5))
-    assert free < 2.45
-    assert held < 1.13 * free
+    assert free < held <= 2.45
+    assert armkin.path(arm, CIRCLE).duration == held  # it is the default

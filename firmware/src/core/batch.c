@@ -6,7 +6,7 @@
 #include "inputs.h"
 #include "motion.h"
 
-enum { END = 1, WIDE = 2 };            // flags
+enum { END = 1, WIDE = 2, GENTLE = 4 * (GENTLE_PARTS - 1) };  // flags
 enum { HEAD = 6 };                     // type, tag, mask, flags, n
 enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
 
@@ -296,7 +296,7 @@ APART enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t 
         axes += mask >> i & 1;
     }
     const uint8_t segment = (flags & WIDE ? WIDE_SIZE : NARROW_SIZE) + 2 * axes;
-    if (count == 0 || flags & ~(END | WIDE) || length != HEAD + 8 * axes + count * segment) {
+    if (count == 0 || flags & ~(END | WIDE | GENTLE) || length != HEAD + 8 * axes + count * segment) {
         return E_LENGTH;
     }
     enum error error = inputs_ready(motion.state == MOVING);
@@ -311,6 +311,10 @@ APART enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t 
     }
     if (motion.state == IDLE) {
         motion_begin(MOVING);
+    }
+    const uint8_t gentle = (flags & GENTLE) / 4;
+    if (gentle > motion.gentle) {
+        motion.gentle = gentle;
     }
     motion_append(count, flags & END);
     return OK;

@@ -234,6 +234,7 @@ void motion_rest(void) {
     motion_replan();
     motion.state = IDLE;
     motion.cruising = false;
+    motion.gentle = 0;
     memory_save();
 }
 
@@ -280,10 +281,19 @@ void motion_stop(void) {
     hold_speed = stop_time(s, interval);
 }
 
-// Time is stretched so that u falls by 1 ms a ms, unless the plan is slower by itself.
+// The queue must always hold the time that a stop takes: on a path that slows down by itself, a stop takes all of it.
+static bool running_dry(const struct segment *s, uint16_t left, uint16_t interval) {
+    if (motion.ended) {
+        return false;
+    }
+    const uint32_t rest = queued_units - motion_units(s) + span(left, interval, last_interval(s));
+    return rest * UNIT_MS < speed + speed / 32 + 2.0F;
+}
+
+// Time is stretched so that u falls by 1 ms a ms, or gently while the queue lasts, unless the plan is slower by itself.
 static void hold_millisecond(const struct segment *s, uint16_t interval) {
     const float planned = stop_time(s, interval);
-    hold_speed -= 1.0F;
+    hold_speed -= (GENTLE_PARTS - motion.gentle) * (1.0F / GENTLE_PARTS);
     speed = planned < hold_speed ? planned : hold_speed;
     if (hold_speed < STANDING) {
         stand_still();
@@ -294,16 +304,6 @@ static void hold_millisecond(const struct segment *s, uint16_t interval) {
     HAL_LOCK();
     SHARED(dda.stretch) = fixed;
     HAL_UNLOCK();
-}
-
-// The queue must always hold the time that a stop takes: on a path that slows down by itself, a stop takes all of it.
-static enum error watch_queue(const struct segment *s, uint16_t left, uint16_t interval) {
-    speed = stop_time(s, interval);
-    if (motion.ended) {
-        return OK;
-    }
-    const uint32_t rest = queued_units - motion_units(s) + span(left, interval, last_interval(s));
-    return rest * UNIT_MS < speed + speed / 32 + 2.0F ? E_DRY : OK;
 }
 
 APART enum error motion_millisecond(void) {
@@ -318,12 +318,18 @@ APART enum error motion_millisecond(void) {
     if (!s) {
         return OK;
     }
-    if (motion.state == HOLDING) {
-        hold_millisecond(s, interval);
-    } else if (++pace % 4 == 0) {
-        return watch_queue(s, left, interval);
+    const bool holding = motion.state == HOLDING;
+    bool dry = false;
+    if (++pace % 4 == 0) {
+        speed = holding ? hold_speed : stop_time(s, interval);
+        dry = running_dry(s, left, interval);
+        motion.gentle = dry ? 0 : motion.gentle;  // no time for that
     }
-    return OK;
+    if (holding) {
+        hold_millisecond(s, interval);
+        return OK;
+    }
+    return dry ? E_DRY : OK;
 }
 
 // All of the queue is done.

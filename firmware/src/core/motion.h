@@ -3,6 +3,8 @@
 #include "config.h"
 #include "dda.h"
 
+enum { GENTLE_PARTS = 8 };
+
 enum state { IDLE, MOVING, HOLDING, HOMING, JOGGING };
 
 // How far the axes are beyond their counts, and which way they were going.
@@ -19,6 +21,7 @@ struct motion {
     int32_t plan_speed[AXES];  // VELOCITY units; 0 at rest
     uint8_t plan_window;       // the last segment's, see batch.c
     bool ended;                // it ends with END
+    uint8_t gentle;            // eighths of the accelerations that a hold leaves out
 
     int32_t latch[AXES];  // counts when the probed switch was pressed
     bool latched;         // dda.pressed has been taken into `latch`

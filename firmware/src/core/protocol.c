@@ -34,6 +34,9 @@ static void end(enum error error, uint8_t detail) {
         session.error = error;
         session.detail = detail;
     }
+    if (error == E_LIMIT_SWITCH) {
+        motion.gentle = 0;
+    }
     if (motion.state == MOVING) {
         motion_stop();
     } else if (motion.state == HOMING || motion.state == JOGGING) {

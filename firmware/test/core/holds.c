@@ -84,6 +84,79 @@ static void holds_stop_on_the_path(void) {
     printf("hold from full speed: %.1f ms, the ideal ramp is %.0f ms\n", times[0], ideal);
 }
 
+// A hold on a batch that asks for it leaves out 3/8 of the accelerations, and stays on the path; how, it says in ms.
+static double hold_gently(uint8_t flags, uint32_t after) {
+    fresh(7);
+    const struct host_segment on = {.ticks = 3000, .interval = 1600, .steps = {3000, -1500}};
+    CHECK(host_motion(3, flags | HOST_WIDE, home_counts, 1, &on).error == OK);
+    bench_run(after);
+    slowing = false;
+    bench_on_tick = watch_slowing;
+    bench_run(1000);
+    slowing = true;
+    host_hold();
+    const uint64_t begin = bench_cycles;
+    while (motion.state != IDLE) {
+        CHECK(bench_cycles - begin < CLOCK);
+        bench_run(100);
+    }
+    bench_on_tick = NULL;
+    const struct status status = host_status(0);
+    CHECK(status.ack.error == E_HELD && status.known == ALL_AXES && pins_are(status.counts));
+    return (last_tick_at - begin) * 1e3 / CLOCK;
+}
+
+static void a_hold_is_as_gentle_as_the_batches_ask_for(void) {
+    const double ramp = 50;  // ms
+    const double whole = hold_gently(0, 100000), gentle = hold_gently(HOST_GENTLE, 100000);
+    CHECK(fabs(gentle - whole / 0.625) < 0.03 * ramp);
+    CHECK(fabs(hold_gently(HOST_END | HOST_GENTLE, 100000) - gentle) < 0.03 * ramp);
+    // shortly before the queue runs dry: of its last 65 ms a gentle stop takes 40, of the last 56 there is no time for that
+    CHECK(fabs(hold_gently(HOST_GENTLE, 232000) - gentle) < 0.03 * ramp);
+    const double short_of_time = hold_gently(HOST_GENTLE, 241000);
+    CHECK(short_of_time > whole && short_of_time < gentle - 0.03 * ramp);
+    printf("gentle hold from full speed: %.1f ms, of whole %.1f ms\n", gentle, whole);
+    // the next motion is not gentle because this one was; a later batch makes the whole motion so, and none less
+    CHECK(host_status(0).ack.state == IDLE && motion.gentle == 0);
+    fresh(8);
+    const struct host_segment on = {.ticks = 1000, .interval = 1600, .steps = {1000}};
+    int32_t at[AXES];
+    memcpy(at, home_counts, sizeof at);
+    const uint8_t flags[] = {0, HOST_GENTLE, 0, 4};
+    for (int k = 0; k < 4; k++) {
+        CHECK(host_motion(1, flags[k] | HOST_WIDE, at, 1, &on).error == OK);
+        at[0] += 1000;
+        CHECK(motion.gentle == (k ? 3 : 0));
+    }
+    host_hold();
+    host_wait_idle(200);
+}
+
+// Where the path slows down as fast as a gentle hold, that takes u / (5/8) of the path: more than an open queue may have.
+static void a_gentle_hold_does_not_outlast_the_queue(void) {
+    const struct host_segment on = {.ticks = 1000, .interval = 1600, .steps = {1000}};
+    for (int after = 20; after <= 180; after += 10) {
+        fresh(400 + after);
+        struct host_segment ramp[10];
+        int32_t at[AXES];
+        memcpy(at, home_counts, sizeof at);
+        CHECK(host_motion(1, HOST_GENTLE | HOST_WIDE, at, 1, &on).error == OK);
+        at[0] += 1000;
+        int32_t end = at[0];
+        for (int k = 0; k < 10; k++) {  // 10 ms each, at 5/8 of max_accel
+            const double rate = 10000 - 125000 * 0.010 * (k + 0.5) / 2;
+            ramp[k] = (struct host_segment){.ticks = rate / 100, .interval = 16e6 / rate, .steps = {rate / 100}};
+            end += ramp[k].steps[0];
+        }
+        CHECK(host_motion(1, HOST_GENTLE, at, 10, ramp).error == OK);
+        bench_run(after * 1000);
+        host_hold();
+        host_wait_idle(300);
+        const struct status status = host_status(0);
+        CHECK(status.known == ALL_AXES && pins_are(status.counts) && status.counts[0] < end);
+    }
+}
+
 static void hold_in_the_planned_ramp_follows_the_plan(void) {
     // speeds up in 100 ms, slows down in 200 ms by itself; a hold in there must not brake harder than max_accel
     fresh(4);
@@ -117,14 +190,14 @@ static void hold_in_the_planned_ramp_follows_the_plan(void) {
     CHECK(host_status(0).counts[0] == bench_pins[0]);
 }
 
-static void an_unfinished_queue_is_a_hold(void) {
+static void an_unfinished_queue_is_a_hold(uint8_t flags) {
     // 320 ms at 10 kHz without END, u = 50 ms, then the host is busy elsewhere but alive
     fresh(5);
     struct host_segment s[4];
     for (int k = 0; k < 4; k++) {
         s[k] = (struct host_segment){.ticks = 800, .interval = 1600, .steps = {800, -400}};
     }
-    CHECK(host_motion(3, HOST_WIDE, home_counts, 4, s).error == OK);
+    CHECK(host_motion(3, flags | HOST_WIDE, home_counts, 4, s).error == OK);
     host_wait_idle(1000);
     const struct status status = host_status(0);
     CHECK(status.ack.error == E_DRY && status.known == ALL_AXES && pins_are(status.counts));
@@ -174,7 +247,10 @@ static void a_hold_is_obeyed_in_every_phase_of_a_segment(void) {
 void test_holds(void) {
     holds_stop_on_the_path();
     hold_in_the_planned_ramp_follows_the_plan();
-    an_unfinished_queue_is_a_hold();
+    a_hold_is_as_gentle_as_the_batches_ask_for();
+    a_gentle_hold_does_not_outlast_the_queue();
+    an_unfinished_queue_is_a_hold(0);
+    an_unfinished_queue_is_a_hold(HOST_GENTLE);
     an_abrupt_end_at_speed_loses_the_position();
     a_hold_is_obeyed_in_every_phase_of_a_segment();
 }

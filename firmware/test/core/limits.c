@@ -116,13 +116,13 @@ static void guarded(uint32_t nonce, uint8_t flags) {
     fresh_with(nonce, &image);
 }
 
-static void a_limit_switch_stops_within_one_ramp(void) {
+static void a_limit_switch_stops_within_one_ramp(uint8_t flags) {
     const struct host_segment on = {.ticks = 30000, .interval = 1600, .steps = {30000}};
     const struct host_segment away = {.ticks = 100, .interval = 16000, .steps = {-100}};
     guarded(70, 0);
     guard_at = 500;
     bench_on_tick = guard_switch;
-    CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 1, &on).error == OK);
+    CHECK(host_motion(1, flags | HOST_END | HOST_WIDE, home_counts, 1, &on).error == OK);
     host_wait_idle(1000);
     struct status status = host_status(0);
     CHECK(status.ack.error == E_LIMIT_SWITCH && status.ack.detail == 0);
@@ -164,6 +164,7 @@ void test_limits(void) {
     limits_hold();
     coupled_motors();
     abort_normally_closed();
-    a_limit_switch_stops_within_one_ramp();
+    a_limit_switch_stops_within_one_ramp(0);
+    a_limit_switch_stops_within_one_ramp(HOST_GENTLE);
     a_cut_of_the_power_loses_the_position();
 }

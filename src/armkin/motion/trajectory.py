@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 LONGEST = 86_400  # [s]
+BRAKE = 0.625  # share of the motors' accelerations with which a board stops on a curve
 
 
 class Stretch(Protocol):

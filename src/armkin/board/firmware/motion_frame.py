@@ -34,6 +34,7 @@ class Batch:
     segments: list[Segment]
     at_rest: bool
     clock: int
+    brake: float = 1.0  # share of the accelerations that a hold takes
 
     @property
     def seconds(self) -> float:
@@ -42,4 +43,5 @@ class Batch:
 
     def payload(self, tag: int) -> bytes:
         """Its frame."""
-        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=self.at_rest)
+        rest, brake = self.at_rest, self.brake
+        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)

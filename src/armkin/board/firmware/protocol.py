@@ -117,6 +117,7 @@ class Flag(IntFlag):
 
 MOTION_END = 1
 MOTION_WIDE = 2
+MOTION_GENTLE, GENTLE_PARTS = 2, 8  # the lowest of its bits; of the accelerations
 
 
 @dataclass(frozen=True)
@@ -238,14 +239,17 @@ def motion(
     *,
     at_rest: bool,
     wide: bool = False,
+    brake: float = 1.0,
 ) -> bytes:
     """A batch of motion for `axes` (ascending), from absolute counts to absolute counts.
 
-    The short form if all segments fit it, unless `wide`.
+    The short form if all segments fit it, unless `wide`. brake: share of the accelerations that a hold takes, in
+    eighths.
     """
     k = len(axes)
     wide = wide or not all(segment.narrow for segment in segments)
-    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0)
+    gentle = round((1.0 - brake) * GENTLE_PARTS)
+    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle << MOTION_GENTLE
     head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, _mask(axes), flags, len(segments), *start, *end)
     return head + b"".join(pack(segment, axes, wide=wide) for segment in segments)
 

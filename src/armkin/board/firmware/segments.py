@@ -39,6 +39,8 @@ _SLOW = 40  # ticks a step, from where the ticks need not fit the steps
 _FEWEST = 32  # ticks of a segment, where the board can make them
 _LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
 _QUICK = 1000, 20  # ticks of a segment whose `bend` counts with each, at most; and such a bend at least
+_BEND = 32767  # greatest bend
+_MONOTONE = 1.98  # times as far as its fast end a parabola's slow end may be from the mean: from 2 on it turns
 _CHOICE, _CHOICES = 32, 12  # one in so many ticks of a ramp may be left out, so that its intervals are whole cycles
 _MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
 
@@ -60,6 +62,7 @@ class Move:
     segments: Segments
     cycles: int  # of the clock, all segments together
     curve: bool = False
+    brake: float = 1.0  # share of the motors' accelerations that a hold takes
 
     @property
     def moving(self) -> list[int]:
@@ -141,7 +144,9 @@ class Cutter:
         ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
         quick = most <= ticks <= _QUICK[0] and ticks > 1 and abs(_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
         if not quick:
-            ticks = int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
+            fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
+            if ticks > 1 and most <= _QUICK[0] < fewer and abs(_parabola(exact, ticks, change, False)[2]) == _BEND:
+                quick, ticks = True, _QUICK[0]  # else it would end faster than the board loads the next one
         ticks = max(1, ticks, math.ceil(most), math.ceil(exact / _LONGEST))
         ratio = (2 + abs(change)) / (2 - abs(change))
         above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
@@ -214,12 +219,14 @@ def _parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple[int
     of a cycle and percents of the bend.
     """
     mean = exact / ticks
-    a, b = mean / (1 - change / 2), mean / (1 + change / 2)  # intervals at its ends
+    fast, slow = mean / (1 + abs(change) / 2), mean / (1 - abs(change) / 2)  # intervals at its ends
+    slow = min(slow, mean + _MONOTONE * (mean - fast))
+    a, b = (slow, fast) if change > 0 else (fast, slow)
     curve = 3 * (a + b) - 6 * mean
     whole = (b - a) * (ticks - 1) / ticks  # from the first interval's middle to the last one's
     unit, block = (17, 1) if quick else (22, BLOCK)
     exact_bend = 2 * curve / ticks**2 * block * 2**unit
-    bend = max(-32767, min(32767, round(exact_bend)))
+    bend = max(-_BEND, min(_BEND, round(exact_bend)))
     add = (whole - bend * _bends(ticks, quick) / 2**unit) / max(ticks - 1, 1) * 65536
     if (bend and add * (add + bend * ((ticks - 1) // block) / 2 ** (unit - 16)) <= 0) or abs(add) < 0.5:
         bend, add = 0, whole / max(ticks - 1, 1) * 65536

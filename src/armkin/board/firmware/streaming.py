@@ -185,5 +185,5 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
             todo = list(islice(source, 1))
         places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
         end = [p // protocol.STEP for p in places]
-        yield Batch([axes[k] for k in moving], at, end, part, not todo, clock)
+        yield Batch([axes[k] for k in moving], at, end, part, not todo, clock, move.brake)
         at = end

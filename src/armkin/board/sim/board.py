@@ -116,7 +116,7 @@ class SimBoard:
         """End the session; the first cause stays."""
         if not self._error:
             self._error, self._detail = error, detail
-        self.motors.stop()
+        self.motors.stop(wholly=error == Error.LIMIT_SWITCH)
 
     # Frames
 

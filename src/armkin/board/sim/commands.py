@@ -115,7 +115,7 @@ class Commands:
         segments = self._batches.check(batch, self._motors.axes.known)
         if idle and (switch := self._inputs.ahead(segments[0].rates)) is not None:
             raise RefusedError(Error.LIMIT_SWITCH, switch)
-        self._motors.append(segments, batch.at_rest)
+        self._motors.append(segments, batch.at_rest, batch.brake)
 
     def _ready(self, axis: int) -> None:
         """Raise unless an axis is used, known and has its drivers or pulses on."""

@@ -27,6 +27,7 @@ class Batch:
     end: tuple[int, ...]
     segments: list[Segment]
     at_rest: bool
+    brake: float  # share of the accelerations that a hold takes
 
 
 def batch(payload: bytes) -> Batch:
@@ -38,13 +39,15 @@ def batch(payload: bytes) -> Batch:
     k = len(axes)
     wide = bool(flags & protocol.MOTION_WIDE)
     size = protocol.segment_size(k, wide=wide)
-    known_flags = protocol.MOTION_END | protocol.MOTION_WIDE
-    if n == 0 or flags & ~known_flags or len(payload) != 6 + 8 * k + n * size:
+    gentle = flags >> protocol.MOTION_GENTLE
+    if n == 0 or gentle >= protocol.GENTLE_PARTS or len(payload) != 6 + 8 * k + n * size:
         raise RefusedError(Error.LENGTH)
     ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
     pieces = (payload[at : at + size] for at in range(6 + 8 * k, len(payload), size))
     segments = [protocol.read_segment(piece, axes, wide=wide) for piece in pieces]
-    return Batch(axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END))
+    return Batch(
+        axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END), 1 - gentle / protocol.GENTLE_PARTS
+    )
 
 
 def axes_of(mask: int) -> list[int]:

@@ -33,10 +33,12 @@ class Motors:
         self.state = State.IDLE
         self._cruising: Iterator[None] | None = None  # homing or jogging, a step a millisecond
         self._hold = 0.0  # [s] time to a stop that the hold allows
+        self._brake = 1.0  # by which that falls in a second
         self._fault = fault
 
-    def append(self, segments: list[Segment], at_rest: bool) -> None:
-        """Queue segments (a step for every axis), the last one ending at rest or not."""
+    def append(self, segments: list[Segment], at_rest: bool, brake: float) -> None:
+        """Queue segments (a step for every axis), the last one ending at rest or not; brake: see `stop`."""
+        self._brake = min(self._brake, brake)
         self.queue.append(segments, at_rest)
         if self.state == State.IDLE:
             self.state = State.MOVING
@@ -76,8 +78,12 @@ class Motors:
         self.axes.lose(search.rate)
         self._begin(State.HOMING, self.homing.run(search))
 
-    def stop(self) -> None:
-        """Come to rest along the path, or along the vector of homing and jogging."""
+    def stop(self, *, wholly: bool = False) -> None:
+        """Come to rest along the path, as gently as its batches ask for, or along the vector of homing and jogging.
+
+        wholly: with all of the accelerations.
+        """
+        self._brake = 1.0 if wholly else self._brake
         if self.state == State.MOVING:
             self.state, self._hold = State.HOLDING, self.queue.stop_time()
         elif self.state in (State.HOMING, State.JOGGING):
@@ -96,10 +102,12 @@ class Motors:
                 self._rest()
         elif self.state == State.MOVING:
             self._run(seconds)
-            if self.state == State.MOVING and self.queue.dry():
+            if self.state == State.MOVING and self.queue.dry(self.queue.stop_time()):
                 self._fault(Error.DRY)
         elif self.state == State.HOLDING:
-            self._hold -= seconds
+            if self.queue.dry(self._hold):
+                self._brake = 1.0
+            self._hold -= seconds * self._brake
             plan = self.queue.stop_time()
             if self._hold < _STANDING:
                 self.cut()
@@ -122,6 +130,7 @@ class Motors:
     def _rest(self) -> None:
         self.queue.rest()
         self._cruising = None
+        self._brake = 1.0
         self.state = State.IDLE
 
     def _plus_made(self, counts: list[int]) -> list[int]:

@@ -127,10 +127,9 @@ class Queue:
         limits = zip(now.segment.rates, self.axes.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
-    def dry(self) -> bool:
-        """Whether what is left is just enough to stop in, and does not end at rest."""
+    def dry(self, u: float) -> bool:
+        """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
         if not self._queue or self._queue[-1].end:
             return False
         rest = self._units * 256 - self._at
-        u = self.stop_time()
         return rest / self.clock < u + u / 32 + 0.002
