@@ -141,6 +141,17 @@ def test_a_hold_stops_on_the_path_within_the_ramp(brake: float) -> None:
     assert host.status().counts == after.counts
 
 
+def test_a_limit_switch_stops_within_the_ramp_however_gentle_the_motion() -> None:
+    unused = AxisImage()
+    image = Image((AXIS, AXIS, AXIS, unused, unused), (), (GuardImage(False, (1, 0, 0, 0, 0)), *(GuardImage(),) * 2))
+    host = ready(lambda number, net: number != 0 or net[0] < 300, image)  # pressed is low
+    assert host.move([0], [0], [whole(5000, 1600, 0, (5000,))], at_rest=True, brake=0.25) == Error.OK
+    host.board.advance(0.3)
+    status = host.status()
+    assert (status.error, status.state, status.known) == (Error.LIMIT_SWITCH, State.IDLE, 7)
+    assert 500 <= status.counts[0] <= 300 + 10_000 * (0.05 / 2 + 0.006)  # u = 50 ms, 3 ms of debounce
+
+
 @pytest.mark.parametrize("brake", [1.0, 0.125])
 def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
     host = ready()

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.board.backend.job import braking
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.cutting import cut
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.segments import cycles_of
 from armkin.board.opening import open_port
 from armkin.board.path_run import follow, parts
+from armkin.board.sim.queue import intervals
+from armkin.motion.curve import Curve
 
 
 def some_path(seed: int) -> dict[str, object]:
@@ -39,6 +42,35 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     follow(machine, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(one.segments for one in laid) < 100 * plan.duration + 50
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_segment_ends_faster_than_the_board_loads_the_next_one(seed: int) -> None:
+    """A tick that loads a segment may take more than the shortest interval: the next tick came early, or late."""
+    arm = armkin.load("three_dof")
+    corners = [[380, -50, 300], [310, 0, 280], [380, 50, 320], [300, 90, 300]]
+    zigzag = {"start": {"point": [300, -90, 300]}, "blend": 8, "moves": [{"line": p} for p in corners]}
+    plan = armkin.path(arm, some_path(seed) if seed else zigzag)
+    laid = cut(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=448)
+    for stretch, move in zip(plan.motion.stretches, laid.moves(), strict=True):
+        if isinstance(stretch, Curve):
+            assert min(min(intervals(s)) for s in move.segments) >= 1.1 * 448
+
+
+def test_a_board_that_is_sent_positions_slows_down_gently_on_curves() -> None:
+    """Time itself goes ever slower: a joint is asked for its plan's acceleration and for its speed by the ramp."""
+    arm = armkin.load("three_dof")
+    circle = armkin.path(arm, {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]})
+    t = np.linspace(0.0, circle.duration, 500)
+
+    def asked(ramp: float) -> float:
+        slower = circle.motion.qdd(t) - circle.motion.qd(t) / ramp
+        return float((np.abs(slower) / arm.max_accel).max())
+
+    ramp = braking(circle.motion)
+    assert asked(ramp) <= 1.63 < asked(0.625 * ramp)
+    there = armkin.path(arm, {"moves": [{"joint": {"q1": 60}}]})
+    assert braking(there.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
 
 
 def test_segments_follow_the_plan_in_time_and_place() -> None:

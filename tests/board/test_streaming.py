@@ -7,6 +7,7 @@ import os
 import numpy as np
 import pytest
 
+import armkin
 from armkin.board.firmware import framing, streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
@@ -50,6 +51,19 @@ def machine_on(port: SimPort) -> Machine:
     machine = Machine(port, ARM, configure(ARM))
     machine.prepare()
     return machine
+
+
+def test_a_hold_is_gentle_on_curves_alone() -> None:
+    """Bits 2 to 4 of a frame's flags: eighths of the accelerations that a hold on it leaves out."""
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]))
+    machine = machine_on(port)
+    moves = {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300]}}]}
+    plan = armkin.path(ARM, moves).motion
+    machine.run([machine.lay(plan, np.array(machine.counts()))])
+    gentle = [payload_of(frame)[4] >> 2 for frame in port.sent]
+    first = gentle.index(3)
+    assert gentle == [0] * first + [3] * (len(gentle) - first)
+    assert 0 < first < len(gentle) // 2
 
 
 def test_a_stall_before_the_first_step_begins_again() -> None:

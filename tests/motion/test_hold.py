@@ -1,4 +1,4 @@
-"""A hold on a curve: the board's motors slow down at their own accelerations along the path; no joint is overasked."""
+"""A hold on a curve: motors slow down along the path at 5/8 of their accelerations, and no joint is overasked."""
 
 from __future__ import annotations
 
