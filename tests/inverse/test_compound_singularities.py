@@ -38,12 +38,17 @@ from armkin.inverse.recognise import solver
         # a root of third order on the self-motion of joints 1 and 4: points beside it are no branches
         ("fanuc_crx10ia", [135, 0, 90, 90, -135, 135]),
         ("fanuc_crx10ia", [-135, 180, 90, -135, 135, -135]),
+        # self-motions of double roots, known to 1e-8 rad: two postures of each were listed
+        ("stanford", [90, 0, 660, -90, 180, -90]),
+        ("iiwa7", [90, -45, 0, 180, 0, 0]),
+        ("fanuc_crx10ia", [0, 0, -90, 180, -135, 90]),
+        ("fanuc_crx10ia", [-90, 90, -90, 0, -90, 180]),
     ],
 )
 def test_compound_singularities(name: str, q: list[float]) -> None:
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
-    joints = np.radians([q])
+    joints = np.where(arm.prismatic, [q], np.radians([q]))
     for near in (None, joints):
         verdict = truth.judge(arm, screw, None, joints, goal(task, screw, joints).array(), near)
         assert verdict, verdict

@@ -147,6 +147,22 @@ def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyP
     assert judged_as(status=np.full_like(right.status, Status.UNREACHABLE)).unreachable == rows.tolist()
 
 
+def test_the_judge_notices_a_self_motion_listed_by_two_of_its_postures(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, screw = shipped("puma560")
+    task, _ = solver(arm, None)
+    q = np.random.default_rng(3).uniform(-np.pi, np.pi, (8, 6))
+    q[:, 4] = 0.0
+    target = goal(task, screw, q).array()
+    right = armkin.ik(arm, target, near=q)
+    assert not right.valid[:, -1].any()
+    assert truth.judge(arm, screw, None, q, target)
+    two, there = right.q.copy(), right.valid.copy()
+    along = np.sqrt(2) * np.linalg.svd(armkin.jacobian(arm, q))[2][:, -1]  # joints 4 and 6 at one rad/s
+    two[:, -1], there[:, -1] = q + np.array([0.5, 1, 2, np.pi, 3.5, 4, 5, 6])[:, None] * along, True
+    monkeypatch.setattr(armkin, "ik", lambda *_, **__: replace(right, q=two, valid=there))
+    assert truth.judge(arm, screw, None, q, target).twice == list(range(8))
+
+
 def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
     arm = shipped("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (300, 6))

@@ -6,6 +6,7 @@ are made with the oracle's screws, never with armkin's own chain.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -157,7 +158,7 @@ class Verdict:
     unreachable: list[int] = field(default_factory=list)  # called so though a posture solves it
     lost: list[int] = field(default_factory=list)  # the posture asked for is no branch and on no reported self-motion
     false: list[int] = field(default_factory=list)  # a branch that misses the target
-    twice: list[int] = field(default_factory=list)  # two branches, and the posture between them solves the target
+    twice: list[int] = field(default_factory=list)  # two branches, and what lies between them solves the target
     moves: list[int] = field(default_factory=list)  # `near` solves the target, and the best branch is another one
     missed: list[tuple[int, Array]] = field(default_factory=list)  # the oracle's isolated branch, complete claimed
 
@@ -216,15 +217,23 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         # a longer valley is a self-motion, which the answer has to report
         long = (d[k, b].max(axis=1) > CLOSE) & (s.status[k] != Status.SINGULAR)
         verdict.lost = k[long | ~_in_one_valley(arm, screw, goals.take(k), asked[k], s.q[k, b])].tolist()
-    pairs = [np.zeros((3, 0), int)]
+    pairs = [np.zeros((4, 0), int)]
     for i in range(s.q.shape[1]):
         for j in range(i):
+            both = s.valid[:, i] & s.valid[:, j]
             with np.errstate(invalid="ignore"):
-                k = np.flatnonzero(apart(s.q[:, i], s.q[:, j]).max(axis=1) < CLOSE)
-            pairs.append(np.stack([k, np.full_like(k, i), np.full_like(k, j)]))
-    k, i, j = np.concatenate(pairs, axis=1)
+                off = apart(s.q[:, i], s.q[:, j])
+                # on one self-motion, perhaps: what it holds is alike
+                alike = (s.status == Status.SINGULAR) & (np.where(s.free, 0.0, off).max(axis=1) < 1e-4)
+                k = np.flatnonzero(both & (alike | (off.max(axis=1) < CLOSE)))
+            pairs.append(np.stack([k, np.full_like(k, i), np.full_like(k, j), alike[k]]))
+    k, i, j, alike = np.concatenate(pairs, axis=1)
     if len(k):
-        verdict.twice = k[_joined(arm, screw, goals.take(k), s.q[k, i], s.q[k, j])].tolist()
+        a, b = s.q[k, i], s.q[k, j]
+        close, straight = apart(a, b).max(axis=1) < CLOSE, alike > 0
+        close[close] = _joined(arm, screw, goals.take(k[close]), a[close], b[close])
+        straight[straight] = _straight(arm, screw, goals.take(k[straight]), a[straight], b[straight])
+        verdict.twice = np.unique(k[close | straight]).tolist()
     if near is not None:
         there = np.broadcast_to(near, q.shape)
         solves = miss_of(arm, screw, goals, there) < 0.5 * SOLVES
@@ -259,6 +268,24 @@ def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
 def _way(screw: Screws, a: Array, b: Array) -> Array:
     d = b - a
     return np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
+
+
+def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+    """Whether the joints move from one to the other (M, n) at constant paces and keep the target, either way round."""
+    unit = np.where(screw.prismatic, screw.size, 1.0)
+    d = _way(screw, a, b) / unit
+    half = ~screw.prismatic & (np.pi - np.abs(d) < 1e-3)
+    out = np.zeros(len(a), bool)
+    for flip in itertools.product((False, True), repeat=a.shape[1]):
+        k = np.flatnonzero(~out & ~(np.array(flip) & ~half).any(axis=1))
+        way, one = d[k] - 2 * np.pi * np.sign(d[k]) * np.array(flip), np.ones(len(k), bool)
+        for part in (0.25, 0.5, 0.75) if len(k) else ():
+            q = a[k] + part * way * unit
+            there = across(screw, goals.take(k), q)
+            one &= np.abs((there - q) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
+            one &= miss_of(arm, screw, goals.take(k), there) < 0.9 * SOLVES
+        out[k[one]] = True
+    return out
 
 
 def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:

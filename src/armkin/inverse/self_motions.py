@@ -68,11 +68,13 @@ def _leads_to(arm: Arm, task: Task, q: Array, corner: Array, target: Array) -> b
     return True
 
 
-def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, moving: Bool, target: Array) -> None:
+def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target: Array) -> None:
     """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
 
-    Groups are found around their first candidate, and reported by the one nearest to `near`.
+    curve: (K, M, n) the joints that a posture's self-motion moves. One group's posture may be close to another's;
+    where a self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
     """
+    moving = np.asarray(curve.any(axis=2))
     for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
         kept: list[int] = []
         for i in np.flatnonzero(chosen[k] & moving[k]):
@@ -80,10 +82,31 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, moving: Bool, targe
             close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
             between = q[k, i] + 0.5 * apart[close] * np.where(arm.prismatic, arm.reach, 1.0)
             there = np.repeat(target[k : k + 1], len(between), axis=0)
-            if (newton.missing(arm, task, between, there) <= SOLUTION).any():
+            held = np.where(curve[k, kept] & curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
+            if (newton.missing(arm, task, between, there) <= SOLUTION).any() or any(
+                _straight(arm, task, q[k, i], d, target[k]) for d in apart[held]
+            ):
                 chosen[k, i] = False
             else:
                 kept.append(int(i))
+
+
+def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool:
+    """Whether the joints can move from q (n,) to q + way while they keep the target, each at a constant pace.
+
+    A quarter, half and three quarters of the way are asked, each way round for joints that turn by 180 degrees. They
+    may be off by as much as roots of high order are.
+    """
+    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < TURNED))
+    flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
+    ways = np.tile(way, (len(flips), 1))
+    ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
+    steps = (np.array([0.25, 0.5, 0.75])[:, None, None] * ways).reshape(-1, arm.n)
+    start = q + steps * np.where(arm.prismatic, arm.reach, 1.0)
+    there, size = newton.correct(arm, task, start, np.repeat(target[None], len(start), axis=0), steps=3, least=WEAK)
+    off = np.abs(newton.difference(arm, there, start)).max(axis=1)
+    good = (size <= SOLUTION) & (off < 10 * TURNED)
+    return bool(good.reshape(3, -1).all(axis=0).any())
 
 
 def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:

@@ -190,7 +190,7 @@ def _settle(
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
     self_motions.drop_contained(arm, task, q, sigma, chosen, curve, target)
-    self_motions.drop_twins(arm, task, q, chosen, np.asarray(curve.any(axis=2)), target)
+    self_motions.drop_twins(arm, task, q, chosen, curve, target)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
     out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
