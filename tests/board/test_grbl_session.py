@@ -105,10 +105,21 @@ def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     assert str(too_fast[0]) == "$110 (q1: greatest speed, units/min) is 9000: the robot file wants $110=3600"
 
 
-@pytest.mark.parametrize("text", ["<Idle|MPos:1,x,3>", "<>", "Idle", "<Run|MPos:", "<Hold:x|MPos:0>", "<Idle|Bf:3>"])
+DAMAGED = ["<Idle|MPos:1,x,3>", "<>", "Idle", "<Run|MPos:", "<Hold:x|MPos:0>", "<Idle|Bf:3>"]
+NO_NUMBERS = ["nan", "inf", "-inf", "1e400", "1_0", "9" * 400, "\u0663", "", " 1", "+1"]
+
+
+@pytest.mark.parametrize("text", [*DAMAGED, *(f"<Idle|MPos:0.000,{text},0.000>" for text in NO_NUMBERS)])
 def test_damaged_reports_are_no_reports(text: str) -> None:
     found = replies.report(text)
     assert found is None or found.position is None
+
+
+@pytest.mark.parametrize("text", NO_NUMBERS)
+def test_what_grbl_never_prints_is_no_number(text: str) -> None:
+    assert replies.setting(f"$100={text}") is None
+    assert replies.offset(f"[G92:0.000,{text},0.000]") is None
+    assert replies.spindle(f"[GC:G0 M3 S{text}]") is None
 
 
 def test_any_bytes_end_in_an_answer_or_an_error() -> None:

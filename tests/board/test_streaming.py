@@ -113,3 +113,25 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
         assert streaming.lead(session) == seconds
     session.line.resent = 1
     assert streaming.lead(session) > 0.5
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_the_end_of_a_motion_is_asked_for_every_10_ms(bad: int) -> None:
+    """On a line that had lost a byte the host asked as fast as it was answered: 2,000 questions a motion."""
+    asked: list[float] = []
+
+    class Asked(SimPort):
+        def write(self, data: bytes) -> None:
+            super().write(data)
+            if payload_of(data)[0] == Type.STATUS_QUERY:
+                asked.append(self.now())
+                assert len(asked) < 1000
+
+    machine = machine_on(Asked(SimBoard(BOARDS["uno_cnc_shield"])))
+    machine.session.line.splitter.bad += bad
+    plan = machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))
+    began = machine.port.now()
+    machine.run([plan])
+    during = [at for at in asked if began < at < machine.port.now()]
+    assert len(during) < 110 * plan.duration
+    assert min(np.diff(during)) > 0.009

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import random
 import re
+from collections import Counter
 from typing import Any
 
 from command_line import Result, run
 
+ATTACKS = Counter[str]()  # inputs so far, by command
 CODES = {0, 1, 2, 3, 4, 5}
 NUMBERS = (
     "0 -0.0 1 -1 90 -90 180 360 1.0e-310 5.0e-324 -5.0e-324 1.0e-12 1.0e-7 0.5 1000000 1.0e+6 1.0e+7 -1.0e+7 1.0e+9 "
@@ -20,6 +23,7 @@ NUMBERS = (
 
 def attack(*words: object, stdin: bytes = b"") -> Result:
     """Run a command line and hold it to the contract: known exit code, no traceback, honest JSON, quiet stdout."""
+    ATTACKS[str(words[0])] += 1
     done = run(*words, stdin=stdin)
     shown = f"{words!r}\n{done}"[:3000]
     assert done.code in CODES, shown
@@ -33,6 +37,11 @@ def attack(*words: object, stdin: bytes = b"") -> Result:
         for line in done.out.splitlines():
             _finite(json.loads(line, parse_constant=_refused), shown)
     return done
+
+
+def generator(seed: object) -> random.Random:
+    """Random numbers, the same in every run; ARMKIN_FUZZ_SEED makes others of them."""
+    return random.Random(f"{seed} {os.environ.get('ARMKIN_FUZZ_SEED', '')}")
 
 
 def _refused(word: str) -> float:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import random
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
-from attack import attack
+from attack import attack, generator
 
 from armkin import load
+from armkin.board.firmware import session, streaming
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
+from armkin.board.klipper.axes import axes_of as klipper_axes_of
+from armkin.board.klipper.axes import settings_of
 from armkin.board.ports import Port
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.klipper import Klipper
 from armkin.board.sim.port import SimPort
 from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.board_kinds import BOARDS
@@ -21,10 +27,13 @@ from command_line import ROOT
 
 GRBL_ARM = ROOT / "tests/robots/three_dof_grbl.yaml"
 FITS = {number: value for number, (_, value) in wanted(axes_of(load(GRBL_ARM))).items()}
+KLIPPER_ARM = ROOT / "tests/robots/three_dof_klipper.yaml"
+SECTIONS = settings_of(klipper_axes_of(load(KLIPPER_ARM)))
 BOARDS_OF: dict[str, Callable[[random.Random], Port]] = {
     str(ROOT / "robots/three_dof.yaml"): lambda rng: SimPort(SimBoard(BOARDS["uno_cnc_shield"])),
-    str(GRBL_ARM): lambda rng: Grbl(axes=4, settings=rng.choice((FITS, {}))),
-    str(ROOT / "tests/robots/bus_arm.yaml"): lambda rng: ServoBus([Servo(number) for number in range(8)]),
+    str(GRBL_ARM): lambda rng: Grbl(axes=4, settings=rng.choice((FITS, FITS, FITS, {}))),
+    str(ROOT / "tests/robots/bus_arm.yaml"): lambda rng: ServoBus([Servo(number) for number in (1, 2, 6, 7)]),
+    str(KLIPPER_ARM): lambda rng: Klipper(rng.choice((SECTIONS, SECTIONS, SECTIONS, {}))),
 }
 SAID = (
     b"ok\r\n",
@@ -38,6 +47,10 @@ SAID = (
     b"\x00\x00\x00",
     b"\xff\xff\x01\x04\x00\x00\x00\xfa",
     b"\xff\xff\xfe\xff",
+    b"\x03",
+    b'{"id": 1, "result": {"state": "ready"}}\x03',
+    b'{"id": 2, "result": {"status": {"toolhead": {"position": [NaN, 1e999, 0, 0, -1e18, 7, {}]}}}}\x03',
+    b'{"id": 3, "error": {"error": "WebRequestError", "message": "Printer is shutdown\\n!!"}}\x03',
 )
 
 
@@ -49,11 +62,12 @@ class Unreliable:
 
     def __init__(self, port: Port, rng: random.Random) -> None:
         self.port, self.name, self.rng = port, port.name, rng
-        self.share = rng.choice((0.0, 0.003, 0.03, 0.3))
+        self.to_program = isinstance(port, Klipper)  # a socket to a program, which hears what it is told
+        self.share = rng.choice((0.0, 0.003, 0.03, 0.3)) * (0.1 if self.to_program else 1.0)  # its answers are long
         self.silent_from = rng.choice((1e9, rng.uniform(0, 4)))
 
     def write(self, data: bytes) -> None:
-        self.port.write(self.spoilt(data))
+        self.port.write(data if self.to_program else self.spoilt(data))
 
     def read(self, timeout: float) -> bytes:
         data = self.port.read(timeout)
@@ -71,8 +85,11 @@ class Unreliable:
 
     def spoilt(self, data: bytes) -> bytes:
         out = bytearray()
+        share = 0.02 * self.share
+        if not share:
+            return data
         for byte in data:
-            if self.rng.random() >= 0.02 * self.share:
+            if self.rng.random() >= share:
                 out.append(byte)
                 continue
             kind = self.rng.randrange(3)
@@ -80,16 +97,34 @@ class Unreliable:
         return bytes(out)
 
 
-@pytest.mark.parametrize("robot", BOARDS_OF, ids=("own firmware", "grbl", "servo bus"))
-def test_any_device(robot: str, rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = random.Random(robot.rpartition("/")[2])
-    make = BOARDS_OF[robot]
-    for module in ("armkin.board.opening", "armkin.board.ports"):  # our firmware's; boards of others, and stop
-        monkeypatch.setattr(f"{module}.SerialPort", lambda *given, **options: Unreliable(make(rng), rng))
-    codes = []
+class Numbers:
+    """Of the module `secrets` what a session takes, from the test's own seed."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.randbits, self.randbelow = rng.getrandbits, rng.randrange
+
+
+@pytest.mark.parametrize("robot", BOARDS_OF, ids=("own firmware", "grbl", "servo bus", "klipper"))
+def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = generator(robot.rpartition("/")[2])
+    boards: list[Port] = []
+
+    def opened(*given: object, **options: object) -> Port:
+        if not boards or rng.random() < 0.4:  # else the one of the command before, as that has left it
+            boards[:] = [BOARDS_OF[robot](rng)]
+        return Unreliable(boards[0], rng)
+
+    # our firmware's; boards of others, and stop; Klipper's
+    for port in ("opening.SerialPort", "ports.SerialPort", "kinds.klipper.SocketPort"):
+        monkeypatch.setattr(f"armkin.board.{port}", opened)
+    # The same in every run: no notes of other runs, no random session numbers, no leads for a busy computer.
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(session, "secrets", Numbers(rng))
+    monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
+    codes = list[int]()
     moved = 0
-    for _ in range(rounds):
-        assume = rng.choice(((), ("--assume-home",))) if "bus" not in robot else ()
+    while len(codes) < rounds or (not moved and len(codes) < 10 * rounds):
+        assume = rng.choice(((), ("--assume-home",), ("--assume-home",))) if "bus" not in robot else ()
         words = rng.choice(
             (
                 ("send", robot, "home", "--assume-home"),
@@ -97,7 +132,7 @@ def test_any_device(robot: str, rounds: int, monkeypatch: pytest.MonkeyPatch) ->
                 ("send", robot, "--batch", "-", *assume),
                 ("status", robot),
                 ("home", robot),
-                ("jog", robot, "q1" if "bus" not in robot else "j1", rng.choice((-5, 5))),
+                ("jog", robot, "q1" if "bus" not in robot else "j1", rng.choice((-5, 5)), *assume),
                 ("stop",),
                 ("grip", robot, "closed", "--assume", "open"),
                 ("setup", robot),

@@ -6,17 +6,18 @@ import random
 from pathlib import Path
 
 import pytest
-from attack import attack, spoilt
+from attack import attack, generator, spoilt
 
 import armkin
 from command_line import ROOT
 
+EXPORTS = ("--json", "--dh", "--mdh", "--screws", "--urdf")
 FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_passes_validation_works_in_every_command(seed: int, rounds: int, tmp_path: Path) -> None:
-    rng = random.Random(seed)
+    rng = generator(seed)
     good = 0
     for i in range(rounds):
         path = tmp_path / f"arm{i}.yaml"
@@ -39,6 +40,9 @@ def use(rng: random.Random, path: Path) -> None:
     attack("ik", path, *[round(rng.uniform(-500, 500), 1) for _ in range(rng.choice((2, 3, 3, 4, 5, 6)))], "--json")
     attack("pulses", path, "home", "--json")
     attack("pulses", path, *pose, "--json")
-    attack("workspace", path, "--samples", "20", "--json")
+    if rng.random() < 0.3:
+        attack("workspace", path, "--samples", "20", "--json")
+    else:
+        attack("export", path, rng.choice(EXPORTS))
     attack("send", path, "home", "--dry-run", "--json")
     attack("send", path, *pose, "--dry-run", "--json")

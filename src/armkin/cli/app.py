@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import cache
 from importlib import import_module
 from keyword import iskeyword
 from typing import Annotated, Any
@@ -108,8 +109,9 @@ def _other_command(name: str, rest: list[str]) -> str:
     return f"did you mean {close[0]}?" if close else "armkin --help lists them"
 
 
+@cache
 def load(name: str) -> Any:
-    """Import a command's module and let Typer read its function."""
+    """Import a command's module and let Typer read its function; once in a process that runs many command lines."""
     word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
@@ -138,6 +140,12 @@ def armkin(
     """Robot arms from a YAML table to real motion. Millimetres and degrees throughout."""
 
 
+@cache
+def _group() -> Any:
+    """The group with all its commands."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: list[str]) -> int:
     """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
     before = {number: signal.signal(number, _terminate) for number in _ending()}
@@ -145,7 +153,7 @@ def run(arguments: list[str]) -> int:
         arguments = [*arguments[1:2], "--help"]
     output.for_programs("--json" in arguments, [*arguments, os.environ.get("ARMKIN_PORT", "")])
     try:
-        code = _exit_code(lambda: app(arguments, prog_name="armkin", standalone_mode=False))
+        code = _exit_code(lambda: _group()(arguments, prog_name="armkin", standalone_mode=False))
         # What a failed command has printed stays printed: the rows of a batch before the malformed one.
         return _exit_code(_flush) or code
     finally:

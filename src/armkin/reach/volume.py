@@ -81,7 +81,8 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     low, high = look.least - margin, look.most + margin
     if section.revolute:
         low[0] = max(low[0], 0.0)
-    cells = _Cells(section, low, high, _LINE if dimensions == 2 else _SIDE)
+    side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # of cells finer than that most stay empty
+    cells = _Cells(section, low, high, _LINE if dimensions == 2 else side)
     _fill(cells, rng, _UNIFORM, _GROWN, chunk)
     levels = [cells]
     while (coarse := levels[-1].merged()) is not None:

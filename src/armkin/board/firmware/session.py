@@ -17,7 +17,8 @@ from armkin.errors import LinkError
 
 _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
 _POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
-_POLL_CREDIT = 0.01  # [s] while waiting for credit, which only answers bring
+_POLL_SOON = 0.01  # [s] while waiting for credit, which only answers bring, and for the queue's end
+_ENDS = 50  # [ms] of motion that the queue holds when its end is near
 _GIVE_UP = 1.5  # [s] without any answer
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
@@ -146,8 +147,8 @@ class Session:
         self.submit(make)
         self.flush()
 
-    def pump(self, timeout: float = 0.005) -> None:
-        """One turn: send what may be sent, hear what has come within `timeout`.
+    def pump(self, timeout: float = 0.005, ends: bool = False) -> None:
+        """One turn: send what may be sent, hear what has come within `timeout`; ends: the queue does, so ask soon.
 
         Raises DeviceError when the session has ended, StoppedError after a stop, and LinkError when
         nothing answers.
@@ -156,7 +157,8 @@ class Session:
             raise StoppedError(self.hold())
         now = self.port.now()
         self._window.send()
-        quick = _POLL_CREDIT if self._window.out_of_credit else _POLL_NOISY if self.line.damaged else _POLL
+        soon = ends or self._window.out_of_credit
+        quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
         if now - self._asked >= quick:
             self._ask()
         self._hear(timeout)
@@ -262,10 +264,7 @@ class Session:
             self._stalled()
             if not self._window and self.state == State.IDLE:
                 return
-            # Asking again when the queue must have ended, rather than at the next poll.
-            if not self._window and self.queued < 50:
-                self._asked = min(self._asked, self.port.now() - _POLL + 0.01)
-            self.pump()
+            self.pump(ends=not self._window and self.queued < _ENDS)
             yield self.under_way + self.queued / 1000
 
     def _silent(self) -> LinkError:

@@ -39,7 +39,7 @@ ERRORS = {
 }
 LOSES_POSITION = {1, 3, 6, 7, 8, 9}  # alarms after which counted steps mean nothing
 
-_VALUES = re.compile(r"[^,]+")
+_NUMBER = r"-?[0-9]{1,9}(?:\.[0-9]{1,9})?"  # as GRBL prints it; nothing that it measures or keeps is longer
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,10 @@ def report(line: str) -> Report | None:
     state, _, detail = head.partition(":")
     found: dict[str, str] = dict(field.partition(":")[::2] for field in fields)
     try:
-        position = tuple(float(value) for value in found["MPos"].split(",")) if "MPos" in found else None
-        free = tuple(int(value) for value in found["Bf"].split(",")) if "Bf" in found else None
-        return Report(state, int(detail or 0), position, (free[0], free[1]) if free else None, found.get("Pn", ""))
+        position = _values(found["MPos"]) if "MPos" in found else None
+        free = [int(value) for value in _values(found["Bf"])] if "Bf" in found else None
+        room = (free[0], free[1]) if free else None
+        return Report(state, int(_value(detail or "0")), position, room, found.get("Pn", ""))
     except (ValueError, IndexError):
         return None
 
@@ -78,7 +79,7 @@ def setting(line: str) -> tuple[int, float] | None:
     >>> setting("$100=44.444")
     (100, 44.444)
     """
-    match = re.fullmatch(r"\$(\d{1,3})=(-?\d+(?:\.\d*)?)(?:\s.*)?", line)
+    match = re.fullmatch(rf"\$(\d{{1,3}})=({_NUMBER})(?:\s.*)?", line)
     return (int(match[1]), float(match[2])) if match else None
 
 
@@ -92,7 +93,7 @@ def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
     if match is None:
         return None
     try:
-        return match[1], tuple(float(value) for value in _VALUES.findall(match[2]))
+        return match[1], _values(match[2])
     except ValueError:
         return None
 
@@ -104,8 +105,19 @@ def spindle(line: str) -> float | None:
     120.0
     """
     words = line[4:-1].split() if line.startswith("[GC:") and line.endswith("]") else []
-    speeds = [word[1:] for word in words if re.fullmatch(r"S\d+(\.\d*)?", word)]
+    speeds = [word[1:] for word in words if re.fullmatch(f"S{_NUMBER}", word)]
     return float(speeds[0]) if "M3" in words and speeds else None
+
+
+def _value(text: str) -> float:
+    """A number as GRBL prints it. Raises ValueError for others, such as nan, 1e400 or 1_0."""
+    if not re.fullmatch(_NUMBER, text):
+        raise ValueError(text)
+    return float(text)
+
+
+def _values(text: str) -> tuple[float, ...]:
+    return tuple(_value(part) for part in text.split(","))
 
 
 def alarm(number: int) -> str:

@@ -12,6 +12,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,7 +83,8 @@ class Klipper(SimulatedTime):
         self._heard += b"" if self.dead else data
         *whole, self._heard = self._heard.split(END)
         for part in whole:
-            self._requests.append(json.loads(part))
+            with suppress(ValueError):  # Klipper logs what is no request, and goes on
+                self._requests.append(json.loads(part))
 
     def read(self, timeout: float) -> bytes:
         """What Klipper has said, requests that wait for no time answered first."""

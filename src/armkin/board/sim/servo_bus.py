@@ -51,8 +51,11 @@ class Servo:
 
     def advance(self, seconds: float) -> None:
         """Let time pass: with its torque on, the shaft moves towards the goal."""
+        moves = self.get(TORQUE) == 1 and self.at != self.get(GOAL_POSITION)
+        if seconds > 0 and not moves and not self.speed:
+            return  # it stands, and its registers say so
         before = self.at
-        if self.get(TORQUE) == 1 and seconds > 0:
+        if moves and seconds > 0:
             fastest = (abs(self.get(GOAL_SPEED)) or FASTEST) * seconds
             self.at += max(-fastest, min(fastest, self.get(GOAL_POSITION) - self.at))
         self.speed = (self.at - before) / seconds if seconds > 0 else 0.0
