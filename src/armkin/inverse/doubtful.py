@@ -57,15 +57,17 @@ def decided(
     def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""
         some = open_[some]
-        if not free[some].any():
-            return q[some], np.zeros(q[some].shape[:2], bool)
-        rows = doubtful[some]
-        goal = entries(task, target[rows])
-        first, other = (
+        first, loose = q[some], np.zeros(q[some].shape[:2], bool)
+        loosened = np.flatnonzero(free[some])
+        if not len(loosened):
+            return first, loose
+        rows = doubtful[some[loosened]]
+        goal, other = entries(task, target[rows]), np.full(first.shape, np.nan)
+        first[loosened], other[loosened] = (
             as_rows(runner.candidates(goal, preferred(arm, near[rows] + shift))[: arm.n], len(rows))
             for shift in (0.0, 1.0)
         )
-        loose = ~(np.abs(first - other).max(axis=2) < SAME)
+        loose[loosened] = ~(np.abs(first[loosened] - other[loosened]).max(axis=2) < SAME)
         if not loose.any():
             return first, loose
         other[~loose] = np.nan

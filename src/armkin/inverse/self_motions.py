@@ -114,6 +114,16 @@ def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
 
 
+def _stays(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Int, Array]:
+    """Which postures (M, n), a step (M,) away along push (M, n) and pulled back, are still away; and their growth."""
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    there, size = _follow(arm, task, q + step[:, None] * push * unit, target)
+    size -= newton.missing(arm, task, q, target)
+    far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
+    some = np.flatnonzero(far & (size <= GROWTH * step))
+    return some, size[some]
+
+
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether the joints can move while the target is kept, and which do.
 
@@ -126,23 +136,19 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
     pushes = list(_null_directions(arm.n, V, nullity))
     who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
-    # most candidates fall back at once
-    first = STEP * (10 if len(pushes) > 1 else 1)
-    there, size = _follow(arm, task, q[who] + first * push * unit, target[who])
-    size -= newton.missing(arm, task, q, target)[who]
-    far = (np.abs(there - q[who]) / unit).max(axis=1) > 0.3 * first * np.abs(push).max(axis=1)
-    some = np.flatnonzero(far & (size <= GROWTH * first))
+    # Most candidates fall back at once. Where several directions are lost, a short step is drawn back into the corner.
+    several = nullity[who] > 1
+    first = np.where(several, 10 * STEP, STEP)
+    some, grown = _stays(arm, task, q[who], first, push, target[who])
+    # of those that lose one direction most do not stay on a longer way
+    one = np.flatnonzero(~several[some] & (grown > NO_GROWTH))
+    if len(one):
+        at = some[one]
+        on, _ = _stays(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
+        some = np.delete(some, np.delete(one, on))
     if not len(some):
         return moving, joints
-    if len(pushes) == 1:  # of these, most do not stay on a longer way
-        who, push, grown = who[some], push[some], size[some]
-        there, size = _follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
-        size -= newton.missing(arm, task, q, target)[who]
-        far = (np.abs(there - q[who]) / unit).max(axis=1) > 3 * STEP * np.abs(push).max(axis=1)
-        some = np.flatnonzero((grown <= NO_GROWTH) | (far & (size <= GROWTH * 10 * STEP)))
-        if not len(some):
-            return moving, joints
-    who, push = who[some], push[some]
+    who, push, several = who[some], push[some], several[some]
     # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
     sizes, ways, parts = np.ix_(*([STEP, 10 * STEP], [1.0, -1.0], [1.0, 0.6], [0.0], [0.0]))[:3]
     start = q[who] + sizes * ways * parts * push * unit
@@ -156,9 +162,9 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     short, long = (apart & (moved.max(axis=3) > least[:, None])).all(axis=1) & (
         grown <= GROWTH * np.array([[STEP], [10 * STEP]])
     )
-    # Where several directions are lost at once, a short step is drawn back into the corner. Where the residual grows
-    # at all, it must do so slowly as far as the long step: near a fold the first tenth of a radian costs nothing.
-    along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & (len(pushes) > 1))
+    # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
+    # radian costs nothing
+    along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & several)
     np.logical_or.at(moving, who, along)
     np.logical_or.at(joints, who, along[:, None] & (moved > 1e-3 * STEP).any(axis=(0, 1)))
     return moving, joints

@@ -9,10 +9,10 @@ from armkin.formula.arrays import Array
 
 
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:
-    """``function(matrix, *arguments)``, with noise of rounding size added if a member is singular.
+    """``function(matrix, *arguments)``, with noise of rounding size added to members that are singular.
 
-    Numpy raises for a whole stack of matrices if one of them has a zero pivot.  Other members lose a few of
-    their last digits, which Newton's method gives back.
+    Numpy raises for a whole stack of matrices if one of them has a zero pivot. The others are left as they are: what
+    becomes of a member does not depend on its neighbours.
 
     Args:
         function: `np.linalg.inv`, `np.linalg.solve` and the like.
@@ -21,11 +21,13 @@ def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Ar
     try:
         return np.asarray(function(matrix, *arguments))
     except np.linalg.LinAlgError:
-        noise = np.random.default_rng(0)
-        size = 1e-13 * (1 + float(np.abs(matrix).max()))
+        noise, nudge = np.random.default_rng(0), matrix.copy()
+        size = 1e-13 * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
         for _ in range(8):  # the noise may itself cancel what is left of a pivot
+            singular = np.linalg.slogdet(nudge).sign == 0
+            nudge[singular] = (matrix + size * noise.standard_normal(matrix.shape[1:]))[singular]
             try:
-                return np.asarray(function(matrix + size * noise.standard_normal(matrix.shape), *arguments))
+                return np.asarray(function(nudge, *arguments))
             except np.linalg.LinAlgError:
                 size *= 3
         raise
