@@ -37,7 +37,7 @@ def test_all_at_once_is_as_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch
     def nothing(arm: Arm, task: object, q: np.ndarray, *rest: object) -> regular.Regular:
         decided.append(len(q))
         none = np.zeros(len(q), bool)
-        return regular.Regular(none, np.zeros(q.shape[:2], bool), none, q, none)
+        return regular.Regular(none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), arm.n), bool), q, none)
 
     monkeypatch.setattr(regular, "settle", nothing)
     _, one_by_one = nearly_singular(name)

@@ -46,13 +46,15 @@ def decided(
             continue
         found = regular.settle(arm, task, q[part], valid[part], target[rows], near[rows])
         left[part] = ~found.known
-        new = np.flatnonzero(found.known & (found.double | found.changed))
+        moving = np.asarray(found.free.any(axis=1))
+        new = np.flatnonzero(found.known & (found.double | found.changed | moving))
         if len(new):
             order = np.argsort(~found.branch[new], axis=1, kind="stable")
             kept = np.take_along_axis(found.q[new], order[:, :, None], axis=1)
             there = np.take_along_axis(found.branch[new], order, axis=1)
             write(arm, out, rows[new], kept, there, order, near[rows[new]])
             out.status[rows[new]] = np.where(found.double[new], Status.BOUNDARY, Status.EXACT)
+            out.status[rows[new[moving[new]]]], out.free[rows[new]] = Status.SINGULAR, found.free[new]
 
     def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse import folds, self_motions
 from armkin.inverse.clusters import means
-from armkin.inverse.folds import BENT, folds
+from armkin.inverse.folds import BENT, CLEAR, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
+from armkin.inverse.numeric.tolerances import BESIDE, CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -29,15 +30,36 @@ SHORT = 1e-6  # [rad, reaches] a step whose square is below rounding
 class Regular(NamedTuple):
     """What is known of K targets: known (K,) whether anything is, branch (K, B) candidates that are its branches.
 
-    double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another. q: (K, B, n) the candidates,
-    those of changed targets (K,) corrected.
+    double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another. free: (K, n) joints that
+    move along a self-motion. q: (K, B, n) the candidates, those of changed targets (K,) corrected.
     """
 
     known: Bool
     branch: Bool
     double: Bool
+    free: Bool
     q: Array
     changed: Bool
+
+
+class _Slopes(NamedTuple):
+    """Residuals of candidates, r (K, B, k) and their size (K, B), and the Jacobian J (K, B, k, n)."""
+
+    r: Array
+    size: Array
+    J: Array
+
+
+class _Weak(NamedTuple):
+    """What the weak ones of K targets' candidates are.
+
+    open: (K,) one may lie on a self-motion that others share, or may yet become a branch. moving: (K, B) it can move
+    without moving the tool, joints: (K, B, n) these joints.
+    """
+
+    open: Bool
+    moving: Bool
+    joints: Bool
 
 
 def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Array) -> Regular:
@@ -46,19 +68,19 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     both = np.concatenate([near[:, None], q], axis=1).reshape(-1, n)
     r, J = newton.scaled(arm, task, both, np.repeat(target, B + 1, axis=0))
     size = np.sqrt((r * r).sum(axis=1)).reshape(K, B + 1)
-    q, valid, changed = _corrected(arm, task, q, valid, r, J, size[:, 1:], target)
+    at = _Slopes(r.reshape(K, B + 1, -1)[:, 1:], size[:, 1:], J.reshape(K, B + 1, *J.shape[1:])[:, 1:])
+    q, valid, changed = _corrected(arm, task, q, valid, at, target)
     # `near` is no branch itself, accepted candidates need no correction, and others are beyond it
     known = (size[:, 0] > SOLUTION) & valid.any(axis=1)
-    known &= ~(valid & ~(size[:, 1:] < CLOSED)).any(axis=1)
-    sigma = np.ones((K, B))
-    sigma[valid] = _weakest(arm, task, J.reshape(K, B + 1, *J.shape[1:])[:, 1:][valid])
-    known &= ~_open(arm, task, q, valid, size[:, 1:], sigma, target)
+    known &= ~(valid & ~(at.size < CLOSED)).any(axis=1)
+    sigma, weak = _weak(arm, task, q, valid, at, target)
+    known &= ~weak.open
     with np.errstate(invalid="ignore"):
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
-        clusters = ((away < CLUSTER).sum(axis=2) > 2) & (size[:, 1:] < SEED)
+        clusters = ((away < CLUSTER).sum(axis=2) > 2) & (at.size < SEED)
     if clusters.any():  # roots of third or fourth order: their mean is right to rounding
         mean = means(arm, q)[clusters]
-        clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < size[:, 1:][clusters]
+        clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < at.size[clusters]
     two = valid[:, :, None] & valid[:, None]
     close = np.triu(two & (away < HAIR) & known[:, None, None], 1)
     same = 2 * SAME + np.minimum(2e-13 / np.maximum(sigma, 1e-300), 4e-4)
@@ -70,58 +92,74 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
         middle = q[k, i] + 0.5 * newton.difference(arm, q[k, j], q[k, i]) * unit
         joined = newton.missing(arm, task, middle, target[k]) <= SOLUTION
         one[k[joined], i[joined], j[joined]] = True
-    merged = np.asarray(one.any(axis=(1, 2)))
-    known &= ((one | one.swapaxes(1, 2)).sum(axis=2) < 2).all(axis=1)
-    second = size[:, None, 1:] < size[:, 1:, None]  # the more exact of two stays
+    either = one | one.swapaxes(1, 2)
+    known &= (either.sum(axis=2) < 2).all(axis=1)
+    if weak.moving.any():  # self-motions are told apart posture by posture
+        alone = np.eye(B, dtype=bool) | ~(weak.moving[:, :, None] & (either | (weak.moving[:, None] & (away < BESIDE))))
+        known &= alone.all(axis=(1, 2))
+    second = at.size[:, None] < at.size[:, :, None]  # the more exact of two stays
     branch = valid & ~(one & second).any(axis=2) & ~(one & ~second).any(axis=1)
-    return Regular(known, branch, merged | (branch & (sigma < DOUBLE)).any(axis=1), q, changed)
+    double, free = either.any(axis=(1, 2)) | (branch & (sigma < DOUBLE)).any(axis=1), weak.joints.any(axis=1)
+    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed)
 
 
-def _corrected(
-    arm: Arm, task: Task, q: Array, valid: Bool, r: Array, J: Array, size: Array, target: Array
-) -> tuple[Array, Bool, Bool]:
+def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, Bool, Bool]:
     """Candidates, accepted ones and changed targets, after one step of those that are only just not accepted.
 
-    r, J: of `near` and the candidates; size: (K, B) residuals, those of corrected candidates are written into it.
+    at: of the candidates; what changes with a correction is written into it.
     """
-    B = valid.shape[1]
-    k, b = np.nonzero(~valid & (size < NEARBY))
+    k, b = np.nonzero(~valid & (at.size < NEARBY))
     changed = np.zeros(len(q), bool)
     if not len(k):
         return q, valid, changed
-    at = k * (B + 1) + b + 1
-    step = (np.linalg.pinv(J[at]) @ r[at, :, None])[:, :, 0]
+    step = (np.linalg.pinv(at.J[k, b]) @ at.r[k, b, :, None])[:, :, 0]
     better = q[k, b] + step * np.where(arm.prismatic, arm.reach, 1.0)
-    left = newton.missing(arm, task, better, target[k])
-    good = (np.abs(step).max(axis=1) < SHORT) & (left < CLOSED)
+    r, J = newton.scaled(arm, task, better, target[k])
+    size = np.sqrt((r * r).sum(axis=1))
+    good = (np.abs(step).max(axis=1) < SHORT) & (size < CLOSED)
     k, b = k[good], b[good]
     q, valid = q.copy(), valid.copy()
-    q[k, b], valid[k, b], size[k, b], changed[k] = better[good], True, left[good], True
+    q[k, b], valid[k, b], changed[k] = better[good], True, True
+    at.r[k, b], at.size[k, b], at.J[k, b] = r[good], size[good], J[good]
     return q, valid, changed
 
 
-def _open(arm: Arm, task: Task, q: Array, valid: Bool, size: Array, sigma: Array, target: Array) -> Bool:
-    """Targets (K,) of which a branch may lie on a self-motion, or a candidate may yet become a branch."""
-    weak, near = valid & (sigma < 1.1 * MOVING), ~valid & (size < SEED)
-    k, b = np.nonzero(weak | near)
-    open_ = np.zeros(len(q), bool)
-    if len(k):
-        at = folds(arm, task, q[k, b], target[k])
-        bent = np.abs(at.bend) > BENT
-        # beyond a fold, and what else is missing is so little that putting it right does not lead back
-        beyond = (at.weakest < 1e-6) & (at.lost * at.bend > 0) & (np.abs(at.lost) > 10 * SOLUTION)
-        beyond &= (at.rest < 1e-3) & (100 * at.rest**2 < np.abs(at.lost))
-        np.logical_or.at(open_, k, ~(bent & (weak[k, b] | beyond)))
-    return open_
-
-
-def _weakest(arm: Arm, task: Task, J: Array) -> Array:
-    """Smallest singular values of Jacobians (M, r, n) for the task, or lower bounds that are above `DOUBLE`: (M,)."""
-    bound = np.zeros(len(J))
-    if J.shape[1] == J.shape[2] and task.orientation != "axis":
-        inverse = nudged(np.linalg.inv, J)  # its Frobenius norm is no smaller than its largest singular value
-        bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-    few = np.flatnonzero(bound < 1.1 * DOUBLE)
-    if len(few):
-        bound[few] = np.linalg.svd(J[few], compute_uv=False)[:, min(task.constraints, arm.n) - 1]
-    return bound
+def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, _Weak]:
+    """Smallest singular values (K, B) of accepted candidates, or bounds above `DOUBLE`; and what weak ones are."""
+    K, B, n = q.shape
+    sigma = np.ones((K, B))
+    plain = folds.square(arm, task)
+    if plain:
+        inverse = nudged(np.linalg.inv, at.J[valid])  # its Frobenius norm is no smaller than its largest singular value
+        sigma[valid] = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+    else:
+        sigma[valid] = 0.0
+    others = ~valid & (at.size < SEED)
+    k, b = np.nonzero(others | (valid & (sigma < 1.1 * DOUBLE)))
+    found = _Weak(np.zeros(K, bool), np.zeros((K, B), bool), np.zeros((K, B, n), bool))
+    if not len(k):
+        return sigma, found
+    U, S, V = np.linalg.svd(at.J[k, b])
+    own = valid[k, b]
+    sigma[k[own], b[own]] = S[own, min(task.constraints, n) - 1]
+    some = np.flatnonzero(~own | (sigma[k, b] < 1.1 * MOVING))
+    k, b, U, S, V, own = k[some], b[some], U[some], S[some], V[some], own[some]
+    if not len(k):
+        return sigma, found
+    fold = folds.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
+    bent = np.abs(fold.bend) > BENT
+    # beyond a fold, and what else is missing is so little that putting it right does not lead back
+    beyond = bent & (fold.weakest < 1e-6) & (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
+    beyond &= (fold.rest < 1e-3) & (100 * fold.rest**2 < np.abs(fold.lost))
+    exact = np.abs(fold.lost) <= SAME * fold.weakest  # a correction would not move it
+    decided = np.where(own, bent | (exact & self_motions.isolated(fold)), beyond)
+    # what is left of a target of which all can be asked: one direction is lost, and no other branch shares the motion
+    asked = own & exact & (S[:, -1] > 2 * SOLUTION) & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)
+    found.open[k[~decided & ~asked]] = True
+    rest = np.flatnonzero(~decided & ~found.open[k])
+    if len(rest) and plain:
+        k, b = k[rest], b[rest]
+        found.moving[k, b], found.joints[k, b] = self_motions.self_motion(
+            arm, task, q[k, b], V[rest], np.ones(len(k), np.int64), target[k], folds.some(fold, rest)
+        )
+    return sigma, found

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import clusters, self_motions
-from armkin.inverse.folds import BENT, folds
+from armkin.inverse import clusters, folds, self_motions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
@@ -151,11 +150,12 @@ def _settle(
         if len(some):
             k, b = k[some], b[some]
             asked[k, b] = True
-            straight = ~(np.abs(folds(arm, task, q[k, b], target[k]).bend) > BENT)
-            if straight.any():
-                k, b = k[straight], b[straight]
+            fold = folds.folds(arm, task, q[k, b], target[k])
+            some = np.flatnonzero(~self_motions.isolated(fold))
+            if len(some):
+                k, b, fold = k[some], b[some], folds.some(fold, some)
                 lost = np.maximum(nullity[k, b], 1)
-                moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
+                moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k], fold)
 
     if (~asked).sum() <= AT_ONCE:
         ask(*np.nonzero(~asked))
