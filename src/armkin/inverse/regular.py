@@ -17,7 +17,7 @@ from armkin.inverse.clusters import means
 from armkin.inverse.folds import BENT, CLEAR, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import BESIDE, CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
+from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -94,9 +94,9 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
         one[k[joined], i[joined], j[joined]] = True
     either = one | one.swapaxes(1, 2)
     known &= (either.sum(axis=2) < 2).all(axis=1)
-    if weak.moving.any():  # self-motions are told apart posture by posture
-        alone = np.eye(B, dtype=bool) | ~(weak.moving[:, :, None] & (either | (weak.moving[:, None] & (away < BESIDE))))
-        known &= alone.all(axis=(1, 2))
+    known &= ~(either & weak.moving[:, :, None]).any(axis=(1, 2))
+    for row in np.flatnonzero(known & weak.moving.any(axis=1)):
+        known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])
     second = at.size[:, None] < at.size[:, :, None]  # the more exact of two stays
     branch = valid & ~(one & second).any(axis=2) & ~(one & ~second).any(axis=1)
     double, free = either.any(axis=(1, 2)) | (branch & (sigma < DOUBLE)).any(axis=1), weak.joints.any(axis=1)

@@ -103,16 +103,40 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool
     A quarter, half and three quarters of the way are asked, each way round for joints that turn by 180 degrees. They
     may be off by as much as roots of high order are.
     """
-    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < TURNED))
-    flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
-    ways = np.tile(way, (len(flips), 1))
-    ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
-    steps = (np.array([0.25, 0.5, 0.75])[:, None, None] * ways).reshape(-1, arm.n)
+    steps = (np.array([0.25, 0.5, 0.75])[:, None, None] * _both_ways(arm, way)).reshape(-1, arm.n)
     start = q + steps * np.where(arm.prismatic, arm.reach, 1.0)
     there, size = newton.correct(arm, task, start, np.repeat(target[None], len(start), axis=0), steps=3, least=WEAK)
     off = np.abs(newton.difference(arm, there, start)).max(axis=1)
     good = (size <= SOLUTION) & (off < 10 * TURNED)
     return bool(good.reshape(3, -1).all(axis=0).any())
+
+
+def _both_ways(arm: Arm, way: Array) -> Array:
+    """A way (n,) each way round for joints that turn by 180 degrees: (m, n)."""
+    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < TURNED))
+    flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
+    ways = np.tile(way, (len(flips), 1))
+    ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
+    return ways
+
+
+def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool:
+    """Whether it is clear that no two postures (B, n) of one target, whose self-motions move curve (B, n), share one.
+
+    Not if they are close. If they differ in moving joints alone, one half way between them that misses the target by
+    far tells: `drop_twins` would have to move it farther than it does.
+    """
+    halfway, unit = [], np.where(arm.prismatic, arm.reach, 1.0)
+    for i, j in itertools.combinations(np.flatnonzero(curve.any(axis=1)), 2):
+        way = newton.difference(arm, q[j], q[i])
+        if np.abs(way).max() < BESIDE:
+            return False
+        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < TURNED:
+            halfway.append(q[i] + 0.5 * _both_ways(arm, way) * unit)
+    if not halfway:
+        return True
+    between = np.concatenate(halfway)
+    return bool((newton.missing(arm, task, between, np.repeat(target[None], len(between), axis=0)) > 0.01).all())
 
 
 def isolated(at: Folds) -> Bool:
