@@ -9,6 +9,7 @@
 //   fine_t, sfine_t            an unsigned and a signed integer of at least 24 bits
 //   DDA_ADVANCE(planned)       planned = dda.interval >> 16, dda.interval += dda.add >> 8
 //   HAL_NEAR(pointer)          keep it in a register that its fields are reached from, or nothing
+//   HAL_COMING(cycles)         the next tick's interval, told in time where loading a segment may take longer than the one before
 //   DDA_AXIS(i, …)             one axis of the tick, see core/dda.h
 //   dda_direction(back)        sets the DIR pins, inline where a call would cost too much
 #pragma once

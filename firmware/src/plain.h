@@ -19,3 +19,4 @@ void dda_direction(uint16_t back);
     dda.interval += dda.add >> 8;
 
 #define HAL_NEAR(pointer)
+#define HAL_COMING(cycles)

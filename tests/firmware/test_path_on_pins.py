@@ -6,16 +6,19 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import curve_on_pins
 import numpy as np
 import pytest
 import waypoints_on_pins
+from bare_host import WIDE, BareHost, batches, image_for
 from emulator import EmulatedBoard
 from pins import net
 
 import armkin
+from armkin.board.firmware import protocol
 from armkin.motors import motor_accel
 from command_line import ROOT, THREE_DOF, run
 
@@ -73,6 +76,22 @@ def test_every_step_of_a_curve_comes_when_the_protocol_says(circle: curve_on_pin
     assert run.late_us <= 5.0
     assert run.off_mm <= 0.05 + HALF_A_STEP
     assert run.segments_a_second <= 100
+
+
+def test_a_tick_behind_the_shortest_interval_is_not_early() -> None:
+    """A tick that loads a segment takes longer than the shortest interval: the timer must know of the next one before."""
+    fast = protocol.Segment(400, 448, 0, (204_800, -102_400, 51_200))
+    slow = protocol.Segment(200, 1344, 5000, tuple(-3 * rate for rate in fast.rates), 50, True)
+    segments = [fast, slow] * 10
+    with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as uno:
+        host = BareHost(uno)
+        host.run(0.02)
+        host.setup(image_for("uno_cnc_shield", replace(WIDE, max_accel=1 << 23)), {0: 0, 1: 0, 2: 0})
+        uno.control("clear")
+        status = host.stream(batches((0, 1, 2), (0, 0, 0), segments, 4))
+        assert (status.error, status.overruns) == (0, 0)
+        wanted = curve_on_pins.predicted(segments, [0, 0, 0])
+        assert curve_on_pins.late_us(uno.trace(), wanted) <= 5.0
 
 
 @pytest.mark.parametrize(("share", "cable"), [(0.22, False), (0.61, False), (0.4, True)])

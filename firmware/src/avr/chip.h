@@ -82,3 +82,6 @@ typedef __int24 sfine_t;
 
 // Keeps a pointer where its fields are one instruction away.
 #define HAL_NEAR(pointer) __asm__("" : "+y"(pointer))
+
+// By the interval before, the timer would fire too early behind a load that takes longer.
+#define HAL_COMING(cycles) (OCR1A = (cycles) - 1)

@@ -13,6 +13,7 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     }
     const struct segment *s = queue_slot(tail);
     HAL_NEAR(s);
+    HAL_COMING(s->interval);
     dda.now = s;
     dda.left = s->ticks;
     dda.interval = (uint32_t)s->interval << 16;
