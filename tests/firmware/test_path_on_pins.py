@@ -79,7 +79,7 @@ def test_every_step_of_a_curve_comes_when_the_protocol_says(circle: curve_on_pin
 
 
 def test_a_tick_behind_the_shortest_interval_is_not_early() -> None:
-    """A tick that loads a segment takes longer than the shortest interval: the timer must know of the next one before."""
+    """Loading a segment takes longer than the shortest interval: the timer must know of the next one before."""
     fast = protocol.Segment(400, 448, 0, (204_800, -102_400, 51_200))
     slow = protocol.Segment(200, 1344, 5000, tuple(-3 * rate for rate in fast.rates), 50, True)
     segments = [fast, slow] * 10
