@@ -84,4 +84,4 @@ typedef __int24 sfine_t;
 #define HAL_NEAR(pointer) __asm__("" : "+y"(pointer))
 
 // By the interval before, the timer would fire too early behind a load that takes longer.
-#define HAL_COMING(cycles) (OCR1A = (cycles) - 1)
+#define HAL_COMING(cycles) (OCR1A = (cycles))

@@ -13,15 +13,16 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     }
     const struct segment *s = queue_slot(tail);
     HAL_NEAR(s);
-    HAL_COMING(s->interval);
+    const uint16_t interval = s->interval;
+    HAL_COMING(interval);
     dda.now = s;
     dda.left = s->ticks;
-    dda.interval = (uint32_t)s->interval << 16;
+    dda.interval = (uint32_t)interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
     if (dda.back & LAST) {
         dda_rest();
     }
-    const axes_t turned = dda.back ^ s->back, fine = s->fine;
+    const axes_t back = s->back, turned = dda.back ^ back, fine = s->fine;
     (void)turned;
     (void)fine;
 #define LOAD(i, ...)                          \
@@ -34,8 +35,8 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
         dda.phase[i] ^= PHASE_TURN;           \
     }
     STEPPER_PINS(LOAD)
-    dda.back = s->back;
-    dda_direction(s->back);
+    dda.back = back;
+    dda_direction(back);
     return true;
 }
 
