@@ -12,7 +12,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import Straight
 from armkin.inverse.batch import Batch, empty, pack
-from armkin.inverse.branches.turns import beyond_near, nearest_copy
+from armkin.inverse.branches.turns import beyond_near, nearest_copy, on_limit
 from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import decided
@@ -68,6 +68,7 @@ def solve(
     target, rounding = np.empty_like(given), np.zeros(N)
     threads = straight is not None and workers > 1
     size = SHARED if threads else arrays.CHUNK
+    limited = bool(on_limit(arm, near if one is None else one).any())
 
     def part(rows: slice) -> list[_Doubts]:
         """Some rows, by a thread of its own."""
@@ -82,7 +83,7 @@ def solve(
             found, workspace = _candidates(
                 runner, straight, goal, columns, near[some] if one is None else one, workspace
             )
-            doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close)
+            doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close, limited)
         return doubts
 
     parts = shared(part, N, workers if threads else 1, size, size)
@@ -119,8 +120,10 @@ def _candidates(
     return list(straight.run(entries(task, goal) if columns is None else columns, workspace)), workspace
 
 
-def _keep(arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], start: int, near: Array) -> list[_Doubts]:
-    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge."""
+def _keep(
+    arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], start: int, near: Array, limited: bool
+) -> list[_Doubts]:
+    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge; limited: `on_limit`."""
     *values, miss, doubt, free = found
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
@@ -129,7 +132,7 @@ def _keep(arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], star
     _fill(arm, part, values, valid.reshape(shape), near)
     full = bool(valid.all())
     doubtful = _doubtful(miss, valid, doubt, full)
-    if (beyond := beyond_near(arm, part.q, part.valid, part.within, near)).any():
+    if limited and (beyond := beyond_near(arm, part.q, part.valid, part.within, near)).any():
         doubtful = np.union1d(doubtful, np.flatnonzero(beyond))
     if not full:
         count = valid.sum(axis=0)

@@ -13,7 +13,6 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import folds, self_motions
-from armkin.inverse.clusters import means
 from armkin.inverse.folds import BENT, CLEAR, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
@@ -77,21 +76,23 @@ def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Arr
     known &= ~weak.open
     with np.errstate(invalid="ignore"):
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
-        clusters = ((away < CLUSTER).sum(axis=2) > 2) & (at.size < SEED)
-    if clusters.any():  # roots of third or fourth order: their mean is right to rounding
-        mean = means(arm, q)[clusters]
-        clusters[clusters] = newton.missing(arm, task, mean, target[np.nonzero(clusters)[0]]) < at.size[clusters]
-    two = valid[:, :, None] & valid[:, None]
-    close = np.triu(two & (away < HAIR) & known[:, None, None], 1)
+    near_by = away < CLUSTER
+    clusters = (near_by.sum(axis=2) > 2) & (at.size < SEED)
+    close = np.triu(valid[:, :, None] & valid[:, None] & (away < HAIR) & known[:, None, None], 1)
+    # roots of third or fourth order: their mean is right to rounding; and between every two the posture half way
+    (kc, ic), (k, i, j) = np.nonzero(clusters), np.nonzero(close)
+    one = np.zeros((K, B, B), bool)
+    if len(kc) + len(k):
+        ways = np.where(near_by[kc, ic][:, :, None], newton.difference(arm, q[kc], q[kc, ic][:, None]), 0.0)
+        mean = ways.sum(axis=1) / near_by[kc, ic].sum(axis=1, keepdims=True)
+        shift = np.concatenate([mean, 0.5 * newton.difference(arm, q[k, j], q[k, i])])
+        between = np.concatenate([q[kc, ic], q[k, i]]) + shift * np.where(arm.prismatic, arm.reach, 1.0)
+        missing = newton.missing(arm, task, between, target[np.concatenate([kc, k])])
+        clusters[kc, ic] = missing[: len(kc)] < at.size[kc, ic]
+        one[k, i, j] = missing[len(kc) :] <= SOLUTION
     same = 2 * SAME + np.minimum(2e-13 / np.maximum(sigma, 1e-300), 4e-4)
     known &= ~clusters.any(axis=1) & ~(close & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
-    one = np.zeros((K, B, B), bool)
-    k, i, j = np.nonzero(close)
-    if len(k):
-        unit = np.where(arm.prismatic, arm.reach, 1.0)
-        middle = q[k, i] + 0.5 * newton.difference(arm, q[k, j], q[k, i]) * unit
-        joined = newton.missing(arm, task, middle, target[k]) <= SOLUTION
-        one[k[joined], i[joined], j[joined]] = True
+    one &= known[:, None, None]
     either = one | one.swapaxes(1, 2)
     known &= (either.sum(axis=2) < 2).all(axis=1)
     known &= ~(either & weak.moving[:, :, None]).any(axis=(1, 2))

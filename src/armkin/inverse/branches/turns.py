@@ -119,6 +119,13 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     return out, inside
 
 
+def on_limit(arm: Arm, near: Array) -> NDArray[np.bool_]:
+    """Whether postures (..., n) are legal with a joint on a limit: (...)."""
+    on = ((near >= arm.lower - SLACK) & (near <= arm.upper + SLACK)).all(axis=-1)
+    on &= ((near <= arm.lower + ON_LIMIT) | (near >= arm.upper - ON_LIMIT)).any(axis=-1)
+    return np.asarray(on)
+
+
 def beyond_near(
     arm: Arm, q: Array, valid: NDArray[np.bool_], within: NDArray[np.bool_], near: Array
 ) -> NDArray[np.bool_]:
@@ -127,8 +134,7 @@ def beyond_near(
     A posture on a limit, its target rounded: the exact answer may lie beyond, and `near` solves the target, too.
     q: (N, B, n) at the nearest legal copies; valid, within: (N, B); near: (n,) or (N, n).
     """
-    on = ((near >= arm.lower - SLACK) & (near <= arm.upper + SLACK)).all(axis=-1)
-    on &= ((near <= arm.lower + ON_LIMIT) | (near >= arm.upper - ON_LIMIT)).any(axis=-1)
+    on = on_limit(arm, near)
     out = np.zeros(len(q), bool)
     if on.any():
         rows = np.flatnonzero(on & valid.any(axis=1))
