@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
+from armkin.motion.branch_path import samples
 from armkin.motion.path_plan import PathPlan
 
 CIRCLE = {"circle": {"centre": [340, 80, 300], "normal": [0, 0, 1]}}
@@ -118,3 +120,26 @@ def test_a_way_of_many_turns_is_planned(three_dof: Arm) -> None:
     )
     assert many.deviation <= 0.1
     assert many.duration == pytest.approx(100 * one.duration, rel=0.08)
+
+
+def test_a_very_long_way_is_solved_every_two_millimetres() -> None:
+    """Farther apart no step is certified, and each is looked at one by one."""
+    way: Any = SimpleNamespace(length=439_823.0, ends=np.array([0.0, 439_823.0]))
+    assert np.diff(samples(way)).max() <= 2.001
+
+
+def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
+    three_dof: Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moves = {"moves": [{"point": [390, 80, 300]}, CIRCLE]}
+    whole = armkin.path(three_dof, moves, start=three_dof.home)
+    monkeypatch.setattr("armkin.motion.linked_branches._BLOCK", 64)
+    monkeypatch.setattr("armkin.motion.path_plan._BLOCK", 100)
+    parts = armkin.path(three_dof, moves, start=three_dof.home)
+    assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
+    assert [b.carries for b in parts.branches] == [b.carries for b in whole.branches]
+    for key, share in whole.limits.items():
+        np.testing.assert_allclose(parts.limits[key], share, rtol=1e-9)
+    assert parts.nearest_singularity is not None
+    assert whole.nearest_singularity is not None
+    assert parts.nearest_singularity[:2] == pytest.approx(whole.nearest_singularity[:2])

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import armkin
+from armkin.motion.time_optimal import knots
 
 
 def way(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -28,3 +31,23 @@ def test_few_samples_cost_little_time_and_no_limit(seed: int, samples: int) -> N
     t = np.linspace(0.0, law.duration, 20_000)
     assert np.abs(law.qd(t) / arm.max_speed).max() <= 1.002
     assert np.abs(law.qdd(t) / arm.max_accel).max() <= 1.002
+
+
+def test_a_long_way_takes_little_memory_beside_its_own() -> None:
+    """What is made of a way of 100,000 samples is kept; what is made on the way there is made in parts."""
+    arm = armkin.load("three_dof")
+    s, q = way(0, 100_000, arm.n)
+    tracemalloc.start()
+    law = armkin.time_law(arm, q, s)
+    kept, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert law.duration > 0
+    assert kept / len(s) <= 100  # bytes a sample: the slopes of three joints, steps, (ds/dt)^2, times
+    assert most / len(s) <= 400
+
+
+def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    s, q = way(1, 500, 3)
+    whole = knots(s, q, (100, 250))
+    monkeypatch.setattr("armkin.motion.time_optimal._AT_ONCE", 37)
+    np.testing.assert_array_equal(knots(s, q, (100, 250)).d, whole.d)

@@ -37,6 +37,7 @@ _DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round 
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 _STEP = 1.0  # [mm] between the first samples, at most
 _SAMPLES = (200, 20_000)
+_FARTHEST = 2.0  # [mm] between those of a path that has more
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Carried:
 
 def samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
-    number = count or int(np.clip(np.ceil(route.length / _STEP), *_SAMPLES))
+    number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
     even = np.linspace(0.0, route.length, max(number, 2))
     return np.asarray(_apart(np.sort(np.concatenate([even, route.ends])), 1e-7 * route.length))
 
@@ -129,13 +130,13 @@ def _seconds(arm: Arm, route: Route, columns: Columns, chain: Chain, near: Array
     if np.isnan(arm.max_speed).any() or np.isnan(arm.max_accel).any():
         return float(np.abs(np.diff(chain.q, axis=0)).sum())
     run = Run(chain, 0, len(columns.s) - 1)
-    return sum(stretch.duration for stretch in stretches(arm, route, columns, run, near, pace, grid=300))
+    return sum(stretch.duration for stretch in stretches(arm, route, columns.s, run, near, pace, grid=300))
 
 
 def stretches(
     arm: Arm,
     route: Route,
-    columns: Columns,
+    s: Array,
     run: Run,
     near: Array,
     pace: Pace,
@@ -143,9 +144,9 @@ def stretches(
     fixed: Array | None = None,
     grid: int = _GRID,
 ) -> list[Curve | Smoothed]:
-    """A run as curves from rest to rest, one between each two stops of the route."""
+    """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
     q = run.chain.run(run.first, run.last, near, fixed)
-    s = columns.s[run.first : run.last + 1]
+    s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     made: list[Curve | Smoothed] = []
@@ -272,23 +273,28 @@ def _deviation(arm: Arm, route: Route, path: Knots, lever: Array) -> float:
 def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
     """The fastest law of time on a grid."""
     path = finer(path)
+    cap, fraction = _caps(arm, route, path, pace)
+    accel = arm.max_accel * pace.accel
+    window = 0.0
+    if pace.jerk is not None:
+        window = float((2 * accel / pace.jerk).max())
+        cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
+    speed = fraction[:, None] * arm.max_speed
+    curve = Curve(path, optimal(path, Bounds(speed, accel, cap), coupled(arm, pace.accel)))
+    return Smoothed(curve, window) if window else curve
+
+
+def _caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:
+    """Greatest (ds/dt)^2 for the tool's speed and for holds, and the fraction of the joints' speeds: (N,) each."""
     fraction, tool = route.limit(path.s, pace.speed, pace.tool_speed)
     tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
     with np.errstate(over="ignore"):
         each = (tool / np.maximum(tip, 1e-300)) ** 2
     each = np.where(np.isfinite(tool), each, np.inf)
-    both = [np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (each, fraction)]
-    cap = both[0]
+    cap, least = (np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (each, fraction))
     if pace.hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = np.minimum(cap, hold_cap(arm, path, pace.hold))
-    accel = arm.max_accel * pace.accel
-    rows = coupled(arm, pace.accel)
-    window = 0.0
-    if pace.jerk is not None:
-        window = float((2 * accel / pace.jerk).max())
-        cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
-    curve = Curve(path, optimal(path, Bounds(both[1][:, None] * arm.max_speed, accel, cap), rows))
-    return Smoothed(curve, window) if window else curve
+    return cap, least
 
 
 def coupled(arm: Arm, share: float) -> tuple[Array, Array] | None:

@@ -30,6 +30,7 @@ ENDS = 0.002  # [mm] how finely the end of a branch, or the crossing of a limit,
 _PARTS = (8, 32)  # of a step that is divided: with many such steps, and with few
 _AT_ONCE = 1024  # samples that are solved at once, if the parts are no fewer
 _MOST = 50_000  # samples added
+_BLOCK = 16_384  # samples that are solved at once at most
 
 
 @dataclass
@@ -244,6 +245,22 @@ class _Linking:
         return True
 
     def _solved(self, s: Array, examine: bool = True) -> Columns:
+        """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
+        parts = [self._solved_part(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
+        if len(parts) == 1:
+            return parts[0]
+        B = max(part.q.shape[1] for part in parts)
+        return Columns(
+            s,
+            np.concatenate([_widened(part.q, B) for part in parts]),
+            np.concatenate([_widened(part.name, B, -1) for part in parts]),
+            np.concatenate([part.status for part in parts]),
+            np.concatenate([_widened(part.within, B, 0) for part in parts]),
+            max((part.names for part in parts), key=len),
+            all(part.complete for part in parts),
+        )
+
+    def _solved_part(self, s: Array, examine: bool) -> Columns:
         found = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
         q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
         singular = np.flatnonzero(found.status == Status.SINGULAR)
@@ -262,11 +279,15 @@ class _Linking:
 
     def _link(self) -> None:
         """Find partners in the open steps."""
-        c = self.columns
-        rows = np.flatnonzero(self.open)
-        valid = c.valid
-        every = len(rows) == len(self.open)
-        left, right = (slice(None, -1), slice(1, None)) if every else (rows, rows + 1)
+        rows, valid = np.flatnonzero(self.open), self.columns.valid
+        for k in range(0, len(rows), _BLOCK):
+            self._link_some(rows[k : k + _BLOCK], valid)
+        self.open[:] = False
+
+    def _link_some(self, rows: Int, valid: Bool) -> None:
+        c, first, behind = self.columns, int(rows[0]), int(rows[-1]) + 1
+        every = behind - first == len(rows)
+        left, right = (slice(first, behind), slice(first + 1, behind + 1)) if every else (rows, rows + 1)
         good, wrapped = self._certified(c.q[left], c.q[right], valid[left] & valid[right])
         column = np.arange(c.q.shape[1], dtype=np.int16)
         c.partner[rows] = np.where(good, column, np.int16(-1))
@@ -278,7 +299,6 @@ class _Linking:
         self.crossing[rows] = flips.any(axis=1)
         for i in rows[~straight]:
             self._match(int(i), valid)
-        self.open[:] = False
 
     def _certified(self, a: Array, b: Array, there: Bool) -> tuple[Bool, Bool]:
         """Which branches (M, B, n) at steps' ends are one, by a cheap bound and where that is too coarse by the bound.
@@ -328,8 +348,7 @@ class _Linking:
         for j in self.wide:
             value = q[:, :, j]
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                turn = np.floor((value - limit) / self.turn[j])
-                out |= turn[left] != turn[right]
+                out |= np.floor((value[left] - limit) / self.turn[j]) != np.floor((value[right] - limit) / self.turn[j])
         k, b = np.nonzero(wrapped)  # these go the other way round
         if len(k):
             start, end = q[left][k, b], q[right][k, b]

@@ -20,7 +20,7 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import outside, said
 from armkin.motion import geometry, path_numbers, report
-from armkin.motion.branch_path import Carried, Pace, carry, deviation, stretches
+from armkin.motion.branch_path import Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
@@ -32,6 +32,8 @@ from armkin.motion.trajectory import Straight, Stretch
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
+    from armkin.motion.branch_chains import Run
+    from armkin.motion.route import Route
     from armkin.path_file import Move, PathFile
 
 TOLERANCE = 0.05  # [mm]
@@ -296,6 +298,24 @@ class _Walk:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
         near = self.q if self.near is None else self.near
+        s, runs = self._runs(route, near, free=free)
+        for k, run in enumerate(runs):
+            if run.first == run.last:
+                continue
+            fixed = self.q if not free and k == 0 else None
+            curves = stretches(self.arm, route, s, run, near, self.pace, fixed=fixed)
+            if free or k:
+                self._go(curves[0].start, self.approach if k == 0 else None)
+            self._lay(route, curves, order)
+            near = self.q
+        for kind, value in self.pauses.get(len(self.pieces), ()):
+            self._mark(kind, value)
+        self.plan.length += route.length
+        self.goal = None
+        self.pieces, self.blends, self.pauses = [], [], {}
+
+    def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
+        """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
         branch = (self.goal_branch or self.branch) if free else None
         carried = carry(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
@@ -304,24 +324,11 @@ class _Walk:
         report.note(self.plan, carried, near)
         if not carried.whole and not (self.split and carried.covered):
             raise report.refused(self.plan, carried, branch)
-        for k, run in enumerate(carried.runs):
-            if run.first == run.last:
-                continue
-            fixed = self.q if not free and k == 0 else None
-            curves = stretches(self.arm, route, carried.columns, run, near, self.pace, fixed=fixed)
-            if free or k:
-                self._go(curves[0].start, self.approach if k == 0 else None)
-            self._lay(carried, curves, order)
-            near = self.q
-        for kind, value in self.pauses.get(len(self.pieces), ()):
-            self._mark(kind, value)
-        self.plan.length += route.length
-        self.goal = None
-        self.pieces, self.blends, self.pauses = [], [], {}
+        return carried.columns.s, carried.runs
 
-    def _lay(self, carried: Carried, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
+    def _lay(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
         """Put a run's curves into the plan, with the pauses where they begin."""
-        at = {round(float(carried.route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
+        at = {round(float(route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
         for curve in curves:
             path_ = curve.path if isinstance(curve, Curve) else curve.curve.path
             for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
@@ -329,7 +336,7 @@ class _Walk:
             self.plan.along(len(self.made), curve, self.plan.length)
             self.made.append(curve)
             self.q = curve.end
-            self.plan.deviation = max(self.plan.deviation, deviation(self.arm, carried.route, path_))
+            self.plan.deviation = max(self.plan.deviation, deviation(self.arm, route, path_))
             self.plan.nearer_singularity(path_.q, path_.s)
 
     # Joint moves

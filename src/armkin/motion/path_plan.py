@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
+_BLOCK = 16_384  # times or grid points that are looked at together
+
 
 @dataclass(frozen=True)
 class PathRun:
@@ -91,10 +93,10 @@ class PathPlan:
 
     def nearer_singularity(self, q: Array, s: Array) -> None:
         """Note where joint values (N, n) at lengths s (N,) behind the present end come nearest to a singularity."""
-        worst = condition(self.arm, q)
+        worst = np.concatenate([condition(self.arm, q[k : k + _BLOCK]) for k in range(0, len(q), _BLOCK)])
         k = int(np.argmax(worst))
         if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
-            self.nearest_singularity = (self.length + float(s[k]), float(worst[k]), q[k])
+            self.nearest_singularity = (self.length + float(s[k]), float(worst[k]), q[k].copy())
 
     def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """The same with its motion."""
@@ -148,8 +150,7 @@ class PathPlan:
     @cached_property
     def limits(self) -> dict[str, Array]:
         """Greatest shares of the joints' limits that the motion takes: speed, accel (and jerk): (n,) each."""
-        speed, accel = np.zeros(self.arm.n), np.zeros(self.arm.n)
-        jerk = np.zeros(self.arm.n)
+        speed, accel, jerk = np.zeros((3, self.arm.n))
         for stretch in self.motion.stretches:
             if isinstance(stretch, Smoothed):
                 t = np.linspace(0.0, stretch.duration, min(max(int(stretch.duration / 0.001), 2), 1_000_000))
@@ -157,12 +158,13 @@ class PathPlan:
                 t = np.concatenate([stretch.times, stretch.times[1:] * (1 - 1e-12)])
             else:
                 t = np.linspace(0.0, stretch.duration, 200)
-            a = np.abs(stretch.at(t, 2))
-            speed = np.maximum(speed, np.abs(stretch.at(t, 1)).max(axis=0))
-            accel = np.maximum(accel, a.max(axis=0))
-            if isinstance(stretch, Smoothed):
-                now = stretch.at(t, 2)
-                jerk = np.maximum(jerk, np.abs(np.diff(now, axis=0)).max(axis=0) / (t[1] - t[0]))
+            for k in range(0, len(t) - 1, _BLOCK):  # neighbouring blocks share a time: a jerk is between two
+                part = t[k : k + _BLOCK + 1]
+                a = stretch.at(part, 2)
+                speed = np.maximum(speed, np.abs(stretch.at(part, 1)).max(axis=0))
+                accel = np.maximum(accel, np.abs(a).max(axis=0))
+                if isinstance(stretch, Smoothed):
+                    jerk = np.maximum(jerk, np.abs(np.diff(a, axis=0)).max(axis=0) / (t[1] - t[0]))
         shares = {"speed": speed / self.arm.max_speed, "accel": accel / self.arm.max_accel}
         if np.isfinite(self.arm.max_jerk).all() and jerk.any():
             shares["jerk"] = jerk / self.arm.max_jerk

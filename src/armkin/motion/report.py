@@ -37,7 +37,7 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
-            plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0], q[-1]))
+            plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0].copy(), q[-1].copy()))
         if run.last < len(c.s) - 1 or k + 1 < len(carried.runs):
             plan.reconfigurations.append(_break(arm, c, run.chain, run.first, base))
 
@@ -55,7 +55,7 @@ def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
     for chain in carried.all:
         if chain.first == 0:
             e = chain.carries(0)
-            q = chain.run(0, e, near)[0] if e >= 0 else chain.q[0]
+            q = (chain.run(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
             far = float(c.s[e]) if e >= 0 else 0.0
             why = words(arm, _break(arm, c, chain, 0, 0.0))
             found.append((e, Branch(_name(c, int(chain.labels[0])), q, far, why)))

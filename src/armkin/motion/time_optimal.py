@@ -16,7 +16,7 @@ of numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
@@ -79,30 +79,32 @@ def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
     total, count = np.zeros_like(q), np.zeros(N)
     for lo, hi in pairwise(edges):
         part = slice(lo, hi + 1)
-        total[part] += _slopes(s[part], q[part])
+        for some in in_parts(hi + 1 - lo):
+            total[lo + some.start : lo + some.stop] += _slopes(s[part], q[part], some)
         count[part] += 1
-    return Knots(s, q, total / count[:, None])
+    total /= count[:, None]
+    return Knots(s, q, total)
 
 
-def _slopes(s: Array, q: Array) -> Array:
-    """Derivatives of the polynomials through up to five neighbours: (M,), (M, n) -> (M, n).
+def _slopes(s: Array, q: Array, some: slice) -> Array:
+    """Derivatives of the polynomials through up to five neighbours, at some of the samples: (M,), (M, n) -> (m, n).
 
     Barycentric: q'(x_i) = sum_j (l_j / l_i) (q_j - q_i) / (x_i - x_j), l_j = 1 / prod_m (x_j - x_m)
     (Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, section 9).
     """
     M = len(s)
     w = min(5, M)
-    at = np.clip(np.arange(M) - w // 2, 0, M - w) + np.arange(w)[:, None]  # (w, M)
+    i = np.arange(some.start, some.stop)
+    at = np.clip(i - w // 2, 0, M - w) + np.arange(w)[:, None]  # (w, m)
     x = s[at]
     inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
-    own = np.arange(M) - at[0]
-    mine = np.choose(own, inverse) if w > 1 else np.ones(M)
-    out = np.zeros_like(q)
+    mine = np.choose(i - at[0], inverse) if w > 1 else np.ones(len(i))
+    out = np.zeros_like(q[some])
     for j in range(w):
-        apart = x[j] - s
+        apart = x[j] - s[some]
         there = apart != 0
-        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(M), where=there)
-        out += weight[:, None] * (q[at[j]] - q)
+        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(len(i)), where=there)
+        out += weight[:, None] * (q[at[j]] - q[some])
     return out
 
 
@@ -139,12 +141,6 @@ class _Motion(NamedTuple):
     h: Array  # (M,)
     accel: Array  # (k, M) greatest acceleration
 
-    def part(self, some: slice) -> _Motion:
-        """The same of some of the intervals."""
-        if some.stop - some.start == len(self.h):
-            return self
-        return _Motion(*(each[..., some] for each in self))
-
     def row(self, f: Array | float) -> tuple[Array, Array]:
         """P and R of the acceleration P u + R x at fractions f of the intervals, x at the left end: (k, M) each.
 
@@ -156,19 +152,28 @@ class _Motion(NamedTuple):
 
     def excess(self, x: Array) -> tuple[Array, Array]:
         """Greatest share of the acceleration inside every interval, and at which fraction: (k, M) each."""
-        found = [self.part(some)._excess(x[some.start : some.stop + 1]) for some in in_parts(len(self.h))]
-        if len(found) == 1:
-            return found[0]
-        share, where = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
-        return share, where
-
-    def _excess(self, x: Array) -> tuple[Array, Array]:
         u = (x[1:] - x[:-1]) / (2 * self.h)
         a = u * self.first + self.left * x[:-1]  # a + b f + c f^2
         b = 3 * u * self.h * self.left + self.bend * x[:-1]
         c = 2.5 * u * self.h * self.bend
         f = np.fmin(np.fmax(-b / (2 * c), 0.0), 1.0)  # 0 where it does not bend
         return np.abs(a + f * (b + f * c)) / self.accel, f
+
+
+Motions = Callable[[slice], _Motion]  # of some of the intervals
+
+
+def _motions(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> Motions:
+    """What is bounded along a path: of a long one it is made anew whenever a part is worked on."""
+    if len(path.h) <= _AT_ONCE:
+        whole = _motion(path, accel, rows)
+        return lambda _: whole
+
+    def part(some: slice) -> _Motion:
+        ends = slice(some.start, some.stop + 1)
+        return _motion(Knots(path.s[ends], path.q[ends], path.d[ends]), accel[ends], rows)
+
+    return part
 
 
 def _motion(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> _Motion:
@@ -192,19 +197,25 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     there, too, and all is done again. What is left of that after some rounds, the whole law slows down for.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        rate = np.ascontiguousarray((bounds.speed / np.maximum(np.abs(path.d), TINY)).T).min(axis=0)
-        cap = np.minimum(np.minimum(rate**2, bounds.cap), _MOST)
+        cap = np.minimum(bounds.cap, _MOST)
+        for some in in_parts(len(cap)):
+            speed = bounds.speed if bounds.speed.ndim == 1 else bounds.speed[some]
+            rate = np.ascontiguousarray((speed / np.maximum(np.abs(path.d[some]), TINY)).T).min(axis=0)
+            cap[some] = np.minimum(cap[some], rate**2)
         cap[0] = cap[-1] = 0.0
         if len(cap) < 2:
             return np.asarray(cap)
-        motion = _motion(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
+        motion = _motions(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
         inside: list[Array | float] = [0.0, 1.0]
         for _ in range(_ROUNDS):
-            x = _fastest(cap.copy(), motion, inside)
-            over, where = motion.excess(x)
-            if (most := float(over.max())) <= _EXCESS:
+            x, most, beyond = _fastest(cap.copy(), path.h, motion, inside), 0.0, []
+            for some in in_parts(len(path.h)):
+                over, where = motion(some).excess(x[some.start : some.stop + 1])
+                most = max(most, float(over.max()))
+                beyond.append(np.where(over > 1.0, where, 0.0))
+            if most <= _EXCESS:
                 return x
-            inside.append(np.where(over > 1.0, where, 0.0))
+            inside.append(np.concatenate(beyond, axis=1))
         return np.asarray(x / most)
 
 
@@ -213,17 +224,17 @@ def in_parts(intervals: int) -> list[slice]:
     return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
 
 
-def _fastest(cap: Array, motion: _Motion, inside: Sequence[Array | float]) -> Array:
+def _fastest(cap: Array, h: Array, motion: Motions, inside: Sequence[Array | float]) -> Array:
     """The fastest x (N,) within cap, the accelerations kept at fractions `inside` of the intervals."""
-    parts = in_parts(len(motion.h))
+    parts = in_parts(len(h))
     for some in parts:
         slope, level = _affine(motion, inside, some)
         # x + 2 h u >= 0 must leave room below the upper bounds of u
-        steep = slope - 0.5 / motion.h[some]
+        steep = slope - 0.5 / h[some]
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
         cap[some] = _meeting(np.minimum(cap[some], room), slope, level)
     if len(parts) == 1:  # the rows of both passes are pruned together
-        forth, M = _ahead(motion.h, slope, level), len(motion.h)
+        forth, M = _ahead(h, slope, level), len(h)
         a, b = (np.concatenate(each, axis=1) for each in zip(_back(*forth), forth, strict=True))
         both = _least(a, b, np.concatenate([cap[:0:-1], cap[:-1]]))
         beta = _scan(cap[::-1], [both.part(0, M)])[::-1]
@@ -231,16 +242,16 @@ def _fastest(cap: Array, motion: _Motion, inside: Sequence[Array | float]) -> Ar
         return _scan(beta, [both.part(M, 2 * M)._replace(reach=reach)])
 
     def ahead(some: slice) -> tuple[Array, Array]:  # of a long path made anew for each of the passes
-        return _ahead(motion.h[some], *_affine(motion, inside, some))
+        return _ahead(h[some], *_affine(motion, inside, some))
 
     back = (_least(*_back(*ahead(some)), cap[some.start + 1 : some.stop + 1][::-1]) for some in reversed(parts))
     beta = _scan(cap[::-1], back)[::-1]
     return _scan(beta, (_least(*ahead(some), beta[some]) for some in parts))
 
 
-def _affine(motion: _Motion, inside: Sequence[Array | float], some: slice) -> tuple[Array, Array]:
+def _affine(motion: Motions, inside: Sequence[Array | float], some: slice) -> tuple[Array, Array]:
     """Slope and level of the bounds of u, which is between -level - slope x and level - slope x: (k, M) each."""
-    P, R, C = _rows(motion.part(some), [f if isinstance(f, float) else f[:, some] for f in inside])
+    P, R, C = _rows(motion(some), [f if isinstance(f, float) else f[:, some] for f in inside])
     return R / P, C / P
 
 
