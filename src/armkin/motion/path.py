@@ -205,15 +205,8 @@ class _Walk:
             self._line(move, target)
 
     def _arc(self, move: Move, value: Any) -> None:
-        self._add(
-            move,
-            geometry.arc(
-                self.task,
-                self.spot,
-                path_numbers.place(self.task, value.via),
-                self._target(value.to),
-            ),
-        )
+        via = path_numbers.place(self.task, value.via)
+        self._add(move, geometry.arc(self.task, self.spot, via, self._target(value.to)))
 
     def _circle(self, move: Move, value: Any) -> None:
         if value.turns == 0:
@@ -222,19 +215,11 @@ class _Walk:
         normal = np.array([0.0, 0.0, 1.0]) if flat else path_numbers.place(self.task, value.normal)
         if np.linalg.norm(normal) < 1e-9:
             raise UsageError("circle: its normal has no length")
-        angle = 2 * np.pi * value.turns
-        self._add(
-            move,
-            geometry.circle(
-                self.task, self.spot, path_numbers.place(self.task, value.centre), normal, angle, value.rise, None
-            ),
-        )
+        centre, angle = path_numbers.place(self.task, value.centre), 2 * np.pi * value.turns
+        self._add(move, geometry.circle(self.task, self.spot, centre, normal, angle, value.rise, None))
 
     def _spline(self, move: Move, value: list[list[float]]) -> None:
-        self._add(
-            move,
-            geometry.spline(self.task, self.spot, [self._target(target) for target in value]),
-        )
+        self._add(move, geometry.spline(self.task, self.spot, [self._target(target) for target in value]))
 
     def _offset(self, move: Move, value: Any) -> None:
         d = path_numbers.place(self.task, value.xyz)
