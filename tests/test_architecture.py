@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,12 @@ MODULES = {
 }
 
 
+@cache
+def _nodes(path: Path) -> list[ast.AST]:
+    """All nodes of a file's syntax tree."""
+    return list(ast.walk(ast.parse(path.read_text())))
+
+
 def _room(module: str) -> str:
     """The room of ``armkin.inverse.closed.elbow`` is ``inverse/closed``."""
     path = MODULES[module]
@@ -71,7 +78,7 @@ def _room(module: str) -> str:
 
 def _imports(module: str) -> Iterator[str]:
     """Modules of armkin that a module imports, anywhere in it: for types and inside functions, too."""
-    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+    for node in _nodes(MODULES[module]):
         if isinstance(node, ast.Import):
             yield from (name.name for name in node.names if name.name in MODULES and name.name != "armkin")
         elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
@@ -98,7 +105,7 @@ def test_below_the_model_nothing_reads_the_robot_file() -> None:
     readers = {
         module
         for module, path in MODULES.items()
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in _nodes(path)
         if isinstance(node, ast.Attribute) and node.attr == "file" and ast.unparse(node.value).endswith("arm")
     }
     assert not {module for module in readers if _room(module) not in printing}
@@ -155,7 +162,7 @@ def test_classes_have_at_most_250_lines() -> None:
     long = {
         node.name
         for path in MODULES.values()
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in _nodes(path)
         if isinstance(node, ast.ClassDef) and (node.end_lineno or 0) - node.lineno >= 250
     }
     assert not long

@@ -33,6 +33,23 @@ def test_many_answers_can_be_piped_in(tmp_path: Path) -> None:
     assert done.json["position_mm"] == pytest.approx([380, 60, 280], abs=0.06)
 
 
+def test_a_malformed_row_ends_a_stream_and_the_error_tells_what_was_sent() -> None:
+    words = ("send", THREE_DOF, "--batch", "-", "--port", "sim")
+    rows = b"10,80,-70\n12,78,-70\n1,x,3\n"
+    for stdin, waypoints in ((rows, 2), (b"1,x,3\n", 0)):
+        done = run(*words, "--json", stdin=stdin)
+        assert (done.code, done.out) == (2, "")
+        told = json.loads(done.err)
+        assert "x" in told["error"]
+        assert ("sent" in told) == (waypoints > 0)
+        if waypoints:
+            assert told["sent"]["waypoints"] == waypoints
+            assert told["sent"]["joints"] == pytest.approx([12, 78, -70], abs=0.02)
+    people = run(*words, stdin=rows)
+    assert people.code == 2
+    assert "read back: as planned" in people.out
+
+
 def test_an_answer_without_a_best_branch_is_refused() -> None:
     answer = run("ik", THREE_DOF, 3900, 80, 300, "--json")
     done = run("send", "--port", "sim", stdin=answer.out.encode())

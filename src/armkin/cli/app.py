@@ -1,12 +1,10 @@
-"""The shell around the commands: the group, and the one place where errors become exit codes."""
+"""The shell around the commands: the group, and what runs a command line (`failures`: errors become exit codes)."""
 
-import errno
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from keyword import iskeyword
@@ -15,27 +13,12 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from armkin import errors
 from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
 
-RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK, INTERRUPTED = 1, 2, 3, 4, 5, 130
-
-EXIT_CODES: dict[type[errors.ArmkinError], int] = {
-    errors.FileError: RUNTIME,
-    errors.RobotFileError: ROBOT_FILE,
-    errors.UsageError: USAGE,
-    errors.NoSolutionError: NO_SOLUTION,
-    errors.MissingExtraError: RUNTIME,
-    errors.LinkError: LINK,
-}
-
+_INTERRUPTED = 130
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-
-
-class _ClosedPipe(Exception):  # noqa: N818 - no error
-    """The reader of standard output has closed the pipe. (Typer would end the process with 1 for the OSError.)"""
 
 
 class Command(TyperCommand):
@@ -93,20 +76,14 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
+        from armkin.cli import failures
+
         name = args[0]
         if name not in COMMANDS and ctx.resilient_parsing:  # Tab was pressed: no command, no complaint
             return name, None, args[1:]
         if name not in COMMANDS:
-            raise errors.UsageError(f"there is no command '{name}'; {_other_command(name, args[1:])}")
+            raise failures.no_command(name, args[1:])
         return name, load(name), args[1:]
-
-
-def _other_command(name: str, rest: list[str]) -> str:
-    """What to type in place of a word that is no command."""
-    if rest and rest[0] in COMMANDS:
-        return f"the command comes first: armkin {rest[0]} {name} ..."
-    close = get_close_matches(name.lower(), COMMANDS, 1)
-    return f"did you mean {close[0]}?" if close else "armkin --help lists them"
 
 
 @cache
@@ -165,26 +142,15 @@ def run(arguments: list[str]) -> int:
 def _exit_code(command: Callable[[], Any]) -> int:
     try:
         return int(command() or 0)
-    except errors.ArmkinError as error:
-        from armkin.cli import advice
-
-        code = next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
-        output.error(advice.message(error), error.kind, code, error.fields, advice.next_step(error))
-        return code
-    except _ClosedPipe:
-        return _enough()
     except (KeyboardInterrupt, typer.Abort):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C while the first one tidies up
-        return INTERRUPTED
+        return _INTERRUPTED
     except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else RUNTIME
-    except OSError as error:
-        return _os_error(error)
-    except MemoryError:
-        output.error("not enough memory; ask for less at once", "memory", RUNTIME)
-        return RUNTIME
+        return stop.code if isinstance(stop.code, int) else 1
     except Exception as error:
-        return _unexpected(error)
+        from armkin.cli import failures
+
+        return failures.exit_code(error)
 
 
 def _flush() -> None:
@@ -205,85 +171,14 @@ def _terminate(signum: int, frame: object) -> None:
     sys.exit(128 + signum)
 
 
-def _os_error(error: OSError) -> int:
-    """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
-    if _is_closed_pipe(error):
-        return _enough()
-    where = error.filename if error.filename is not None else "standard output"
-    output.error(f"{where}: {error.strerror or error}", "system", RUNTIME, {"file": str(where)})
-    _drop_stdout()
-    return RUNTIME
-
-
-def _is_closed_pipe(error: OSError) -> bool:
-    return error.errno == errno.EPIPE or (os.name == "nt" and error.errno == errno.EINVAL)
-
-
 @contextmanager
 def _closed_pipes() -> Iterator[None]:
     """Keep a closed pipe from Typer, which would end the process with exit code 1."""
     try:
         yield
     except OSError as error:
-        if _is_closed_pipe(error):
-            raise _ClosedPipe from None
+        from armkin.cli import failures
+
+        if failures.is_closed_pipe(error):
+            raise failures.ClosedPipe from None
         raise
-
-
-def _enough() -> int:
-    """Exit code 0 where the reader has closed the pipe, as `| head` does."""
-    _drop_stdout()
-    return 0
-
-
-def _drop_stdout() -> None:
-    """Throw away what is still buffered: the interpreter would complain about it at its end."""
-    try:
-        _flush()
-    except (OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _meant(error: Any, context: Any) -> list[str]:
-    """Options that a mistyped one is near to, or begins: --all for --all-branches."""
-    word = getattr(error, "option_name", None)
-    if not isinstance(word, str) or context is None:
-        return []
-    known = [name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")]
-    begun = [name for name in known if len(word) > 3 and name.startswith(f"{word}-")]
-    return list(getattr(error, "possibilities", None) or begun)
-
-
-def _unexpected(error: Exception) -> int:
-    """Typer's own complaints about the command line, and our bugs."""
-    if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
-        from armkin.cli.numbers import is_number
-
-        message = str(error.format_message()).rstrip(".")
-        context = getattr(error, "ctx", None)
-        if possible := _meant(error, context):
-            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
-        if message.endswith("'ROBOT'"):
-            message += ": a robot file or the name of a shipped robot (armkin robots)"
-        if context is not None:
-            if "unexpected extra argument" in message and any(
-                map(is_number, message.rstrip(")").split("(")[-1].split())
-            ):
-                message += "; an option's numbers have commas and no spaces, as 390,80,300"
-            if "unexpected extra argument" in message and context.command.name == "stop":
-                message = "stop takes no robot: it stops what moves behind a port, armkin stop --port PORT"
-            message = f"{message}\nsee {context.command_path} --help"
-        code = int(getattr(error, "exit_code", USAGE))
-        output.error(message[:1].lower() + message[1:], "usage", code)
-        return code
-    if os.environ.get("ARMKIN_TRACEBACK"):
-        import traceback
-
-        traceback.print_exc()
-    output.error(
-        f"internal error: {type(error).__name__}: {error}\n"
-        "this is a bug in armkin: please report it with the command line and ARMKIN_TRACEBACK=1's output",
-        "internal",
-        RUNTIME,
-    )
-    return RUNTIME

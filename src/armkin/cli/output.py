@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-from armkin.errors import FileError, UsageError
-
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
 _LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
@@ -19,6 +17,8 @@ _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warning
 @contextmanager
 def destination(path: str | None) -> Iterator[Write]:
     """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all."""
+    from armkin.errors import FileError, UsageError
+
     if path == "":
         raise UsageError("--out needs the name of a file")
     if path is not None and path != "-":

@@ -206,7 +206,7 @@ class Homing(_Model):
         description="How far to back off the switch, in degrees or mm."
     )
     order: Annotated[int, Field(ge=1, le=99)] | None = Field(
-        None, description="1 homes first, equal numbers together. Absent: in the file's order."
+        None, description="1 homes first, one joint after another; equal numbers in the file's order, absent ones last."
     )
     normally: Literal["open", "closed"] = Field(
         description="The switch when it is not pressed: `closed` also notices a cut wire."

@@ -286,5 +286,6 @@ class Error(TypedDict):
     kind: Annotated[str, "usage, file, robot_file, no_solution, no_branch, link, position_lost, ..."]
     exit_code: Annotated[int, "1 runtime or file, 2 usage, 3 no solution, 4 robot file, 5 link or device"]
     next: Annotated[NotRequired[str], "what to do, where there is a next step"]
+    sent: Annotated[NotRequired[dict[str, Any]], "send --batch -: its answer for the rows before the malformed one"]
     notes: Annotated[NotRequired[list[str]], "said before the error"]
     warnings: Annotated[NotRequired[list[str]], "said before the error"]

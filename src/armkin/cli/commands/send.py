@@ -158,10 +158,13 @@ def send(
         planned = planner.done.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     problem = goals.problem if isinstance(goals, Stream) else None
-    if problem is not None and not planned["waypoints"]:
-        raise problem  # nothing has moved: there is nothing to tell
+    answer = {**render.head(arm), **found}
+    if problem is not None and planned["waypoints"] and json:
+        problem.fields["sent"] = answer
+    if problem is not None and (json or not planned["waypoints"]):
+        raise problem
     with output.beside(trace) as write:
-        write(render.to_json({**render.head(arm), **found}) + "\n" if json else _arrived(arm, planned, found))
+        write(render.to_json(answer) + "\n" if json else _arrived(arm, planned, found))
     if problem is not None:
         raise problem
 

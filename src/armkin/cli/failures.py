@@ -1,0 +1,135 @@
+"""Where errors become messages and exit codes.
+
+Imported before a command is: what has no memory, or no open files left, imports nothing. `armkin --help` needs none.
+"""
+
+import errno
+import os
+import sys
+from difflib import get_close_matches
+from typing import Any
+
+from armkin import errors
+from armkin.cli import output
+from armkin.cli.commands import COMMANDS
+
+RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK = 1, 2, 3, 4, 5
+
+EXIT_CODES: dict[type[errors.ArmkinError], int] = {
+    errors.FileError: RUNTIME,
+    errors.RobotFileError: ROBOT_FILE,
+    errors.UsageError: USAGE,
+    errors.NoSolutionError: NO_SOLUTION,
+    errors.MissingExtraError: RUNTIME,
+    errors.LinkError: LINK,
+}
+
+
+class ClosedPipe(Exception):  # noqa: N818 - no error
+    """The reader of standard output has closed the pipe. (Typer would end the process with 1 for the OSError.)"""
+
+
+def exit_code(error: BaseException) -> int:
+    """Say on stderr why the command fails; its exit code."""
+    if isinstance(error, errors.ArmkinError):
+        from armkin.cli import advice
+
+        code = next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
+        output.error(advice.message(error), error.kind, code, error.fields, advice.next_step(error))
+        return code
+    if isinstance(error, ClosedPipe):
+        return _enough()
+    if isinstance(error, OSError):
+        return _os_error(error)
+    if isinstance(error, MemoryError):
+        output.error("not enough memory; ask for less at once", "memory", RUNTIME)
+        return RUNTIME
+    return _unexpected(error)
+
+
+def no_command(name: str, rest: list[str]) -> errors.UsageError:
+    """The error of a first word that is no command, before the words `rest`."""
+    return errors.UsageError(f"there is no command '{name}'; {_other_command(name, rest)}")
+
+
+def _other_command(name: str, rest: list[str]) -> str:
+    """What to type in place of a word that is no command."""
+    if rest and rest[0] in COMMANDS:
+        return f"the command comes first: armkin {rest[0]} {name} ..."
+    close = get_close_matches(name.lower(), COMMANDS, 1)
+    return f"did you mean {close[0]}?" if close else "armkin --help lists them"
+
+
+def _os_error(error: OSError) -> int:
+    """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
+    if is_closed_pipe(error):
+        return _enough()
+    where = error.filename if error.filename is not None else "standard output"
+    output.error(f"{where}: {error.strerror or error}", "system", RUNTIME, {"file": str(where)})
+    _drop_stdout()
+    return RUNTIME
+
+
+def is_closed_pipe(error: OSError) -> bool:
+    """Whether the reader of what is written has gone."""
+    return error.errno == errno.EPIPE or (os.name == "nt" and error.errno == errno.EINVAL)
+
+
+def _enough() -> int:
+    """Exit code 0 where the reader has closed the pipe, as `| head` does."""
+    _drop_stdout()
+    return 0
+
+
+def _drop_stdout() -> None:
+    """Throw away what is still buffered: the interpreter would complain about it at its end."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _meant(error: Any, context: Any) -> list[str]:
+    """Options that a mistyped one is near to, or begins: --all for --all-branches."""
+    word = getattr(error, "option_name", None)
+    if not isinstance(word, str) or context is None:
+        return []
+    known = [name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")]
+    begun = [name for name in known if len(word) > 3 and name.startswith(f"{word}-")]
+    return list(getattr(error, "possibilities", None) or begun)
+
+
+def _unexpected(error: BaseException) -> int:
+    """Typer's own complaints about the command line, and our bugs."""
+    if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
+        from armkin.cli.numbers import is_number
+
+        message = str(error.format_message()).rstrip(".")
+        context = getattr(error, "ctx", None)
+        if possible := _meant(error, context):
+            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
+        if message.endswith("'ROBOT'"):
+            message += ": a robot file or the name of a shipped robot (armkin robots)"
+        if context is not None:
+            if "unexpected extra argument" in message and any(
+                map(is_number, message.rstrip(")").split("(")[-1].split())
+            ):
+                message += "; an option's numbers have commas and no spaces, as 390,80,300"
+            if "unexpected extra argument" in message and context.command.name == "stop":
+                message = "stop takes no robot: it stops what moves behind a port, armkin stop --port PORT"
+            message = f"{message}\nsee {context.command_path} --help"
+        code = int(getattr(error, "exit_code", USAGE))
+        output.error(message[:1].lower() + message[1:], "usage", code)
+        return code
+    if os.environ.get("ARMKIN_TRACEBACK"):
+        import traceback
+
+        traceback.print_exc()
+    output.error(
+        f"internal error: {type(error).__name__}: {error}\n"
+        "this is a bug in armkin: please report it with the command line and ARMKIN_TRACEBACK=1's output",
+        "internal",
+        RUNTIME,
+    )
+    return RUNTIME
