@@ -30,15 +30,23 @@ class Polished(NamedTuple):
 
 def turn(frame: Array, q: Array, prismatic: bool) -> Array:
     """``frame @ Z(q)`` for blocks (3, 4, M) and joint values (M,)."""
+    return _moved(frame, q, np.cos(q), _signed(np.sin(q)), prismatic)
+
+
+def _signed(sine: Array) -> Array:
+    """Sines (..., M) as `_moved` takes them: with both signs, (..., 2, M)."""
+    return np.stack([sine, -sine], axis=-2)
+
+
+def _moved(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
+    """`turn` by angles of which the cosines (M,) and the sines with both signs (2, M) are known."""
     out = np.empty_like(frame)
     if prismatic:
         out[:, :3] = frame[:, :3]
         out[:, 3] = frame[:, 3] + q * frame[:, 2]
         return out
-    c, s = np.cos(q), np.sin(q)
-    x, y = frame[:, 0], frame[:, 1]
-    out[:, 0] = c * x + s * y
-    out[:, 1] = c * y - s * x
+    np.multiply(frame[:, :2], cosine, out=out[:, :2])
+    out[:, :2] += frame[:, 1::-1] * sine  # c x + s y, c y - s x
     out[:, 2:] = frame[:, 2:]
     return out
 
@@ -49,13 +57,14 @@ def advance(frame: Array, link: Array) -> Array:
     return out
 
 
-def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, list[Array]]:
-    """The last frame (3, 4, M) for joint values (6, M), and every joint's frame before it turns."""
+def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, Array]:
+    """The last frame (3, 4, M) for joint values (n, M), and every joint's frame before it turns, (n, 3, 4, M)."""
+    cosine, sine = np.cos(q), _signed(np.sin(q))
+    joints = np.empty((q.shape[0], 3, 4, q.shape[1]))
     frame = np.repeat(link[0, :3, :, None], q.shape[1], axis=2)
-    joints = []
     for i in range(q.shape[0]):
-        joints.append(frame)
-        frame = advance(turn(frame, q[i], bool(prismatic[i])), link[i + 1])
+        joints[i] = frame
+        frame = advance(_moved(frame, q[i], cosine[i], sine[i], bool(prismatic[i])), link[i + 1])
     return frame, joints
 
 
@@ -72,18 +81,15 @@ def pose_error(frame: Array, goal: Array) -> tuple[Array, Array]:
     return error, np.sqrt(np.einsum("ijm,ijm->m", difference, difference))
 
 
-def jacobian(frame: Array, joints: list[Array], prismatic: Bool) -> Array:
-    """Jacobians (M, 6, 6) in the base's axes, from the frames that `tip` returns."""
+def jacobian(frame: Array, joints: Array, prismatic: Bool) -> Array:
+    """Jacobians (M, 6, n) in the base's axes, from the frames that `tip` returns."""
+    axis, arm = joints[:, :, 2], frame[:, 3] - joints[:, :, 3]  # (n, 3, M)
     out = np.empty((frame.shape[2], 6, len(joints)))
-    for i, joint in enumerate(joints):
-        axis = joint[:, 2]
-        if prismatic[i]:
-            out[:, :3, i], out[:, 3:, i] = axis.T, 0.0
-            continue
-        arm = frame[:, 3] - joint[:, 3]
-        out[:, 3:, i] = axis.T
-        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            out[:, x, i] = axis[y] * arm[z] - axis[z] * arm[y]
+    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, x] = (axis[:, y] * arm[:, z] - axis[:, z] * arm[:, y]).T
+    out[:, 3:] = axis.transpose(2, 1, 0)
+    if prismatic.any():
+        out[:, :3, prismatic], out[:, 3:, prismatic] = axis[prismatic].transpose(2, 1, 0), 0.0
     return out
 
 
@@ -116,7 +122,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         last = size
         if stale.size:
             chosen = slice(None) if stale.size == active.size else stale
-            square = jacobian(frame[..., chosen], [joint[..., chosen] for joint in joints], prismatic)
+            square = jacobian(frame[..., chosen], joints[..., chosen], prismatic)
             fresh = nudged(np.linalg.inv, square)
             index = active[chosen]
             weakness[index] = np.sqrt(np.einsum("mij,mij->m", fresh, fresh))
