@@ -78,7 +78,7 @@ class CompiledArm:
         self, targets: ArrayLike, task: str | None = None, near: ArrayLike | None = None, *, workers: int = 1
     ) -> Solutions:
         """All branches, as `armkin.ik`; workers: threads that share a large batch."""
-        return self._of(task).ik(targets, near, workers)
+        return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers)
 
     def _of(self, task: str | None) -> _CompiledTask:
         """The library for a task, built at its first use."""
@@ -195,10 +195,9 @@ class _CompiledTask:
         if self.turned is not self.arm:
             return None
         names = None if self.geometry.pairs is not None else self._names
-        same = {"arm": self.arm, "task": self.task, "names": self.names, "rounding": np.zeros(())}
+        same = {"arm": self.arm, "task": self.task, "names": self.names, "complete": self.geometry.complete}
         same |= {"method": self.geometry.name, "why": self.geometry.why}
-        complete = self.geometry.complete
-        return Single(call, self.goal_shape, self.arm.home, self.branches, complete, same, names)
+        return Single(call, self.goal_shape, self.arm.home, self.branches, same, names)
 
     def _names(self, count: int) -> tuple[str, ...]:
         if self.geometry.pairs is None:
@@ -208,12 +207,14 @@ class _CompiledTask:
     def _alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
         """One target the short way; None if there is more to it."""
         assert self._single is not None
-        close = near if near is None else np.asarray(near)
-        if target.dtype != np.float64 or (
-            close is not None and (close.shape != (self.n,) or close.dtype.kind not in "if")
-        ):
+        if target.dtype != np.float64:
             return None
-        return self._single.solve(target, close if close is None else close.astype(np.float64))
+        if near is None:
+            return self._single.solve(target, None)
+        close = np.asarray(near)
+        if close.shape != (self.n,) or close.dtype.kind not in "if":
+            return None
+        return self._single.solve(target, close.astype(np.float64))
 
     def _solved(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """All branches of targets (N, ...); None if some must be read first. near: (n,) or (N, n)."""
@@ -234,7 +235,7 @@ class _CompiledTask:
             return None
         out.complete[...] = self.geometry.complete
         if left:
-            rows = np.flatnonzero(out.state)
+            rows = np.flatnonzero(out.state.view(np.bool_))  # all targets have been read: 0 or 1, which is quicker told
             out.write(rows, solve.ik(self.arm, target[rows], self.name, near=each[rows] if step else each[0]))
         return out
 

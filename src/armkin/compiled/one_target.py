@@ -6,12 +6,27 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.inverse.solutions import Solutions
+from armkin.inverse.solutions import Solutions, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+LEFT = 2  # what `arm_single` returns for a target that it leaves to Python
+_FLAGS, _SMALL = np.dtype(np.bool_), np.dtype(np.int8)
+
+
+def _fixed(value: object) -> NDArray[Any]:
+    """An array () that solutions share, and so nobody may change."""
+    out = np.array(value)
+    out.flags.writeable = False
+    return out
+
+
+_STATUS = tuple(_fixed(np.int8(status)) for status in (Status.EXACT, Status.UNREACHABLE))
 
 
 class Single:
@@ -23,62 +38,73 @@ class Single:
         shape: tuple[int, ...],
         home: Array,
         branches: int,
-        complete: bool,
         same: dict[str, Any],
         names: Callable[[int], tuple[str, ...]] | None,
     ) -> None:
-        """call: takes a block's address; shape: of a target; complete, same: fields that all solutions share.
+        """call: takes a block's address; shape: of a target; same: fields that all solutions share.
 
         names: of that many branches, for classes that list no more rows than a target has branches; else None.
         """
-        self._call, self._shape, self._home, self._same, self._names = call, shape, home, same, names
-        self._n, self._branches, self._complete = len(home), branches, complete
+        self._call, self._shape, self._home, self._names = call, shape, home, names
+        self._same = same | {"rounding": _fixed(0.0), "complete": _fixed(same["complete"])}
+        self._n, self._branches = len(home), branches
+        self._cuts: dict[int, tuple[Any, ...]] = {}
         self._local = threading.local()
         size, n, B = int(np.prod(shape)), len(home), branches
         self._results = size + n
         self._bytes = 8 * B * n
-        self._size = size + n + B * n + (3 * B + n + 3 + 7) // 8
+        self._size = size + n + B * n + (3 * B + n + 2 + 7) // 8
 
-    def _block(self) -> tuple[Array, Array, Array, int]:
-        """Target, near, results, and the block's address."""
+    def _block(self) -> list[Any]:
+        """Target, near, results, the block's address, and the array that near was copied from."""
         block = np.zeros(self._size)
         size = self._results - self._n
-        results = block[self._results :]
-        results.view(np.bool_)[self._bytes + 3 * self._branches + self._n + 1] = self._complete
-        parts = block[:size].reshape(self._shape), block[size : self._results], results, block.ctypes.data
+        target, near, results = np.split(block, [size, self._results])
+        parts = [target.reshape(self._shape), near, results, block.ctypes.data, None]
         self._local.block = parts
         return parts
+
+    def _cut(self, rows: int) -> tuple[Any, ...]:
+        """Of that many branches: where q, valid, within, branch and free stand, and the fields that do not differ.
+
+        q's shape follows its place.
+        """
+        n, B, at = self._n, self._branches, self._bytes
+        masks = [slice(start, start + rows) for start in (at, at + B, at + 2 * B)]
+        same = self._same if self._names is None else {**self._same, "names": self._names(rows)}
+        self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(at + 3 * B, at + 3 * B + n), same
+        return self._cuts[rows]
 
     def solve(self, target: Array, near: Array | None) -> Solutions | None:
         """The branches of a target of float64 in the task's shape; None if C leaves it open. near: (n,) or None."""
         try:
-            target_in, near_in, results, address = self._local.block
+            block = self._local.block
         except AttributeError:
-            target_in, near_in, results, address = self._block()
+            block = self._block()
+        target_in, near_in, results, address, before = block
         close = self._home if near is None else near
         target_in[...] = target
-        near_in[...] = close
-        if self._call(address):
+        if close is not before:
+            near_in[...] = close
+            block[4] = self._home if near is None else None  # home does not change, other arrays may
+        said = self._call(address)
+        if said == LEFT:
             return None
         found = results.copy()
-        flags, small = found.view(np.bool_), found.view(np.int8)
-        n, B, at = self._n, self._branches, self._bytes
-        end, rows = at + 3 * B + n, B
-        said = self._same
+        flags, rows = found.view(_FLAGS), self._branches
         if self._names is not None:
-            rows = int(flags[at : at + B].sum())
-            said = {**said, "names": self._names(rows)}
+            rows = int(flags[self._bytes : self._bytes + rows].sum())
+        q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._cut(rows)
         out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
         out.__dict__.update(
-            said,
+            same,
             target=target,
             near=close,
-            q=found[: rows * n].reshape(rows, n),
-            valid=flags[at : at + rows],
-            within_limits=flags[at + B : at + B + rows],
-            branch=small[at + 2 * B : at + 2 * B + rows],
-            free=flags[at + 3 * B : end],
-            status=small[end : end + 1].reshape(()),
-            complete=flags[end + 1 : end + 2].reshape(()),
+            q=found[q].reshape(shape),
+            valid=flags[valid],
+            within_limits=flags[within],
+            branch=found.view(_SMALL)[branch],
+            free=flags[free],
+            status=_STATUS[said],
         )
         return out

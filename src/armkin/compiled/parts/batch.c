@@ -82,7 +82,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
 }
 
 /* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free (left alone), status,
-   complete (left alone), state. Returns the state. */
+   state. Returns 0 if it is solved, 1 if it is and no branch reaches it, 2 if it is left to Python. */
 int64_t arm_single(double *block)
 {
     const double *near = block + ARM_TARGET;
@@ -92,8 +92,8 @@ int64_t arm_single(double *block)
     int j;
     for (j = 0; j < ARM_JOINTS; j++)
         if (!(fabs(near[j]) <= ARM_LARGEST))
-            return ARM_UNREAD;
+            return 2;
     arm_batch(1, block, near, 0, 0, q, bytes, bytes + ARM_BRANCHES, (int8_t *)bytes + 2 * ARM_BRANCHES, (int8_t *)rest,
-        rest + 2);
-    return rest[2];
+        rest + 1);
+    return rest[1] != ARM_DONE ? 2 : rest[0] != 0;
 }
