@@ -22,7 +22,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
-from armkin.formula.trace import OncePaid
+from armkin.formula.trace import LazyCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -232,25 +232,25 @@ Formula = Callable[["Arm", list[Entry]], list[Entry]]
 
 
 @lru_cache(maxsize=256)
-def _recorded(arm: Arm, formula: Formula) -> OncePaid:
+def _recorded(arm: Arm, formula: Formula) -> LazyCode:
     """A formula of an arm's joint values as straight-line code."""
-    return OncePaid(lambda q: formula(arm, q), arm.n)
+    return LazyCode(lambda q: formula(arm, q), arm.n)
 
 
 def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
     """Run a formula over the batch axes of q in chunks that stay in the cache."""
     out = np.empty(values.shape[:-1] + shape)
     flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
-    straight = _recorded(arm, formula).get(len(flat_q))
-    if straight is None:
+    code = _recorded(arm, formula).get(len(flat_q))
+    if code is None:
         for k, entry in enumerate(formula(arm, list(flat_q.T))):
             flat_out[:, k] = entry
         return out
-    workspace = straight.workspace(min(len(flat_q), arrays.CHUNK))
+    workspace = code.workspace(min(len(flat_q), arrays.CHUNK))
     for start in range(0, len(flat_q), arrays.CHUNK):
         columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
         if columns.shape[1] < arrays.CHUNK <= len(flat_q):
-            workspace = straight.workspace(columns.shape[1])
-        for k, entry in enumerate(straight.run(list(columns), workspace)):
+            workspace = code.workspace(columns.shape[1])
+        for k, entry in enumerate(code.run(list(columns), workspace)):
             flat_out[start : start + arrays.CHUNK, k] = entry
     return out

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armkin.formula.recording import record
-from armkin.formula.trace import OncePaid, Straight
+from armkin.formula.trace import LazyCode, StraightLineCode
 
 Expression = Any  # an input's number, a constant, a column of branch constants, or (operation, expressions...)
 
@@ -83,7 +83,7 @@ def check(expression: Expression, operations: dict[str, Callable[..., Any]], tol
     rng = np.random.default_rng(7)
     inputs = [np.concatenate([rng.uniform(-10, 10, 5), [0.0, 1.0, -2.0]]) for _ in range(INPUTS)]
     expected = np.asarray(value(expression, inputs, operations), dtype=float)
-    formula = Straight(lambda symbols: [value(expression, symbols, operations)], INPUTS)
+    formula = StraightLineCode(lambda symbols: [value(expression, symbols, operations)], INPUTS)
     [batch] = formula.run(inputs, formula.workspace(len(inputs[0])))
     whole = np.broadcast_to(np.asarray(batch, dtype=float), expected.shape)
     np.testing.assert_allclose(whole, expected, rtol=tolerance, atol=tolerance)
@@ -121,7 +121,7 @@ def test_signs_move_outwards() -> None:
 
 def test_a_buffer_is_used_again() -> None:
     """A sum of ten products needs the buffers of two, not of ten."""
-    formula = Straight(lambda x: [sum((x[0] * float(k + 2) for k in range(10)), start=0.0)], 1)
+    formula = StraightLineCode(lambda x: [sum((x[0] * float(k + 2) for k in range(10)), start=0.0)], 1)
     assert len(formula.workspace(4)) <= 3
     [total] = formula.run([np.arange(4.0)], formula.workspace(4))
     assert total.tolist() == [0.0, 65.0, 130.0, 195.0]
@@ -138,6 +138,6 @@ def test_recording_waits_until_it_pays() -> None:
     def formula(x: list[Any]) -> list[Any]:
         return [x[0] + x[1]]
 
-    once = OncePaid(formula, 2)
+    once = LazyCode(formula, 2)
     assert [once.get(1) is None for _ in range(5)] == [True] * 4 + [False]
-    assert OncePaid(formula, 2).get(64) is not None
+    assert LazyCode(formula, 2).get(64) is not None

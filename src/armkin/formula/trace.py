@@ -19,8 +19,8 @@ UNCOPIED = 512  # elements of numpy's buffers: it copies operands that are repea
 LENGTHS = 16  # of batches, for which a thread keeps buffers
 
 
-class Straight:
-    """A recorded formula, as code for batches and as code for one pose."""
+class StraightLineCode:
+    """A recorded formula as code without branches or loops: for batches, and for one pose."""
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
@@ -88,25 +88,25 @@ class Straight:
         ]
 
 
-class OncePaid:
-    """A formula that is recorded at the first batch of 64 poses, or at the fifth call: recording takes milliseconds.
+class LazyCode:
+    """Straight-line code that is recorded at the first batch of 64 or at the fifth call: it takes milliseconds.
 
     Recorded or not, a batch is computed by the same operations of numpy; a single target is always computed in
     plain Python. So no result depends on what was asked before.
     """
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
-        """The arguments of `Straight`."""
+        """The arguments of `StraightLineCode`."""
         self._formula, self._inputs, self._calls = formula, inputs, 0
-        self._straight: Straight | None = None
+        self._code: StraightLineCode | None = None
 
-    def get(self, batch: int) -> Straight | None:
+    def get(self, batch: int) -> StraightLineCode | None:
         """The recorded code for a batch of that many poses; None while it is not recorded."""
         self._calls += 1
-        return self.always() if batch >= 64 or self._calls > 4 or self._straight is not None else None
+        return self.always() if batch >= 64 or self._calls > 4 or self._code is not None else None
 
-    def always(self) -> Straight:
+    def always(self) -> StraightLineCode:
         """The recorded code, recorded now if it is not yet."""
-        if self._straight is None:
-            self._straight = Straight(self._formula, self._inputs)
-        return self._straight
+        if self._code is None:
+            self._code = StraightLineCode(self._formula, self._inputs)
+        return self._code

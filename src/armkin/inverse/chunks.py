@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import Straight
+from armkin.formula.trace import StraightLineCode
 from armkin.inverse.batch import Batch, empty, pack
 from armkin.inverse.branches.turns import beyond_near, nearest_copy, on_limit
 from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
@@ -61,12 +61,12 @@ def solve(
     near: (N, n), one: (n,) if it serves all; workers: threads.
     """
     runner, N = recorded(arm, task, geometry), len(given)
-    straight = runner.code.always() if N == 1 else runner.code.get(N)
+    code = runner.code.always() if N == 1 else runner.code.get(N)
     if runner.axes is None:
-        runner.axes = _axes(runner, straight, given[:0])
+        runner.axes = _axes(runner, code, given[:0])
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
-    threads = straight is not None and workers > 1
+    threads = code is not None and workers > 1
     size = SHARED if threads else arrays.CHUNK
     limited = bool(on_limit(arm, near if one is None else one).any())
 
@@ -80,9 +80,7 @@ def solve(
             if task.orientation == "full":
                 goal, rounding[some], columns = read_poses(goal)
             target[some] = goal
-            found, workspace = _candidates(
-                runner, straight, goal, columns, near[some] if one is None else one, workspace
-            )
+            found, workspace = _candidates(runner, code, goal, columns, close, workspace)
             doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close, limited)
         return doubts
 
@@ -93,17 +91,17 @@ def solve(
     return Solved(out, math.prod(runner.axes), target, rounding)
 
 
-def _axes(runner: Recorded, straight: Straight | None, goal: Array) -> tuple[int, ...]:
+def _axes(runner: Recorded, code: StraightLineCode | None, goal: Array) -> tuple[int, ...]:
     """Lengths of the branch axes; goal: no targets."""
-    if straight is not None:
-        return np.broadcast_shapes((1, 1, 1), *straight.axes()[:-3])
+    if code is not None:
+        return np.broadcast_shapes((1, 1, 1), *code.axes()[:-3])
     values = runner.candidates(entries(runner.task, goal), [None] * runner.arm.n)[:-3]
     return np.broadcast_shapes((1, 1, 1, 0), *map(np.shape, values))[:-1]
 
 
 def _candidates(
     runner: Recorded,
-    straight: Straight | None,
+    code: StraightLineCode | None,
     goal: Array,
     columns: list[Entry] | None,
     near: Array,
@@ -111,13 +109,13 @@ def _candidates(
 ) -> tuple[list[Array], list[NDArray[Any]]]:
     """A chunk's candidates as `Recorded.candidates` returns them, and the buffers that they stand in."""
     N, task = len(goal), runner.task
-    if straight is None:
+    if code is None:
         return runner.candidates(entries(task, goal), preferred(runner.arm, near)), workspace
     if N == 1:
-        return straight.single(pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()), workspace
+        return code.single(pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()), workspace
     if not workspace or workspace[-1].shape[-1] != N:
-        workspace = straight.workspace(N)
-    return list(straight.run(entries(task, goal) if columns is None else columns, workspace)), workspace
+        workspace = code.workspace(N)
+    return list(code.run(entries(task, goal) if columns is None else columns, workspace)), workspace
 
 
 def _keep(

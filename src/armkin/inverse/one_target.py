@@ -56,15 +56,15 @@ class OneTarget:
         definition, geometry = solver(arm, task)
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
-        straight = recorded(arm, definition, geometry).code.always()
-        self._run, self._off = straight.numbers(), rotation_check().numbers()
+        code = recorded(arm, definition, geometry).code.always()
+        self._run, self._off = code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._limited = [
             (i, low + ON_LIMIT, high - ON_LIMIT)
             for i, (low, high, _) in enumerate(self._joints)
             if math.isfinite(low) or math.isfinite(high)
         ]
-        own = [axes_of(x) for x in straight.outputs]
+        own = [axes_of(x) for x in code.outputs]
         axes = np.broadcast_shapes((1, 1, 1), *own[: arm.n])
         self.count = math.prod(axes)
         self._plain = [not a for a in own]  # outputs that are a number, not a tuple

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import OncePaid
+from armkin.formula.trace import LazyCode
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
@@ -36,7 +36,7 @@ class Recorded:
         self.arm, self.task, self.geometry = arm, task, geometry
         self.link = [pose.constant(L) for L in arm.link]
         inputs = 12 if task.orientation == "full" else len(task.labels)
-        self.code = OncePaid(lambda goal: self.candidates(goal, [None] * arm.n), inputs)
+        self.code = LazyCode(lambda goal: self.candidates(goal, [None] * arm.n), inputs)
         self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
@@ -52,11 +52,11 @@ class Recorded:
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
-        straight = self.code.get(N)
-        if straight is None:
+        code = self.code.get(N)
+        if code is None:
             found = self.candidates(entries(self.task, target), [None] * self.arm.n)
         else:
-            found = list(straight.run(entries(self.task, target), straight.workspace(N)))
+            found = list(code.run(entries(self.task, target), code.workspace(N)))
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 

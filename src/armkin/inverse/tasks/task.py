@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
-from armkin.formula.trace import Straight
+from armkin.formula.trace import StraightLineCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -138,7 +138,7 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
 
 
 @cache
-def rotation_check() -> Straight:
+def rotation_check() -> StraightLineCode:
     """How far the columns x and z are from unit vectors at right angles, and y from z x x."""
 
     def formula(P: pose.Pose) -> list[Entry]:
@@ -150,7 +150,7 @@ def rotation_check() -> Straight:
             worst = np.maximum(worst, np.abs(e))
         return [worst]
 
-    return Straight(formula, 12)
+    return StraightLineCode(formula, 12)
 
 
 def _off(T: Array, entries: pose.Pose) -> Array:
