@@ -91,6 +91,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "fuzz/test_fuzz_command_lines.py": (),
     "fuzz/test_fuzz_devices.py": (),
     "fuzz/test_fuzz_robot_files.py": (),
+    "inverse/test_circuits.py": (),
     "inverse/test_compound_singularities.py": (),
     "inverse/test_edges.py": (),
     "inverse/test_elimination.py": (),

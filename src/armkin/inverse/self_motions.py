@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
 NO_GROWTH = 1e-12  # residual that stays as it is
+ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
 CORRECTIONS, CLOSE = 6, 1e-6  # Newton steps that bring a posture onto a curve, and their size where it is there
@@ -89,6 +90,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             between = q[k, i] + 0.5 * apart[close] * np.where(arm.prismatic, arm.reach, 1.0)
             there = np.repeat(target[k : k + 1], len(between), axis=0)
             held = np.where(curve[k, kept] & curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
+            held &= (np.abs(apart) > TURNED).sum(axis=1) <= ALONG
             if (newton.missing(arm, task, between, there) <= SOLUTION).any() or any(
                 _straight(arm, task, q[k, i], d, target[k]) for d in apart[held]
             ):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import clusters, folds, self_motions
+from armkin.inverse import circuits, clusters, folds, self_motions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
@@ -172,6 +172,10 @@ def _settle(
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, target)
+        far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
+        if (some := np.flatnonzero(far.any(axis=1))).size:
+            at, goal = q[k[some], b[some]], target[k[some]]
+            mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
         mine |= one
         mine[np.arange(len(k)), b] = True
         group[k] = np.where(mine, b[:, None], group[k])

@@ -1,0 +1,100 @@
+"""Circuits: the connected pieces of a self-motion of three joints or more.
+
+Two postures with the same values of the joints that a self-motion holds need not lie on one curve: a linkage of four
+bars has two circuits, the elbow up and down, where its shortest bar can go all the way round (Grashof's condition).
+The arm cannot go from one to the other without leaving its target.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.task import Task
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+STEP = 0.2  # [rad, reaches] along the curve
+MOST = 150  # steps
+PASSED = 0.75 * STEP  # joint values this close to a step are on the way
+SHORTEST = 0.02  # of them
+STRAIGHT = 0.8  # cosine between the directions of two steps
+OFF = 1e-6  # residual above which the joints move no farther
+CROSSING = 1e-2  # second smallest singular value below which another curve may cross
+
+
+def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: Bool, target: Array) -> Bool:
+    """Which of the postures others (M, K, n) lie on one circuit with q (M, n), of those asked (M, K); else True.
+
+    joints: (M, n) those that move. The curve is walked one way until it closes, then the other. Where another curve
+    crosses it, or it is too long, all count as on it.
+    """
+    who, column = np.nonzero(asked)
+    posture, met = others[who, column], np.zeros(len(who), bool)
+    closed = np.zeros(len(q), bool)
+    for way in (1.0, -1.0):
+        left = np.bincount(who[~met], minlength=len(q)) > 0
+        rows = np.flatnonzero(~closed & left)
+        if len(rows):
+            some = np.flatnonzero(~met & ~closed[who])
+            place = np.searchsorted(rows, who[some])
+            part = joints[rows], place, posture[some], target[rows]
+            met[some], closed[rows] = _walk(arm, task, q[rows], *part, way)
+    on = np.ones(asked.shape, bool)
+    on[who, column] = met
+    return on
+
+
+def _walk(
+    arm: Arm, task: Task, q: Array, joints: Bool, who: NDArray[np.intp], posture: Array, target: Array, way: float
+) -> tuple[Bool, Bool]:
+    """Which postures (P, n) are met on the way from the who-th of q (M, n): (P,); and whether the curve closes (M,)."""
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    at, last, pace = q.copy(), np.zeros_like(q), np.zeros(len(q))
+    met, closed, going = np.zeros(len(who), bool), np.zeros(len(q), bool), np.ones(len(q), bool)
+    for step in range(MOST):
+        active = np.flatnonzero(going)
+        start = at[active] + pace[active, None] * last[active] * unit
+        there, ahead, second, size = _across(arm, task, start, joints[active], target[active])
+        turned = (ahead * last[active]).sum(axis=1)
+        if not step:
+            turned = way * ahead[np.arange(len(active)), np.abs(ahead).argmax(axis=1)]
+        good = (size < OFF) & ((np.abs(turned) > STRAIGHT) | (step == 0))
+        at[active[good]] = there[good]
+        last[active[good]] = (ahead * np.sign(turned)[:, None])[good]
+        pace[active] = np.where(good, np.minimum(2.0 * pace[active], STEP) if step else STEP, 0.5 * pace[active])
+        stuck = ~good & (pace[active] < SHORTEST)
+        unsure = np.zeros(len(q), bool)  # nobody knows where it goes on
+        unsure[active] = (second < CROSSING) | (stuck & (size < OFF)) | (step == MOST - 1)
+        open_ = np.flatnonzero(~met & going[who])
+        off = np.abs(newton.difference(arm, posture[open_], at[who[open_]])).max(axis=1)
+        met[open_] = (off < PASSED) | unsure[who[open_]]
+        home = np.linalg.norm(newton.difference(arm, at[active], q[active]), axis=1) < PASSED
+        closed[active] = home & good & (step > 2)
+        more = np.bincount(who[~met], minlength=len(q)) > 0
+        going[active] = more[active] & ~closed[active] & ~stuck
+        if not going.any():
+            break
+    return met, closed
+
+
+def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
+    """Postures (M, n) moved onto the curve beside them, at right angles to it.
+
+    Also the curve's direction there (M, n), the second smallest singular value (M,) and what is missed (M,).
+    """
+    r, J = newton.scaled(arm, task, q, target)
+    J = J * joints[:, None]
+    L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
+    gain = np.where(L > 1e-10, 1.0 / np.maximum(L, 1e-10), 0.0)
+    gain[:, 0] = 0.0
+    back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
+    for _ in range(3):
+        q = q + (back @ r[:, :, None])[:, :, 0] * np.where(arm.prismatic, arm.reach, 1.0)
+        r = newton.residuals(arm, task, q, target)
+    return q, V[:, :, 0], np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))

@@ -1,0 +1,61 @@
+"""Self-motions in pieces: a linkage of four bars has two circuits, and an answer lists one posture of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import oracle
+import pytest
+import truth
+from oracle import Goal, Screws
+from test_every_branch import shipped
+from truth import Array, Bool
+
+import armkin
+from armkin import Status
+from armkin.inverse.recognise import solver
+
+STEP = 0.08  # [rad]
+
+
+def leads_to(screw: Screws, goals: Goal, q: Array, to: Array) -> Bool:
+    """Which of the postures to (M, B, n) lie on the curve of solutions through q (M, n), by the oracle: (M, B).
+
+    Walked both ways in small steps along the null vector, pulled back by Newton's method, until it closes.
+    """
+    met = np.zeros(to.shape[:2], bool)
+    for way in (1.0, -1.0):
+        at, last, going = q.copy(), np.zeros_like(q), np.ones(len(q), bool)
+        for step in range(250):
+            k = np.flatnonzero(going)
+            _, J = oracle._residual(screw, goals.take(k), at[k])
+            ahead = np.linalg.svd(J)[2][:, -1]
+            side = (ahead * last[k]).sum(axis=1) if step else way * ahead[:, np.abs(ahead[0]).argmax()]
+            last[k] = ahead * np.sign(side)[:, None]
+            there = truth.across(screw, goals.take(k), at[k] + STEP * last[k], weak=1e-4)
+            at[k] = truth.across(screw, goals.take(k), there, weak=1e-4)
+            met[k] |= oracle.distance(screw, to[k], at[k][:, None]) < 0.75 * STEP
+            back = (step > 2) & (np.linalg.norm(truth._way(screw, q[k], at[k]), axis=1) < 0.6 * STEP)
+            stray = np.linalg.norm(oracle._residual(screw, goals.take(k), at[k])[0], axis=1) > 1e-7
+            going[k] = ~(back | stray)
+            if not going.any():
+                break
+    return met
+
+
+@pytest.mark.parametrize(
+    ("name", "surface"), [("ur5e", "J5 = 0"), ("mycobot_280", "J5 = 90"), ("wx250s", "elbow moved")]
+)
+def test_each_circuit_is_listed_once(name: str, surface: str) -> None:
+    """Of these up to a quarter lay on a circuit that was not listed."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    q = truth.singular_postures(arm, screw, None, 40, seed=3)[surface]
+    goals = oracle.goal(task, screw, q)
+    s = armkin.ik(arm, goals.array())
+    k = np.flatnonzero((s.status == Status.SINGULAR) & (s.free.sum(axis=1) > 2))
+    assert len(k) > 15
+    here = oracle.distance(screw, s.q[k], q[k][:, None]).min(axis=1) < 1e-3
+    held = np.where(s.free[k, None], 0.0, np.abs(truth._way(screw, q[k][:, None], s.q[k]))).max(axis=2)
+    on = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)
+    assert (here | on.any(axis=1)).all(), q[k[~(here | on.any(axis=1))]]
+    assert (on.sum(axis=1) <= 1).all(), q[k[on.sum(axis=1) > 1]]
