@@ -154,13 +154,14 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     beyond &= (fold.rest < 1e-3) & (100 * fold.rest**2 < np.abs(fold.lost))
     exact = np.abs(fold.lost) <= SAME * fold.weakest  # a correction would not move it
     decided = np.where(own, bent | (exact & self_motions.isolated(fold)), beyond)
-    # what is left of a target of which all can be asked: one direction is lost, and no other branch shares the motion
-    asked = own & exact & (S[:, -1] > 2 * SOLUTION) & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)
+    asked = own & exact & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)  # one direction is lost
     found.open[k[~decided & ~asked]] = True
     rest = np.flatnonzero(~decided & ~found.open[k])
     if len(rest) and plain:
-        k, b = k[rest], b[rest]
-        found.moving[k, b], found.joints[k, b] = self_motions.self_motion(
-            arm, task, q[k, b], V[rest], np.ones(len(k), np.int64), target[k], folds.some(fold, rest)
+        k, b, at_rest = k[rest], b[rest], folds.some(fold, rest)
+        moving, found.joints[k, b] = self_motions.self_motion(
+            arm, task, q[k, b], V[rest], np.ones(len(k), np.int64), target[k], at_rest
         )
+        found.moving[k, b] = moving
+        found.open[k[moving & (at_rest.weakest < 2 * SOLUTION)]] = True  # others of its postures may be listed
     return sigma, found
