@@ -125,18 +125,33 @@ def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target:
     return q, valid, changed
 
 
+def _bounds(J: Array) -> tuple[Array, Bool]:
+    """Lower bounds of the smallest singular values of Jacobians (M, n, n), and of which more must be known (M,).
+
+    The Frobenius norm of the inverse is no smaller than its largest singular value, and next to equal where the sum of
+    the fourth powers of all is that of their squares, squared.
+    """
+    inverse = nudged(np.linalg.inv, J)
+    squares = (inverse * inverse).sum(axis=(1, 2))
+    bound = 1.0 / np.sqrt(squares)
+    asked = bound < 1.1 * DOUBLE
+    some = np.flatnonzero(asked & (bound > 1.1 * MOVING))
+    if len(some):
+        both = inverse[some].swapaxes(1, 2) @ inverse[some]
+        asked[some] = (both * both).sum(axis=(1, 2)) < 0.999 * squares[some] ** 2
+    return bound, asked
+
+
 def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, _Weak]:
     """Smallest singular values (K, B) of accepted candidates, or bounds above `DOUBLE`; and what weak ones are."""
     K, B, n = q.shape
     sigma = np.ones((K, B))
     plain = folds.square(arm, task)
+    asked = valid.copy()
     if plain:
-        inverse = nudged(np.linalg.inv, at.J[valid])  # its Frobenius norm is no smaller than its largest singular value
-        sigma[valid] = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-    else:
-        sigma[valid] = 0.0
-    others = ~valid & (at.size < SEED)
-    k, b = np.nonzero(others | (valid & (sigma < 1.1 * DOUBLE)))
+        bound, asked[valid] = _bounds(at.J[valid])
+        sigma[valid] = bound
+    k, b = np.nonzero(asked | (~valid & (at.size < SEED)))
     found = _Weak(np.zeros(K, bool), np.zeros((K, B), bool), np.zeros((K, B, n), bool))
     if not len(k):
         return sigma, found
@@ -154,8 +169,8 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     beyond &= (fold.rest < 1e-3) & (100 * fold.rest**2 < np.abs(fold.lost))
     exact = np.abs(fold.lost) <= SAME * fold.weakest  # a correction would not move it
     decided = np.where(own, bent | (exact & self_motions.isolated(fold)), beyond)
-    asked = own & exact & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)  # one direction is lost
-    found.open[k[~decided & ~asked]] = True
+    one = own & exact & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)  # one direction is lost
+    found.open[k[~decided & ~one]] = True
     rest = np.flatnonzero(~decided & ~found.open[k])
     if len(rest) and plain:
         k, b, at_rest = k[rest], b[rest], folds.some(fold, rest)
