@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,9 @@ def test_what_is_not_carried_is_exit_3_with_the_verdict() -> None:
     assert [branch["ends_because"] for branch in found["branches"]][-1] == "q1 meets its limit -120 deg"
 
 
+AT = "moves:\n  - point: [390, 80, 300]\n"
+
+
 @pytest.mark.parametrize(
     ("text", "code", "words"),
     [
@@ -106,7 +110,15 @@ def test_what_is_not_carried_is_exit_3_with_the_verdict() -> None:
         ("speed: 200\nmoves:\n  - joint: home", 2, "speed: must be at most 100"),
         ("moves:\n  - line: [258, 10, 367]", 2, "no length"),
         ("moves:\n  - joint: [0, 130, 0]", 3, "q2 = 130 deg is outside"),
-        ("moves:\n  - point: [3000, 0, 0]", 3, "no solution within the limits"),
+        ("moves:\n  - point: [3000, 0, 0]", 3, "the point 3000, 0, 0 is out of reach"),
+        ("start: {point: [900, 0, 0]}\nmoves:\n  - line: [390, 80, 300]", 3, "start: the point 900, 0, 0 is out of"),
+        ("start: {point: [-100, 10, 300]}\nmoves:\n  - joint: home", 3, "has no solution within the limits"),
+        ("moves:\n  - line: [390, .nan, 300]", 2, ".nan is not a finite number; write one"),
+        (AT + "  - line: [390, 80, 300]", 2, "its points are all the same"),
+        (AT + "  - {line: [390, 100, 300], blend: 15}\n  - line: [360, 100, 300]", 2, "half of a side of 20 mm"),
+        (AT + "  - arc: {via: [390, 120, 300], to: [390, 160, 300]}", 2, "lie on one line"),
+        (AT + "  - arc: {via: [390, 120, 300], to: [390, 80, 300]}", 2, "or two of them are the same"),
+        (AT + "  - spline: [[390, 80, 300]]", 2, "passes the same point twice"),
         ("moves:\n  - point: [3000, 0, 0]\n  - line: [2000, 0, 0]", 3, "first point is out of reach"),
         ("x,y,z\n1,2\n", 2, ":2: 2 cells, 3 columns"),
         ("x,y,z\n1,2,nan\n", 2, ":2: 'nan' is no number"),
@@ -120,6 +132,33 @@ def test_bad_paths_are_refused_in_words(tmp_path: Path, text: str, code: int, wo
     assert done.code == code, done.err
     assert words in done.err
     assert "read back" not in done.out
+
+
+def test_a_file_that_is_not_there_is_called_a_path_file(tmp_path: Path) -> None:
+    done = run("path", THREE_DOF, tmp_path / "nofile.yaml")
+    assert (done.code, done.out) == (1, "")
+    assert "nofile.yaml: cannot read the path file: No such file" in done.err
+    assert "robot" not in done.err
+
+
+def test_a_million_rows_are_refused_without_being_read() -> None:
+    """The text is read, and of its rows as many as a path may have."""
+    rows = b"x,y,z\n" + b"390,80,300\n" * 1_000_000
+    tracemalloc.start()
+    done = run("path", THREE_DOF, "-", stdin=rows)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert done.code == 2
+    assert "has more than 50000 rows" in done.err
+    assert most < 12 * len(rows)
+
+
+def test_corners_of_half_a_turn_and_points_given_twice_are_no_errors(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text("blend: 5\n" + AT + 2 * "  - line: [390, 160, 300]\n" + "  - line: [390, 80, 300]\n")
+    found = run("path", THREE_DOF, path, "--json").json
+    assert found["length_mm"] == pytest.approx(160)
+    assert found["deviation_mm"] <= 0.05
 
 
 def test_the_robot_file_is_not_written_over(tmp_path: Path, pick: Path) -> None:

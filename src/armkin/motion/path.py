@@ -15,6 +15,7 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.branches.names import find
+from armkin.inverse.solutions import Status
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -345,8 +346,11 @@ class _Walk:
             named = meant is None or found.branch[b] in meant
             if found.valid[b] and found.within_limits[b] and named:
                 return np.asarray(found.q[b])
-        what = f" on branch '{wanted}'" if wanted else ""
-        raise NoSolutionError(f"a point has no solution within the limits{what}: nothing was moved")
+        what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
+        if found.status == Status.UNREACHABLE:
+            raise NoSolutionError(f"{what} is out of reach: nothing was moved")
+        on = f" on branch '{wanted}'" if wanted else ""
+        raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
 
 
 def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
@@ -29,15 +30,14 @@ def parse(raw: bytes, name: str) -> PathFile:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise PathFileError(f"{name}: is not UTF-8 text", file=name) from None
-    rows = [
+    filled = (
         (number, row)
         for number, row in enumerate(csv.reader(io.StringIO(text)), 1)
         if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-    ]
+    )
+    rows = list(islice(filled, MOST + 2))  # a header, and one too many
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
-    if len(rows) > MOST:
-        raise PathFileError(f"{name}: has {len(rows)} rows; a path takes up to {MOST}: give it in parts", file=name)
     header: list[str] | None = None
     if any(_value(cell) is None for cell in rows[0][1]):
         kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
@@ -46,6 +46,8 @@ def parse(raw: bytes, name: str) -> PathFile:
         doubled = sorted({key for key in header if header.count(key) > 1})
         if doubled:
             raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
+    if len(rows) > MOST:
+        raise PathFileError(f"{name}: has more than {MOST} rows, and a path no more: give it in parts", file=name)
     moves: list[Move] = []
     for number, row in rows:
         values = [_value(cell) for cell in row]

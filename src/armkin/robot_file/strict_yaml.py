@@ -295,7 +295,7 @@ def _number(text: str, line: int) -> str | int | float:
             raise StrictYamlError(line, f"{shown(text)} is too large for a number")
         return value
     if re.fullmatch(_NOT_FINITE, text):
-        raise StrictYamlError(line, f"{text} is not a finite number; leave the key out if there is no bound")
+        raise StrictYamlError(line, f"{text} is not a finite number; write one, or leave the key out for no bound")
     if re.fullmatch(_SEXAGESIMAL, text):
         raise StrictYamlError(line, _sexagesimal(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
