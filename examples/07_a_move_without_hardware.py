@@ -4,7 +4,7 @@ import numpy as np
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import plan
+from armkin.board.firmware.trajectory_to_counts import plan
 from armkin.board.opening import open_machine
 from armkin.board.planner import where
 

@@ -15,7 +15,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "attacks/test_signals.py": (),
     "board/test_board_sim.py": ("test_mutated_frames_move_nothing_that_was_not_sent",),
     "board/test_curves.py": ("test_a_path_at_random_arrives_at_exact_counts",),
-    "board/test_cutting.py": (
+    "board/test_trajectory_to_counts.py": (
         "test_a_line_is_exact_coordinated_and_within_every_bound",
         "test_a_move_of_hours_is_planned_at_once_in_bounded_memory",
         "test_a_queue_of_30_segments_always_reaches_to_a_stop",
@@ -26,7 +26,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "board/test_feetech_machine.py": ("test_random_moves_arrive_and_stay_near_their_line",),
     "board/test_grbl_machine.py": ("test_200_random_moves_are_read_back_exact",),
     "board/test_klipper.py": ("test_200_random_moves_are_read_back_exact_and_keep_their_time",),
-    "board/test_lies.py": ("test_90_lies_to_a_moving_command_end_it_in_bounded_time",),
+    "board/test_false_replies.py": ("test_90_lies_to_a_moving_command_end_it_in_bounded_time",),
     "board/test_machine.py": (
         "test_a_noisy_line_ends_at_exact_counts",
         "test_coupled_joints_home_one_after_another",
@@ -99,7 +99,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_memory.py": ("test_memory_beyond_the_results_does_not_grow_with_the_batch",),
     "inverse/test_near.py": (),
     "inverse/test_nearly_special.py": (),
-    "inverse/test_regular.py": ("test_all_at_once_is_as_one_by_one",),
+    "inverse/test_regular_targets.py": ("test_all_at_once_is_as_one_by_one",),
     "inverse/test_subproblems.py": ("test_a_circle_and_a_conic",),
     "inverse/test_sweep.py": ("test_what_is_dropped_is_not_shown",),
     "inverse/test_truth.py": (),

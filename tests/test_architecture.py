@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -63,9 +64,14 @@ MODULES = {
 
 
 @cache
+def _parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@cache
 def _nodes(path: Path) -> list[ast.AST]:
     """All nodes of a file's syntax tree."""
-    return list(ast.walk(ast.parse(path.read_text())))
+    return list(ast.walk(_parsed(path)))
 
 
 def _room(module: str) -> str:
@@ -166,3 +172,23 @@ def test_classes_have_at_most_250_lines() -> None:
         if isinstance(node, ast.ClassDef) and (node.end_lineno or 0) - node.lineno >= 250
     }
     assert not long
+
+
+PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
+LISTED_ELSEWHERE = {SOURCE / "armkin", SOURCE / "armkin/cli/commands"}  # docs/architecture.md; its table of commands
+
+
+@pytest.mark.parametrize("package", [path for path in PACKAGES if path not in LISTED_ELSEWHERE], ids=lambda p: p.name)
+def test_a_package_lists_its_files(package: Path) -> None:
+    """And no other files: every word that ends in .py is one of its own, or has a path before it."""
+    text = ast.get_docstring(_parsed(package / "__init__.py")) or ""
+    files = {
+        f"{path.name}{'/' * path.is_dir()}" for path in package.iterdir() if path.suffix == ".py" or _is_room(path)
+    }
+    named = set(re.findall(r"(?<![\w./])(\w+(?:\.py|/))", text))
+    assert files - {"__init__.py", "__main__.py"} <= named
+    assert {name for name in named if name.endswith(".py")} <= files
+
+
+def _is_room(path: Path) -> bool:
+    return (path / "__init__.py").exists()

@@ -8,9 +8,9 @@ import pytest
 import armkin
 from armkin.board.backend.job import braking
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import cut
+from armkin.board.firmware.counts_to_segments import cycles_of
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.segments import cycles_of
+from armkin.board.firmware.trajectory_to_counts import cut
 from armkin.board.opening import open_port
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.queue import intervals

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import ReplacedError
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS

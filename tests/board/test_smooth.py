@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armkin.board.firmware import segments, straight_lines
-from armkin.board.firmware.cutting import plan as plan_moves
+from armkin.board.firmware import counts_to_segments, straight_lines
 from armkin.board.firmware.protocol import BLOCK, HALF, STEP, Segment
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.model import build as arms
 
-CLOCK, MIN_INTERVAL = segments.CLOCK, 448
+CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, 448
 
 
 def ticks(cut: list[Segment]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

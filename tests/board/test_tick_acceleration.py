@@ -13,9 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 from armkin.board.firmware import straight_lines
-from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
 from armkin.board.firmware.straight_lines import Pieces
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.board_kinds import BOARDS

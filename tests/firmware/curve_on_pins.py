@@ -16,10 +16,10 @@ from emulator import EmulatedBoard, Trace
 import armkin
 from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import cut
+from armkin.board.firmware.counts_to_segments import CLOCK
 from armkin.board.firmware.protocol import HALF, STEP, Segment, State
-from armkin.board.firmware.segments import CLOCK
 from armkin.board.firmware.straight_lines import line
+from armkin.board.firmware.trajectory_to_counts import cut
 from armkin.formula.arrays import Array
 from armkin.motion.curve import Curve
 from armkin.motion.trajectory import Trajectory

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 import armkin
 from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import plan
 from armkin.board.firmware.protocol import whole
+from armkin.board.firmware.trajectory_to_counts import plan
 from armkin.motion.profile import Profile
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order

@@ -11,9 +11,9 @@ from pins import net
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import Flag
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.model import build as arms
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run

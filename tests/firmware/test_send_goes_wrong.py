@@ -18,8 +18,8 @@ from emulator import EmulatedBoard
 from pins import at_rest, net, on_the_line
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import plan as plan_moves
 from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.model import build as arms
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, run

@@ -16,8 +16,8 @@ from emulator import EmulatedBoard
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.cutting import Cut
-from armkin.board.firmware.segments import CLOCK
+from armkin.board.firmware.counts_to_segments import CLOCK
+from armkin.board.firmware.trajectory_to_counts import Cut
 from armkin.board.planner import Planner
 from armkin.formula.arrays import Array
 from command_line import THREE_DOF, process

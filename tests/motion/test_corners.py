@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware.cutting import cut
+from armkin.board.firmware.trajectory_to_counts import cut
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.corners import rounded

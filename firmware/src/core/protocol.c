@@ -9,7 +9,7 @@
 #include "inputs.h"
 #include "jog.h"
 #include "link.h"
-#include "orders.h"
+#include "commands.h"
 
 enum { HELLO = 0x01, STATUS_ASK, HOLD };
 enum { ACK = 0x80, INFO, STATUS, CREDIT };

@@ -2,7 +2,7 @@
 #pragma once
 #include <stdint.h>
 
-#include "../plain.h"
+#include "../tick_in_c.h"
 
 #define HAL_LOCK() {
 #define HAL_UNLOCK() }

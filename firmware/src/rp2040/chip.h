@@ -2,7 +2,7 @@
 #pragma once
 #include <stdint.h>
 
-#include "../plain.h"
+#include "../tick_in_c.h"
 
 #define HAL_BARRIER() __asm__ volatile("dmb" ::: "memory")
 #define HAL_LOCK()                                                       \

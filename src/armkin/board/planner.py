@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.cutting import cut, plan
+from armkin.board.firmware.trajectory_to_counts import cut, plan
 from armkin.board.kinds import Foreign
-from armkin.board.report import Summary, Where
+from armkin.board.summaries import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.cutting import Cut
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import STEP
+from armkin.board.firmware.trajectory_to_counts import Cut
 from armkin.board.ports import note_path
 from armkin.errors import HeldError, LinkError, NothingHeldError
 from armkin.motion.remainder import remainder

@@ -1,7 +1,24 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
-    __init__ (main) -> app (group, errors -> exit codes) -> commands/__init__ (the table of commands)
-    commands/fk, commands/ik, ... -> options, numbers, batch, output, render
+app.py             the group of commands, and what runs a command line; failures.py: errors -> exit codes
+advice.py          the next step after an error
+commands/          one file a command, and the table of them
+answers/           the JSON of every command, as types
+
+What the words come to:
+
+arguments.py       negative numbers are no options
+options.py         options that several commands share; completion.py: what Tab offers
+numbers.py         numbers as people write them; unit_notes.py: those that look like metres or radians
+inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or swept
+rows.py            many of them in chunks; csv_rows.py: from CSV; batch.py: their answers
+piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
+default_port.py    the port; board_link.py: an open machine, signals
+
+What is printed:
+
+output.py          where it goes
+render.py          JSON and aligned columns; info_text.py: `info` for people
 
 A command is a function of the same name in a module of the same name, written for Typer:
 `armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its

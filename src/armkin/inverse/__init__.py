@@ -5,10 +5,16 @@ The way of a target:
 tasks/              what a target prescribes, and which task fits an arm
 recognise.py        which class an arm belongs to
 solve.py            `ik`: candidates -> residuals -> whole turns and limits -> singularities
+one_target.py       a single pose of a closed form in plain numbers, without numpy
+batch.py            arrays of all targets, as the solvers fill them
 chunks.py           closed forms: chunks of a batch that stay in the cache; workers.py: threads that share it
-singularities.py    boundaries and singular postures; clusters.py: roots of higher order
+singularities.py    boundaries and singular postures
+doubtful.py         targets that may be singular: regular_targets.py decides most at once, singularities.py the rest
+fold_singularities.py  postures at which two roots meet, told from self-motions
+clusters.py         what rounding makes of one root of third or fourth order
 self_motions.py     whether joints can move while the target is kept, and what lies on one self-motion
 solutions.py        the answer
+choose.py           one branch a target, of an arm with joints held or swept, too; or why none is
 closest.py          the nearest legal pose when there is no branch
 
 The classes, in the order in which they are asked:
@@ -18,6 +24,7 @@ nearly_special.py   all but one of these: its branches, corrected on the true ar
 tool_axis.py        five joints, the tool's position and z axis: a class for poses and a virtual joint
 general.py          every other arm of up to six joints
 elimination/        the numeric method behind it
+many_starts.py      a search, for targets that the elimination could not settle
 
 What serves them all:
 

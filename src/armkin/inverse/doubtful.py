@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import regular, singularities
+from armkin.inverse import regular_targets, singularities
 from armkin.inverse.batch import Batch, named, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
 from armkin.inverse.numeric.tolerances import SAME
@@ -44,7 +44,7 @@ def decided(
         rows = doubtful[part]
         if not len(part):
             continue
-        found = regular.settle(arm, task, q[part], valid[part], target[rows], near[rows])
+        found = regular_targets.settle(arm, task, q[part], valid[part], target[rows], near[rows])
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
         new = np.flatnonzero(found.known & (found.double | found.changed | moving))

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import folds
-from armkin.inverse.folds import BENT, CLEAR, Folds
+from armkin.inverse import fold_singularities
+from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import BESIDE, SOLUTION, TURNED, WEAK
@@ -180,7 +180,9 @@ def self_motion(
     moving, joints, known = np.zeros(len(q), bool), np.zeros(q.shape, bool), np.zeros(len(q), bool)
     one = np.flatnonzero((nullity == 1) & (fold.second > CLEAR))
     if len(one):
-        known[one], moving[one], joints[one] = _one_way(arm, task, q[one], folds.some(fold, one), target[one])
+        known[one], moving[one], joints[one] = _one_way(
+            arm, task, q[one], fold_singularities.some(fold, one), target[one]
+        )
     rest = np.flatnonzero(~known)
     if len(rest):
         moving[rest], joints[rest] = _all_ways(arm, task, q[rest], V[rest], nullity[rest], target[rest])

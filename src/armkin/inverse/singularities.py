@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, clusters, folds, self_motions
+from armkin.inverse import circuits, clusters, fold_singularities, self_motions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
@@ -150,10 +150,10 @@ def _settle(
         if len(some):
             k, b = k[some], b[some]
             asked[k, b] = True
-            fold = folds.folds(arm, task, q[k, b], target[k])
+            fold = fold_singularities.folds(arm, task, q[k, b], target[k])
             some = np.flatnonzero(~self_motions.isolated(fold))
             if len(some):
-                k, b, fold = k[some], b[some], folds.some(fold, some)
+                k, b, fold = k[some], b[some], fold_singularities.some(fold, some)
                 lost = np.maximum(nullity[k, b], 1)
                 moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k], fold)
 

@@ -10,7 +10,7 @@ branch_chains.py    how far each carries, and the fewest runs that carry all
 branch_path.py      the branch that is taken: joint values along the route
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
 hold_cap.py         how fast it may be for a hold on it
-path_plan.py        the answer; report.py: what is said of its branches; held.py: with joints held
+path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: with joints held
 
 The way of waypoints:
 

@@ -20,7 +20,7 @@ from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import outside, said
-from armkin.motion import geometry, path_numbers, report
+from armkin.motion import branch_report, geometry, path_numbers
 from armkin.motion.branch_path import Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
@@ -307,9 +307,9 @@ class _Walk:
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
             fixed=None if free else self.q, branch=branch, count=self.samples,
         )  # fmt: skip
-        report.note(self.plan, carried, near)
+        branch_report.note(self.plan, carried, near)
         if not carried.whole and not (self.split and carried.covered):
-            raise report.refused(self.plan, carried, branch)
+            raise branch_report.refused(self.plan, carried, branch)
         return carried.columns.s, carried.runs
 
     def _lay(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:

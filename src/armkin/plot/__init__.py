@@ -1,8 +1,9 @@
 """Pictures (extra ``armkin[plot]``): the arm in one or many poses, and the cloud of its workspace.
 
-    canvas.py    matplotlib: figures, axes in true proportion, files
-    poses.py     `plot_poses`: branches, a path, a single pose
-    cloud.py     `plot_workspace`: the cloud and its projections
+canvas.py  matplotlib: figures, axes in true proportion, files
+poses.py   `plot_poses`: branches, a path, a single pose
+path.py    a planned path
+cloud.py   `plot_workspace`: the cloud and its projections
 
 The same input gives the same file, to the byte.
 """

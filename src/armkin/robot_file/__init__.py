@@ -1,7 +1,13 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
-    strict_yaml -> model (pydantic: keys, types, bounds) -> checks (rules between values)
-                -> robot (RobotFile: the two together) -> messages (errors in the file's own words)
+strict_yaml.py   YAML without its traps
+model.py         keys, types, bounds, as pydantic has them; checks.py: rules between values
+robot.py         `RobotFile`: the two together; messages.py: errors in the file's own words
+schema.py        JSON Schema, for editors
+catalogue.py     the shipped robots by name
+new.py           a robot file from a DH table
+edit.py          other values in a robot file's text; writing.py: a whole file's text
+urdf.py          a URDF as a robot file; urdf_document.py: its XML
 
 This package imports pydantic and yaml, and is itself imported only when a robot file is read.
 """

@@ -1,1 +1,7 @@
-"""Bus servos: Feetech STS3215 and its kin."""
+"""Bus servos: Feetech STS3215 and its kin.
+
+packet.py     packets on the bus
+registers.py  a servo's registers
+bus.py        questions, asked again until they are answered
+machine.py    an arm of them; gripping.py: its gripper
+"""

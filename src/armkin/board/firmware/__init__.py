@@ -1,13 +1,31 @@
 """The boards that run armkin's own firmware (firmware/PROTOCOL.md).
 
-framing.py              payloads to bytes on the line and back
-protocol.py             payloads
-motion_frame.py         the payload of a motion; segment.py: one segment and its bytes
-configuration_image.py  the configuration image
-session.py              opened, spoken in, held; window.py: go-back-N with credit; serial_line.py: noise on the line
-reply_checks.py         what a board may say
-configuration.py        a robot file as its board must know it; missing_keys.py: what it lacks
-cutting.py              a trajectory as moves; straight_lines.py and curves.py: as segments, which segments.py makes
-machine.py              an arm on its board
-homing.py               homing by limit switches
+The bytes:
+
+framing.py                payloads to bytes on the line and back
+protocol.py               payloads
+segment_format.py         one segment: its fields and its bytes; motion_frame.py: the payload that carries several
+configuration_image.py    the configuration image
+reply_checks.py           what a board may say
+
+The conversation:
+
+find_boards.py            which plugged-in boards answer
+session.py                opened, spoken in, held
+go_back_n.py              frames in sequence, sent again until they are acknowledged; serial_line.py: noise on the line
+
+The way of a motion:
+
+trajectory_to_counts.py   a trajectory as moves in counts, refused where it is too fast
+counts_to_segments.py     pieces of constant acceleration as exact segments
+straight_lines.py         which pieces a straight line has; curves.py: any other stretch
+streaming.py              segments to the board while it moves
+
+An arm on a board:
+
+configuration.py          a robot file as its board must know it; missing_keys.py: what it lacks
+machine.py                the arm: configured, its position known or lost, moved by plans
+homing.py                 homing by limit switches
+jogging.py, gripping.py   one joint at a constant speed; the gripper
+board_status.py           what `status` tells besides the position
 """

@@ -10,10 +10,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware import cutting, protocol, streaming
+from armkin.board.firmware import protocol, streaming, trajectory_to_counts
+from armkin.board.firmware.board_status import told
 from armkin.board.firmware.motion_frame import WHY
 from armkin.board.firmware.protocol import Error, Flag, Status
-from armkin.board.firmware.reporting import told
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.board_kinds import board_name
 from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
@@ -23,7 +23,7 @@ from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.segments import Counts, Move
+    from armkin.board.firmware.counts_to_segments import Counts, Move
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
@@ -189,16 +189,20 @@ class Machine:
 
     # Moving
 
-    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> cutting.Cut:
+    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> trajectory_to_counts.Cut:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each, for the board that is there."""
         info = self.info
-        return cutting.plan(self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval)
+        return trajectory_to_counts.plan(
+            self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval
+        )
 
-    def lay(self, trajectory: Trajectory, start: Counts) -> cutting.Cut:
+    def lay(self, trajectory: Trajectory, start: Counts) -> trajectory_to_counts.Cut:
         """A trajectory that starts at counts (motors,), for the board that is there."""
-        return cutting.cut(trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval)
+        return trajectory_to_counts.cut(trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval)
 
-    def run(self, plans: Iterable[cutting.Cut | None], progress: Progress = lambda done, total: None) -> Status:
+    def run(
+        self, plans: Iterable[trajectory_to_counts.Cut | None], progress: Progress = lambda done, total: None
+    ) -> Status:
         """Carry out plans, one after another; None in between: nothing to do yet.
 
         Returns the status at the end, where the last plan ends, or raises LinkError.

@@ -22,17 +22,17 @@ from armkin.board.firmware.framing import cobs_decode as cobs_decode
 from armkin.board.firmware.framing import cobs_encode as cobs_encode
 from armkin.board.firmware.framing import unwire as unwire
 from armkin.board.firmware.framing import wire as wire
-from armkin.board.firmware.segment import BLOCK as BLOCK
-from armkin.board.firmware.segment import COARSE as COARSE
-from armkin.board.firmware.segment import FINE as FINE
-from armkin.board.firmware.segment import HALF as HALF
-from armkin.board.firmware.segment import STEP as STEP
-from armkin.board.firmware.segment import Segment as Segment
-from armkin.board.firmware.segment import nearest_rate as nearest_rate
-from armkin.board.firmware.segment import pack
-from armkin.board.firmware.segment import read_segment as read_segment
-from armkin.board.firmware.segment import segment_size as segment_size
-from armkin.board.firmware.segment import whole as whole
+from armkin.board.firmware.segment_format import BLOCK as BLOCK
+from armkin.board.firmware.segment_format import COARSE as COARSE
+from armkin.board.firmware.segment_format import FINE as FINE
+from armkin.board.firmware.segment_format import HALF as HALF
+from armkin.board.firmware.segment_format import STEP as STEP
+from armkin.board.firmware.segment_format import Segment as Segment
+from armkin.board.firmware.segment_format import nearest_rate as nearest_rate
+from armkin.board.firmware.segment_format import pack
+from armkin.board.firmware.segment_format import read_segment as read_segment
+from armkin.board.firmware.segment_format import segment_size as segment_size
+from armkin.board.firmware.segment_format import whole as whole
 
 VERSION = 2
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import protocol, reply_checks
+from armkin.board.firmware.go_back_n import Window
 from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
 from armkin.board.firmware.reply_checks import DeviceError as DeviceError
 from armkin.board.firmware.reply_checks import ReplacedError as ReplacedError
 from armkin.board.firmware.serial_line import Line
-from armkin.board.firmware.window import Window
 from armkin.board.ports import Port
 from armkin.errors import LinkError
 

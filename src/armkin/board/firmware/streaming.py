@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.firmware import protocol
+from armkin.board.firmware.go_back_n import QUESTION
 from armkin.board.firmware.motion_frame import Batch
 from armkin.board.firmware.protocol import Error, Segment, State, Status
 from armkin.board.firmware.reply_checks import DeviceError
 from armkin.board.firmware.straight_lines import Pieces
-from armkin.board.firmware.window import QUESTION
 
 if TYPE_CHECKING:
     from armkin.board.backend import Progress
-    from armkin.board.firmware.cutting import Cut
-    from armkin.board.firmware.segments import Counts, Move
+    from armkin.board.firmware.counts_to_segments import Counts, Move
     from armkin.board.firmware.session import Session
+    from armkin.board.firmware.trajectory_to_counts import Cut
 
 # [s] that the arm stands while the queue begins to fill: what the frames of a ramp's first 10 ms take, and 4.5 times
 # the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a bad line.

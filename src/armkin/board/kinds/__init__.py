@@ -1,4 +1,10 @@
-"""Boards with somebody else's firmware, one file a kind: what stands where our own has a configuration."""
+"""Boards with somebody else's firmware, one file a kind: what stands where our own has a configuration.
+
+foreign.py  what all of them do: plan, find a port, jog, home, grip
+grbl.py     GRBL, grblHAL, FluidNC
+feetech.py  bus servos
+klipper.py  Klipper
+"""
 
 from __future__ import annotations
 

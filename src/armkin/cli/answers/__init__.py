@@ -1,5 +1,8 @@
 """The JSON of every command: keys, types and what they mean.
 
+arm.py     answers about an arm, and errors
+moving.py  answers about an arm that moves, and about its board
+
 `docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
 """

@@ -3,7 +3,7 @@
 # No annotations as text here: a key that may be absent is known by NotRequired at run time.
 from typing import Annotated, Literal, NotRequired, TypedDict
 
-from armkin.board.report import Summary, Where
+from armkin.board.summaries import Summary, Where
 from armkin.cli.answers.arm import Head
 
 

@@ -258,7 +258,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
     from functools import partial
 
     from armkin.board import path_run
-    from armkin.board.firmware.cutting import cut
+    from armkin.board.firmware.trajectory_to_counts import cut
     from armkin.board.kinds import Foreign
     from armkin.motors import pulses
 
@@ -277,7 +277,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
 
 def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
-    from armkin.motion.report import answer
+    from armkin.motion.branch_report import answer
 
     segments = None if laid is None else sum(one.segments for one in laid)
     return {**render.head(plan.arm), **answer(plan), "segments": segments}
@@ -334,7 +334,7 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         )
         lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
     for one in plan.reconfigurations:
-        from armkin.motion.report import words
+        from armkin.motion.branch_report import words
 
         line = f"  at {one.s:.3f} mm: {words(arm, one)}"
         if line not in lines:  # several branches end there for one reason

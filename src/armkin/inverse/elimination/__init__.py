@@ -2,7 +2,7 @@
 
 method.py          the method, why it is complete, `prepare` and `solve`
 closed_loop.py     the chain closed and scaled
-walks.py           which joint plays which part
+joint_order.py     where the loop is cut, which way it is walked: which joint plays which part
 line_features.py   the numbers of a line on which rigid motions are matrices
 end_joints.py      removes the two end joints, and gives them back
 pencil.py          the eigenvalue problem of the middle joints

@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import line_features
-from armkin.inverse.elimination.walks import Role
+from armkin.inverse.elimination.joint_order import Role
 from armkin.inverse.numeric.linalg import nudged
 from armkin.model.rotation import inverse
 

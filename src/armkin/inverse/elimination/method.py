@@ -40,10 +40,10 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import closed_loop, roots, three_prismatic
 from armkin.inverse.elimination.closed_loop import Loop
+from armkin.inverse.elimination.joint_order import Role, roles
 from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
-from armkin.inverse.elimination.walks import Role, roles
 from armkin.inverse.numeric.tolerances import ELIMINATED, EXAMINED, GRAZING, SEED
 from armkin.model.rotation import inverse
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import folds, self_motions
-from armkin.inverse.folds import BENT, CLEAR, Linear
+from armkin.inverse import fold_singularities, self_motions
+from armkin.inverse.fold_singularities import BENT, CLEAR, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
@@ -146,7 +146,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     """Smallest singular values (K, B) of accepted candidates, or bounds above `DOUBLE`; and what weak ones are."""
     K, B, n = q.shape
     sigma = np.ones((K, B))
-    plain = folds.square(arm, task)
+    plain = fold_singularities.square(arm, task)
     asked = valid.copy()
     if plain:
         bound, asked[valid] = _bounds(at.J[valid])
@@ -162,7 +162,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     k, b, U, S, V, own = k[some], b[some], U[some], S[some], V[some], own[some]
     if not len(k):
         return sigma, found
-    fold = folds.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
+    fold = fold_singularities.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
     bent = np.abs(fold.bend) > BENT
     # beyond a fold, and what else is missing is so little that putting it right does not lead back
     beyond = bent & (fold.weakest < 1e-6) & (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
@@ -173,7 +173,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     found.open[k[~decided & ~one]] = True
     rest = np.flatnonzero(~decided & ~found.open[k])
     if len(rest) and plain:
-        k, b, at_rest = k[rest], b[rest], folds.some(fold, rest)
+        k, b, at_rest = k[rest], b[rest], fold_singularities.some(fold, rest)
         moving, found.joints[k, b] = self_motions.self_motion(
             arm, task, q[k, b], V[rest], np.ones(len(k), np.int64), target[k], at_rest
         )

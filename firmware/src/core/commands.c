@@ -1,4 +1,4 @@
-#include "orders.h"
+#include "commands.h"
 
 #include <string.h>
 

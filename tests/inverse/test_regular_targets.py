@@ -10,7 +10,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse import regular
+from armkin.inverse import regular_targets
 from armkin.inverse.numeric import newton
 from armkin.inverse.recognise import solver
 from armkin.model.arm import Arm
@@ -38,12 +38,14 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
     arm, at_once = nearly_singular(name, least, most)
     decided = []
 
-    def nothing(arm: Arm, task: object, q: np.ndarray, *rest: object) -> regular.Regular:
+    def nothing(arm: Arm, task: object, q: np.ndarray, *rest: object) -> regular_targets.Regular:
         decided.append(len(q))
         none = np.zeros(len(q), bool)
-        return regular.Regular(none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), arm.n), bool), q, none)
+        return regular_targets.Regular(
+            none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), arm.n), bool), q, none
+        )
 
-    monkeypatch.setattr(regular, "settle", nothing)
+    monkeypatch.setattr(regular_targets, "settle", nothing)
     _, one_by_one = nearly_singular(name, least, most)
     assert sum(decided) > 4
     for k in range(len(at_once.status)):
@@ -60,14 +62,14 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
 def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: no singular value, one call."""
     known = []
-    settle = regular.settle
+    settle = regular_targets.settle
 
-    def counted(*args: object) -> regular.Regular:
+    def counted(*args: object) -> regular_targets.Regular:
         found = settle(*args)  # type: ignore[arg-type]
         known.append(found.known)
         return found
 
-    monkeypatch.setattr(regular, "settle", counted)
+    monkeypatch.setattr(regular_targets, "settle", counted)
     arm, _ = shipped(name)
     task, _ = solver(arm, None)
     screw = shipped(name)[1]

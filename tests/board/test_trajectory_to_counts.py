@@ -14,9 +14,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from armkin.board.firmware import segments, straight_lines
-from armkin.board.firmware.cutting import plan as plan_moves
+from armkin.board.firmware import counts_to_segments, straight_lines
 from armkin.board.firmware.protocol import AxisImage, Image, Segment
+from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.board_kinds import BOARDS
 from armkin.errors import NoSolutionError, UsageError
@@ -25,7 +25,7 @@ from armkin.model.arm import Arm
 from armkin.motion import profile
 from armkin.motors import joints, pulses
 
-CLOCK, MIN_INTERVAL = segments.CLOCK, segments.MIN_INTERVAL
+CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, counts_to_segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
 RAMPS = st.floats(0.03, 3.0)  # [s] to full speed
 
@@ -85,7 +85,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
         assert 1 <= s.ticks <= 65535
         assert abs(s.bend) <= 32767
         assert all(abs(r) < 32768 or r % 256 == 0 or abs(r) == 2**23 - 128 for r in s.rates)
-    assert move.cycles == sum(segments.cycles_of(s) for s in move.segments)
+    assert move.cycles == sum(counts_to_segments.cycles_of(s) for s in move.segments)
     if n == 0:
         assert move.segments == ()
         return
@@ -115,11 +115,14 @@ def off(s: Segment) -> float:
     cycles: less than one a tick. Where `add` makes at most three cycles of difference in all, it is there to make up
     for that: rounding it to 2^-16 cycle moves its thresholds by T^2 / 2^17 ticks, and a cycle or two are left.
     """
-    long = segments.cycles_of(s) > segments._EVEN * CLOCK  # a shorter one's ticks are of one length, in whole cycles
+    long = (
+        counts_to_segments.cycles_of(s) > counts_to_segments._EVEN * CLOCK
+    )  # a shorter one's ticks are of one length, in whole cycles
     rate, even = abs(s.rates[0]), long and abs(s.add) * s.ticks <= 3 << 16
     cycles = min(s.ticks, s.ticks**2 / 2**17 + 2) if even else s.ticks
     return float(
-        s.ticks * 2.0 ** (-24 if rate < 2**15 else -16) + rate / 2**23 * s.ticks * cycles / segments.cycles_of(s)
+        s.ticks * 2.0 ** (-24 if rate < 2**15 else -16)
+        + rate / 2**23 * s.ticks * cycles / counts_to_segments.cycles_of(s)
     )
 
 
@@ -134,7 +137,7 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
     where a ramp's first piece of 1.5 ms makes up for it.
     """
     cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
-    h = np.array([segments.cycles_of(s) / CLOCK for s in cut])
+    h = np.array([counts_to_segments.cycles_of(s) / CLOCK for s in cut])
     mean = np.array([s.ticks * s.rates[0] / 2**23 for s in cut]) / h
     e = np.zeros(len(cut) + 1)
     for k, s in enumerate(cut):  # at the greatest rate, which is 2^-16 short of a step, nothing is made up for
@@ -194,7 +197,7 @@ def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, ac
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
     # once: a long line makes them anew each time
     cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
-    length = [segments.cycles_of(s) / CLOCK for s in cut]
+    length = [counts_to_segments.cycles_of(s) / CLOCK for s in cut]
     for i, s in enumerate(cut[:-30]):
         u = abs(s.rates[0]) / 2**23 * CLOCK / min(s.interval, s.last_interval) / accel
         assert sum(length[i : i + 30]) > u + u / 32 + 0.002 + 0.02
@@ -277,9 +280,9 @@ def test_values_that_are_no_pose_are_refused(three_dof: Arm) -> None:
 
 def test_a_piece_at_rest_has_one_speed() -> None:
     """A wait on a path begins and ends at rest: 0 / 0 once."""
-    assert segments.changing(0.0, 0.0) == 0.0
-    assert segments.changing(0.0, 5.0) == 0.0
-    assert segments.changing(4.0, 5.0) == pytest.approx(2 / 9)
+    assert counts_to_segments.changing(0.0, 0.0) == 0.0
+    assert counts_to_segments.changing(0.0, 5.0) == 0.0
+    assert counts_to_segments.changing(4.0, 5.0) == pytest.approx(2 / 9)
 
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:

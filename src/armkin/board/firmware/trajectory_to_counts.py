@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.board.firmware.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
