@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
@@ -70,7 +71,9 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
                 os.unlink(temporary)
             raise
     except OSError as error:
-        raise FileError(f"{name}: cannot write: {error.strerror or error}", file=name) from None
+        lost = error.errno == errno.ENOENT and os.path.dirname(name)
+        why = f"there is no folder {lost}" if lost else error.strerror or error
+        raise FileError(f"{name}: cannot write: {why}", file=name) from None
 
 
 def _is_stream(there: os.stat_result) -> bool:

@@ -311,7 +311,7 @@ def test_messages_of_workspace_pictures(tmp_path: Path) -> None:
 def test_files_that_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"a picture is written as .png or .svg"):
         plot_poses(THREE_DOF, POSE, str(tmp_path / "arm.jpg"))
-    with pytest.raises(FileError, match="cannot write: No such file or directory"):
+    with pytest.raises(FileError, match="cannot write: there is no folder "):
         plot_poses(THREE_DOF, POSE, str(tmp_path / "no/arm.png"))
 
 

@@ -13,6 +13,7 @@ doubtful.py         targets that may be singular: regular_targets.py decides mos
 fold_singularities.py  postures at which two roots meet, told from self-motions
 clusters.py         what rounding makes of one root of third or fourth order
 self_motions.py     whether joints can move while the target is kept, and what lies on one self-motion
+circuits.py         the connected pieces of a self-motion of three joints or more
 solutions.py        the answer
 choose.py           one branch a target, of an arm with joints held or swept, too; or why none is
 closest.py          the nearest legal pose when there is no branch
