@@ -1,10 +1,12 @@
-"""The homework's tilted circle: both elbows carry it, the mirrored bases too. Which is fastest, and by how much?"""
+"""The homework's tilted circle: both elbows and mirrored bases carry it. Which is fastest? Its argument: a picture."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 
 import armkin
+from armkin.plot.path import plot_path
 
 arm = armkin.load("yaw_two_link")
 # The homework gives no speeds: these are ours.
@@ -18,3 +20,5 @@ for branch in best.branches:
     chosen = "  <- chosen" if branch.name == best.runs[0].names[0][1] else ""
     first = np.round(np.rad2deg(plan.runs[0].start_joints), 2) + 0.0
     print(f"{branch.name:28} {plan.motion.stretches[-1].duration:.3f} s from {first}{chosen}")
+if sys.argv[1:]:
+    plot_path(best, sys.argv[1])

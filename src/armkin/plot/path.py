@@ -36,10 +36,11 @@ def plot_path(plan: PathPlan, out: str) -> None:
         _tool(rows[3], t, position(plan.arm, q))
         for axes in rows[:-1]:
             axes.set_xticklabels([])
-        rows[-1].set_xlabel("time / s", labelpad=2)
+        rows[-1].set_xlabel("time / s", labelpad=2, fontsize=8)
         for axes in rows:
             axes.set_xlim(0.0, max(plan.duration, 1e-9))
             axes.grid(True, linewidth=0.4)
+            axes.tick_params(labelsize=8)
             for when in _breaks(plan):
                 axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
 
@@ -66,19 +67,27 @@ def _breaks(plan: PathPlan) -> list[float]:
 
 
 def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
-    """The tip's way, the arm at its start and end, and where it is nearest to a singularity."""
+    """The tip's way, the arm at its start and end, where it is nearest to a singularity, and on other branches."""
     arm = plan.arm
-    poses = [("start", q[0], "#1f77b4", 4.5), ("end", q[-1], "#2ca02c", 2.0)]
-    if plan.nearest_singularity is not None:
+    poses: list[tuple[str, Array, str, float, Any]] = [
+        ("start", q[0], "#1f77b4", 4.5, "-"),
+        ("end", q[-1], "#2ca02c", 2.0, "-"),
+    ]
+    if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
         s, value, where = plan.nearest_singularity
-        poses.insert(0, (f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}", where, _SINGULAR, 1.6))
-    bones = [(name, skeleton(arm, pose), colour, width) for name, pose, colour, width in poses]
+        label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
+        poses.append((label, where, _SINGULAR, 1.6, (0, (3, 2))))
+    others = _others(plan)
+    many = len(others) != 1
+    label = f"{len(others)} other branch{'es' * many} that {'carry' if many else 'carries'} all, at the path's start"
+    poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(others)), *poses]
+    bones = [(name, skeleton(arm, pose), *look) for name, pose, *look in poses]
     tips = position(arm, q)
-    points = np.concatenate([tips, arm.base[None, :3, 3], *(bone.path for _, bone, _, _ in bones)])
+    points = np.concatenate([tips, arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
     axes = space(figure, (0.0, 0.03, 0.53, 0.78), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
-    for name, bone, colour, width in bones:
-        axes.plot(*bone.path.T, color=colour, linewidth=width, label=name, solid_capstyle="round")
+    for name, bone, colour, width, dashes in bones:
+        axes.plot(*bone.path.T, color=colour, linewidth=width, linestyle=dashes, label=name, solid_capstyle="round")
         axes.plot(*bone.joints.T, color=colour, marker="o", markersize=4, linestyle="none")
     axes.plot(*tips.T, color="#333333", linewidth=1.2, label="tool")
     for one in plan.reconfigurations:
@@ -88,6 +97,12 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         loc="upper left", bbox_to_anchor=(0.03, 0.92), bbox_transform=figure.transFigure, fontsize=8, frameon=False
     )
     true_proportions(axes, points, float(arm.base[2, 3]))
+
+
+def _others(plan: PathPlan) -> list[Array]:
+    """Joint values at the path's start of the branches that would carry it as well."""
+    taken = {run.names[0][1] for run in plan.runs[:1]}
+    return [b.start_joints for b in plan.branches if b.carries >= plan.length - 0.01 and b.name not in taken]
 
 
 def _joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
