@@ -19,7 +19,8 @@ eigenspace has dimension one.
 measures it on random poses, and only roles that give their generating joints back are used.
 (v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
 rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
-roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none.
+roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none, or
+to one whose value of the hidden joint is not theirs.
 Such a pose is solved again, with another offset and other hidden joints, then moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
 longer.  This goes on until a pass shows none of these, or nine are done; all passes' answers count.  A self-motion
@@ -54,6 +55,8 @@ BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunk
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
+OWN = 1e-6  # [rad, scaled length] how far a root may be off the answer that it stands for
+REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
 GUESSES = 8  # postures close to answers that are kept of a pose
 SAMPLES = 11  # random poses on which roles are compared
 # log10 of a role's raw error: nothing better needed, good enough, unfit
@@ -294,6 +297,13 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.
     strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
+    # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
+    # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
+    weakest = np.zeros(goal.shape[0])
+    np.maximum.at(weakest, seed.pose[good], done.weakness[good])
+    away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
+    own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    strayed &= ~own
     unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
@@ -305,6 +315,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     order = np.lexsort((hidden, pose))
     close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
     close &= blurred[order][1:] | blurred[order][:-1]
+    close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
     # Two real roots that led to one answer: one of them stands for another.
     real = answers.take(seed.tilt[good] == 0)

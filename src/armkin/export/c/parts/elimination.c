@@ -1,13 +1,17 @@
+/* A joint value less another, turns the short way round. */
+static double arm_less(double a, double b, int slides)
+{
+    return slides ? a - b : a - b - ARM_TURN * rint((a - b) / ARM_TURN);
+}
+
 /* The largest difference of two postures' joint values, modulo whole turns. */
 static double arm_apart(const double *a, const double *b)
 {
     double most = 0;
     int k;
     for (k = 0; k < 6; k++) {
-        double step = b[k] - a[k];
-        if (!arm_loop_slides[k])
-            step -= ARM_TURN * rint(step / ARM_TURN);
-        most = fabs(step) > most ? fabs(step) : most;
+        const double step = fabs(arm_less(a[k], b[k], arm_loop_slides[k]));
+        most = step > most ? step : most;
     }
     return most;
 }
@@ -18,12 +22,12 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
 {
     const arm_pencil *pencil = &arm_pencils[arm_plan[pass]];
     const double shake = arm_shakes[pass];
-    const int careful = pass > 0;
+    const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden];
     const double pair = 1e-4 + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
     const int size = pencil->size, lead = 12, c = 12 + size, wide = 12 + ARM_MOST, begin = *count;
     double moved[12], back[12], E[12 * (12 + ARM_MOST)], G[12 * (12 + ARM_MOST)], C[ARM_MOST * ARM_MOST];
-    double re[ARM_MOST], im[ARM_MOST], most = 0, hidden[ARM_MOST];
-    unsigned char stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
+    double re[ARM_MOST], im[ARM_MOST], most = 0, weakest = 0, hidden[ARM_MOST];
+    unsigned char own[ARM_MOST], stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
     arm_ends ends;
     int i, j, k, open = 0;
     arm_times(arm_shaking + 12 * pass, goal, moved);
@@ -67,7 +71,7 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
             continue;
         if (!arm_joints_of(pencil, E, back, &ends, re[i], one->q))
             continue;
-        hidden[*count - begin] = one->q[pencil->order[2 + pencil->hidden]];
+        hidden[*count - begin] = one->q[joint];
         arm_refine(goal, careful ? 12 : 4, careful, one);
         good = one->residual < (careful ? 3e-9 : 1e-10);
         if (!good && (tilt < 1e-4 || (careful ? one->residual < 1e-5 && tilt < (pair > 1e-3 ? pair : 1e-3)
@@ -75,24 +79,32 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
             open = 1; /* a complex pair that steps brought near the pose may be a real one, seen through rounding */
         if (good && tilt > 0 && tilt < pair)
             open = 1; /* a move of the pose may turn two close real roots into such a pair */
-        if (good && !(tilt > 0) && one->guess > 1e-3 + 30 * shake)
-            open = 1; /* a real root far from the answer it led to may have stood for another one */
         if ((good && tilt > 0 && tilt < 1e-4) || (one->residual > 1e-10 && one->residual < 3e-6))
             *touching = 1;
         if (!good)
             continue;
+        weakest = one->weakness > weakest ? one->weakness : weakest;
+        own[*count - begin] = fabs(arm_less(one->q[joint], hidden[*count - begin], arm_loop_slides[joint])) < 1e-6;
         stands[*count - begin] = tilt < pair; /* of others damped steps bring many to an answer that has its own root */
         blurred[*count - begin] = one->guess > 1e-5 + 10 * shake;
         real[*count - begin] = !(tilt > 0);
         arm_sortable(one);
         ++*count;
     }
+    /* A real root far from the answer it led to may have stood for another one. It has not if it has the answer's value of
+       the hidden joint: around a value there are no more solutions than roots, and no two roots may have led to one answer.
+       Near singularities roots are too far off to say so. */
+    for (j = begin; j < *count; j++) {
+        own[j - begin] &= !(shake > 0) && weakest < 1e3;
+        if (real[j - begin] && found[j].guess > 1e-3 + 30 * shake && !own[j - begin])
+            open = 1;
+    }
     /* Two roots that share the hidden joint: good if both were near an answer at once, and, of real ones, if these are not
        the same. */
     for (j = begin; j < *count; j++)
         for (k = begin; k < j; k++) {
             const int one = j - begin, other = k - begin;
-            if (stands[one] && stands[other] && (blurred[one] || blurred[other])
+            if (stands[one] && stands[other] && (blurred[one] || blurred[other]) && !(own[one] && own[other])
                 && fabs(hidden[one] - hidden[other]) < 1e-4)
                 open = 1;
             if (real[one] && real[other] && fabs(found[j].key - found[k].key) < 1e-5
@@ -121,9 +133,7 @@ static int arm_merge(const double *goal, arm_answer *found, int count, int *merg
             if (gone[i] || gone[j] || found[j].key - found[i].key > 0.1)
                 continue;
             for (k = 0; k < 6; k++) {
-                step[k] = found[j].q[k] - found[i].q[k];
-                if (!arm_loop_slides[k])
-                    step[k] -= ARM_TURN * rint(step[k] / ARM_TURN);
+                step[k] = arm_less(found[j].q[k], found[i].q[k], arm_loop_slides[k]);
                 half[k] = found[i].q[k] + step[k] / 2;
                 distance = fabs(step[k]) > distance ? fabs(step[k]) : distance;
             }
