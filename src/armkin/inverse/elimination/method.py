@@ -167,13 +167,12 @@ def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
 def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
     pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    first, spurious = _raw_error(pencil, closed, q[:3], goal[:3])
-    if np.median(first) > 1e-2:  # a role that the arm makes singular loses every pose: no need to try more
+    nearest, spurious = _raw_error(pencil, closed, q, goal)
+    if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, pencil)
-    rest, more = _raw_error(pencil, closed, q[3:], goal[3:])
-    error = float(np.quantile(np.log10(np.concatenate([first, rest]) + 1e-16), 0.9))
+    error = float(np.quantile(np.log10(nearest + 1e-16), 0.9))
     # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
-    cost = 0.15 * pencil.size + 4 * float(np.mean([*spurious, *more])) - 0.5 * (role.slot == 1)
+    cost = 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
     return _Rating(max(error, -11.0) + cost, error, pencil)
 
 
