@@ -56,6 +56,35 @@ class Columns:
         parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within[rows])
         return Columns(*parts, self.names, self.complete)
 
+    def wider(self, B: int) -> Columns:
+        """The same with B columns of branches at least."""
+        return Columns(
+            self.s,
+            _widened(self.q, B),
+            _widened(self.name, B, -1),
+            self.status,
+            _widened(self.within, B, 0),
+            self.names,
+            self.complete,
+            _widened(self.partner, B, -1),
+        )
+
+    def inserted(self, at: Int, new: Columns) -> Columns:
+        """These samples with others before the rows `at`; the links of both stay, as far as they have any."""
+        B = max(self.q.shape[1], new.q.shape[1])
+        old, new = self.wider(B), new.wider(B)
+        links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
+        return Columns(
+            np.insert(old.s, at, new.s),
+            np.insert(old.q, at, new.q, axis=0),
+            np.insert(old.name, at, new.name, axis=0),
+            np.insert(old.status, at, new.status),
+            np.insert(old.within, at, new.within, axis=0),
+            old.names,
+            old.complete and new.complete,
+            np.insert(old.partner, at, links, axis=0),
+        )
+
 
 def levers(arm: Arm) -> Array:
     """Bounds of the second derivatives of the tip's position by two joints: (n, n) [mm/rad^2, ...]."""
@@ -178,26 +207,17 @@ class _Linking:
 
     def _put(self, part: _Linking, steps: Int, group: Int) -> None:
         """Take over what was added to the steps, and their links."""
-        c, p = self.columns, part.columns
-        B = max(c.q.shape[1], p.q.shape[1])
-        q, name, partner = _widened(c.q, B), _widened(c.name, B, -1), _widened(c.partner, B, -1)
-        new = part.fresh
+        B = max(self.columns.q.shape[1], part.columns.q.shape[1])
+        c, p, new = self.columns.wider(B), part.columns.wider(B), part.fresh
         at = np.repeat(steps + 1, np.bincount(group[new], minlength=len(steps)))
-        links = np.append(_widened(p.partner, B, -1), np.full((1, B), -1, np.int16), axis=0)
+        links = np.append(p.partner, np.full((1, B), -1, np.int16), axis=0)
         # the left end of each step is the second sample of its group
         second = np.flatnonzero(~new)[1::3]
-        partner = partner.copy()
-        partner[steps] = links[second]
-        self.columns = Columns(
-            np.insert(c.s, at, p.s[new]),
-            np.insert(q, at, _widened(p.q, B)[new], axis=0),
-            np.insert(name, at, _widened(p.name, B, -1)[new], axis=0),
-            np.insert(c.status, at, p.status[new]),
-            np.insert(_widened(c.within, B, 0), at, _widened(p.within, B, 0)[new], axis=0),
-            c.names,
-            c.complete and p.complete,
-            np.insert(partner, at, links[new], axis=0),
-        )
+        c.partner = c.partner.copy()
+        c.partner[steps] = links[second]
+        added = p.rows(np.flatnonzero(new))
+        added.partner = links[new]
+        self.columns = c.inserted(at, added)
 
     def divide(self) -> bool:
         """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done.
@@ -223,18 +243,7 @@ class _Linking:
         self.where = where = np.repeat(todo + 1, parts - 1)
         self.fresh = np.insert(self.fresh, where, True)
         self.added += len(new)
-        B = max(c.q.shape[1], found.q.shape[1])
-        q, name = _widened(c.q, B), _widened(c.name, B, -1)
-        self.columns = Columns(
-            np.insert(c.s, where, new),
-            np.insert(q, where, _widened(found.q, B), axis=0),
-            np.insert(name, where, _widened(found.name, B, -1), axis=0),
-            np.insert(c.status, where, found.status),
-            np.insert(_widened(c.within, B, 0), where, _widened(found.within, B, 0), axis=0),
-            c.names,
-            c.complete and found.complete,
-            np.insert(_widened(c.partner, B, -1), where, -1, axis=0),
-        )
+        self.columns = c.inserted(where, found)
         fresh = np.zeros(len(c.s) - 1, bool)
         fresh[todo] = True
         self.open = np.insert(fresh, where, True)
@@ -250,12 +259,13 @@ class _Linking:
         if len(parts) == 1:
             return parts[0]
         B = max(part.q.shape[1] for part in parts)
+        wide = [part.wider(B) for part in parts]
         return Columns(
             s,
-            np.concatenate([_widened(part.q, B) for part in parts]),
-            np.concatenate([_widened(part.name, B, -1) for part in parts]),
-            np.concatenate([part.status for part in parts]),
-            np.concatenate([_widened(part.within, B, 0) for part in parts]),
+            np.concatenate([part.q for part in wide]),
+            np.concatenate([part.name for part in wide]),
+            np.concatenate([part.status for part in wide]),
+            np.concatenate([part.within for part in wide]),
             max((part.names for part in parts), key=len),
             all(part.complete for part in parts),
         )
