@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -64,6 +65,17 @@ Assume = Annotated[
 BAUD = 250_000
 SIM = "sim"
 AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
+
+
+@dataclass(frozen=True)
+class Link:
+    """The options of a command that say how it reaches its board, and what it takes for granted there."""
+
+    port: str | None
+    baud: int | None
+    assume: str | None
+    resume: bool
+    reset: bool
 
 
 @contextmanager

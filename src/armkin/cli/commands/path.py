@@ -9,7 +9,7 @@ import typer
 from armkin import files
 from armkin.cli import board_link, inputs, lock_and_sweep, output, render
 from armkin.cli.batch import csv_line
-from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
+from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
 from armkin.errors import NoSolutionError, UsageError
@@ -91,13 +91,12 @@ def path(
     import armkin
 
     arm = inputs.load(robot)
-    held = {
+    locked = {
         name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
         for name, value in lock_and_sweep.locks(arm, lock).items()
     }
-    moves = _moves(armkin.lock(arm, held) if held else arm, file, via, task)
+    moves = _moves(armkin.lock(arm, locked) if locked else arm, file, via, task)
     options: dict[str, Any] = {
-        "held": held,
         "branch": branch,
         "task": task,
         "tolerance": _positive(tolerance, "--tolerance", 1e-6),
@@ -117,29 +116,24 @@ def path(
     if port is None or dry_run:
         if start is not None:
             options["start"] = board_link.standing(arm, start, "--start")
-        plan = _planned(arm, moves, options, json=json)
+        plan = _planned(arm, moves, locked, options, json=json)
         found = _found(plan, _rehearsed(plan, rehearsal=dry_run))
         _files(plan, out, plot)
         _print(plan, found, json=json, out=out)
         return
-    _carried_out(
-        arm, moves, options, port, baud, out, plot, assume=assume, reset=not no_reset, json=json, resume=resume
-    )
+    link = board_link.Link(port, baud, assume, resume, reset=not no_reset)
+    _carried_out(arm, moves, locked, options, link, out, plot, json=json)
 
 
 def sent(
     robot: str | None,
     file: str,
-    port: str | None,
+    link: Link,
     speed: str,
-    dry_run: bool,
     start: str | None,
     trace: str | None,
-    baud: int | None,
     *,
-    assume: str | None,
-    reset: bool,
-    resume: bool,
+    dry_run: bool,
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
@@ -149,11 +143,11 @@ def sent(
     moves = _moves(arm, file, None, None)
     options: dict[str, Any] = {"speed": inputs.percent(speed, "--speed")}
     if not dry_run:
-        _carried_out(arm, moves, options, port, baud, trace, None, assume=assume, reset=reset, json=json, resume=resume)
+        _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
     if start is not None:
         options["start"] = board_link.standing(arm, start, "--from")
-    plan = _planned(arm, moves, options, json=json)
+    plan = _planned(arm, moves, {}, options, json=json)
     found = {**_found(plan, _rehearsed(plan)), "dry_run": True}
     _files(plan, trace, None)
     _print(plan, found, json=json, out=trace)
@@ -162,16 +156,13 @@ def sent(
 def _carried_out(
     arm: Arm,
     moves: Any,
+    locked: dict[str, float],
     options: dict[str, Any],
-    port: str | None,
-    baud: int | None,
+    link: Link,
     out: str | None,
     plot: str | None,
     *,
-    assume: str | None,
-    reset: bool,
     json: bool,
-    resume: bool = False,
 ) -> None:
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
     from armkin.board import path_run, resuming
@@ -179,13 +170,14 @@ def _carried_out(
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
-    board, stands = board_link.board_of(arm, rehearsal=port == SIM), board_link.assumed(arm, assume)
-    with board_link.backend(arm, board, port, baud, simulated=board_link.simulated(assume), reset=reset) as machine:
-        board_link.prepare(arm, machine, assume, stands)
-        held = board_link.held(machine, resume)
+    board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed(arm, link.assume)
+    simulated = board_link.simulated(link.assume)
+    with board_link.backend(arm, board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
+        board_link.prepare(arm, machine, link.assume, stands)
+        held = board_link.held(machine, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
-            plan = _planned(arm, moves, {**options, "start": joints_of(arm, began)}, json=json)
+            plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
             laid = path_run.parts(plan, began, machine.lay)
             _files(plan, out, plot)
@@ -232,16 +224,15 @@ def _positive(text: str | None, option: str, least: float) -> float | None:
     return value
 
 
-def _planned(arm: Arm, moves: Any, options: dict[str, Any], *, json: bool) -> PathPlan:
+def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, Any], *, json: bool) -> PathPlan:
     """The plan; of a path that is not carried, what is known of it is printed first."""
     import armkin
 
-    held = options.pop("held", None)
     try:
-        if held:
+        if locked:
             from armkin.motion.held import path_held
 
-            return path_held(arm, moves, held, **options)
+            return path_held(arm, moves, locked, **options)
         return armkin.path(arm, moves, **options)
     except NoSolutionError as error:
         plan: PathPlan | None = getattr(error, "plan", None)

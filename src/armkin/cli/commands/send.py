@@ -121,8 +121,8 @@ def send(
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        how: dict[str, Any] = {"assume": assume, "reset": not no_reset, "resume": resume, "json": json}
-        sent(robot, path, port, speed, dry_run, start, trace, baud, **how)
+        link = board_link.Link(port, baud, assume, resume, reset=not no_reset)
+        sent(robot, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
