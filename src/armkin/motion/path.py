@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.errors import NoSolutionError, UsageError
+from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.branches.names import find
@@ -103,36 +103,34 @@ def path(
         tolerance or file.tolerance or TOLERANCE,
     )
     here = arm.home if start is None else np.asarray(start, dtype=float)
-    walk = _Walk(arm, file, pace, task, blend, here, None if near is None else np.asarray(near, dtype=float))
-    walk.branch, walk.split, walk.samples = branch, split, samples
-    return walk.walked()
+    near = None if near is None else np.asarray(near, dtype=float)
+    return _Walk(arm, file, pace, here, _Wishes(task, blend, near, branch, split, samples)).walked()
+
+
+@dataclass(frozen=True)
+class _Wishes:
+    """What `path` was asked for beside the moves and their pace."""
+
+    task: str | None
+    blend: float | None
+    near: Array | None
+    branch: str | None
+    split: bool
+    samples: int | None
 
 
 class _Walk:
     """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
 
-    split = False
-    branch: str | None = None
-    samples: int | None = None
     _spot: Spot | None = None
     at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
-    def __init__(
-        self,
-        arm: Arm,
-        file: PathFile,
-        pace: Pace,
-        task: str | None,
-        blend: float | None,
-        here: Array,
-        near: Array | None,
-    ) -> None:
-        self.arm, self.file, self.pace = arm, file, pace
-        with _told(file, "task"):
-            self.plan = PathPlan(arm, _task(arm, file, task or file.task), pace.tolerance)
-        self.blend = file.blend if blend is None else blend
+    def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, wishes: _Wishes) -> None:
+        self.arm, self.file, self.pace, self.wishes = arm, file, pace, wishes
+        with _of_key(file, "task"):
+            self.plan = PathPlan(arm, _task(arm, file, wishes.task or file.task), pace.tolerance)
+        self.blend = file.blend if wishes.blend is None else wishes.blend
         self.q = here  # where the joints are when all so far is done
-        self.near = near
         self.made: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
         self._clear(None)
@@ -159,7 +157,7 @@ class _Walk:
 
     def walked(self) -> PathPlan:
         """The plan of all moves."""
-        with _told(self.file, "start"):
+        with _of_key(self.file, "start"):
             start = self._start()
         if start is not None:
             self.q = start
@@ -167,9 +165,9 @@ class _Walk:
         self.begun = self.q
         for number, move in enumerate(self.file.moves):
             self.at = number, number
-            with _told(self.file, self):
+            with _of_moves(self):
                 getattr(self, f"_{move.kind}")(move, getattr(move, move.kind))
-        with _told(self.file, self):
+        with _of_moves(self):
             self._close()
         return self.plan.finished(self.begun, self.made, self.markers)
 
@@ -283,7 +281,7 @@ class _Walk:
         if route.length < geometry.SMALL:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
-        near = self.q if self.near is None else self.near
+        near = self.q if self.wishes.near is None else self.wishes.near
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
             if run.first == run.last:
@@ -302,13 +300,13 @@ class _Walk:
 
     def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
         """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
-        branch = (self.goal_branch or self.branch) if free else None
+        branch = (self.goal_branch or self.wishes.branch) if free else None
         carried = carry(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
-            fixed=None if free else self.q, branch=branch, count=self.samples,
+            fixed=None if free else self.q, branch=branch, count=self.wishes.samples,
         )  # fmt: skip
         branch_report.note(self.plan, carried, near)
-        if not carried.whole and not (self.split and carried.covered):
+        if not carried.whole and not (self.wishes.split and carried.covered):
             raise branch_report.refused(self.plan, carried, branch)
         return carried.columns.s, carried.runs
 
@@ -341,7 +339,7 @@ class _Walk:
     def _reached(self, goal: Spot, branch: str | None) -> Array:
         """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
         found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
-        meant = find(found.names, wanted) if (wanted := branch or self.branch) else None
+        meant = find(found.names, wanted) if (wanted := branch or self.wishes.branch) else None
         for b in found.order:
             named = meant is None or found.branch[b] in meant
             if found.valid[b] and found.within_limits[b] and named:
@@ -364,18 +362,30 @@ def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
 
 
 @contextmanager
-def _told(file: PathFile, about: str | _Walk) -> Iterator[None]:
-    """Errors inside are said of a key of the file, or of the moves that a walk does now."""
+def _of_key(file: PathFile, key: str) -> Iterator[None]:
+    """Errors inside are said of a key of the file, if it has that."""
     try:
         yield
     except (UsageError, NoSolutionError) as error:
-        if isinstance(about, str):
-            place, fields = file.place(about) if getattr(file, about) is not None else "", {}
-        else:
-            place, fields = file.place_of(*about.at), {"move": about.at[0] + 1}
-        if not place:
+        if getattr(file, key) is None or not (place := file.place(key)):
             raise
-        told = error.within(place, **fields)
-        if (plan := getattr(error, "plan", None)) is not None:
-            told.plan = plan  # type: ignore[union-attr]
-        raise told from None
+        raise _at(place, error) from None
+
+
+@contextmanager
+def _of_moves(walk: _Walk) -> Iterator[None]:
+    """Errors inside are said of the moves that a walk does then."""
+    try:
+        yield
+    except (UsageError, NoSolutionError) as error:
+        if not (place := walk.file.place_of(*walk.at)):
+            raise
+        raise _at(place, error, move=walk.at[0] + 1) from None
+
+
+def _at(place: str, error: ArmkinError, **fields: int) -> ArmkinError:
+    """The error said of a place, with its plan, if it has one."""
+    told = error.within(place, **fields)
+    if (plan := getattr(error, "plan", None)) is not None:
+        told.plan = plan  # type: ignore[attr-defined]
+    return told
