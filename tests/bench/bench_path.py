@@ -31,6 +31,7 @@ from armkin.motion.branch_chains import Chain, chains, fewest
 from armkin.motion.curve import Curve
 from armkin.motion.geometry import spot
 from armkin.motion.linked_branches import linked
+from armkin.motion.path_plan import PathPlan
 from armkin.motion.profile import seven_phases
 from armkin.motion.time_optimal import Bounds, Knots, finer, optimal
 
@@ -44,6 +45,14 @@ def moving(name: str) -> armkin.Arm:
     unit = np.where(arm.prismatic, 5.0, np.pi / 180)
     speed = np.where(np.isnan(arm.max_speed), 90 * unit, arm.max_speed)
     return replace(arm, max_speed=speed, max_accel=np.where(np.isnan(arm.max_accel), 3 * speed, arm.max_accel))
+
+
+def planned_along(arm: armkin.Arm, ends: np.ndarray) -> PathPlan | None:
+    """The plan of a line; None: no branch carries it."""
+    try:
+        return armkin.path(arm, ends, hold=None)
+    except armkin.NoSolutionError:
+        return None
 
 
 def branches(lines: int) -> None:
@@ -114,9 +123,8 @@ def tips(lines: int) -> None:
             off = tips_off(arm, all_)
             worst, beyond = max(worst, off), beyond + (off > 0.05)
             ends = way.targets(np.array([0.0, way.length]))
-            try:
-                plan = armkin.path(arm, ends, hold=None)
-            except armkin.NoSolutionError:
+            plan = planned_along(arm, ends)
+            if plan is None:
                 continue
             planned += 1
             curve = plan.motion.stretches[-1]
@@ -145,9 +153,8 @@ def chosen(lines: int) -> None:
         for _ in range(lines):
             way = random_line(arm, rng)
             ends = way.targets(np.array([0.0, way.length]))
-            try:
-                plan = armkin.path(arm, ends, hold=None)
-            except armkin.NoSolutionError:
+            plan = planned_along(arm, ends)
+            if plan is None:
                 continue
             planned += 1
             times = []
