@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -114,7 +115,9 @@ def test_a_file_with_one_row_outside_moves_nothing(tmp_path: Path) -> None:
 def test_streamed_waypoints_stand_up_to_the_first_wrong_one(last: bytes, code: int, message: str) -> None:
     done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=b"10,80,-80\n-30,5,-5\n" + last)
     assert done.code == code, done.err
-    assert done.json["pulses"] == COUNTS
+    told = json.loads(done.err)["sent"] if code == 2 else done.json
+    assert told["pulses"] == COUNTS
+    assert (done.out == "") == (code == 2)
     assert message in done.err
 
 

@@ -14,7 +14,7 @@ from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.cli.send_goals import goals as read_goals
-from armkin.errors import UsageError
+from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -159,9 +159,10 @@ def send(
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     problem = goals.problem if isinstance(goals, Stream) else None
     answer = {**render.head(arm), **found}
-    if problem is not None and planned["waypoints"] and json:
-        problem.fields["sent"] = answer
-    if problem is not None and (json or not planned["waypoints"]):
+    if problem is not None and not planned["waypoints"]:
+        raise problem  # nothing has moved: there is nothing to tell
+    if problem is not None and json and not isinstance(problem, NoSolutionError):
+        problem.fields["sent"] = answer  # of exit codes, 0 and 3 alone have something on stdout
         raise problem
     with output.beside(trace) as write:
         write(render.to_json(answer) + "\n" if json else _arrived(arm, planned, found))
