@@ -118,6 +118,28 @@ def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:
     assert armkin.ik(arm, goal(task, screw, q).array(), "pose").valid.sum() == 2
 
 
+@pytest.mark.parametrize(
+    "q",
+    [
+        [
+            -1.81528044303384,
+            -0.578513013433144,
+            1.28802382226464,
+            -3.14159265459377,
+            -1.16754010958679,
+            -2.58009190677196,
+        ],
+        [1.79985719326818, 0.597891726666232, 1.26397661739479, -3.14159264632712, 1.90889802799518, 1.71036861976579],
+    ],
+)
+def test_roots_of_third_order_on_a_self_motion_are_no_branches(q: list[float]) -> None:
+    """Postures 1e-3 rad beside it solve the target to 1e-9, and so does what lies between them and the self-motion."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(168)), "pose")
+    task, _ = solver(arm, "pose")
+    verdict = truth.judge(arm, screw, "pose", np.array([q]), goal(task, screw, np.array([q])).array())
+    assert verdict, verdict
+
+
 @pytest.mark.parametrize("twist", [90.0, -90.0])
 def test_a_quartic_that_says_nothing_leaves_its_joint_free(twist: float) -> None:
     """Joint 3 in one line with joint 1: any value will do."""

@@ -18,13 +18,14 @@ from armkin.inverse import fold_singularities
 from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import BESIDE, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import BESIDE, HAIR, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
 GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
 NO_GROWTH = 1e-12  # residual that stays as it is
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
@@ -45,16 +46,34 @@ def drop_contained(arm: Arm, task: Task, q: Array, sigma: Array, chosen: Bool, c
     for k in np.flatnonzero(curve.any(axis=(1, 2))):
         mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
         few = curve[k, mine].sum(axis=1) <= arm.n // 2
-        for i in np.flatnonzero(chosen[k] & (sigma[k] < WEAK) & ~curve[k].any(axis=1)):
+        for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            beside = (away < 10 * TURNED) & few
-            on = (j for j in mine[(away < TURNED) & ~few] if _leads_to(arm, task, q[k, j], q[k, i], target[k]))
-            chosen[k, i] = i == 0 or not (beside.any() or any(True for _ in on))
+            beside = mine[(away < HAIR) & few]
+            one = _grows_from(arm, task, q[k, i], q[k, beside], curve[k, beside], target[k])
+            if sigma[k, i] < WEAK:
+                one |= bool((away[few] < 10 * TURNED).any())
+                on = (j for j in mine[(away < TURNED) & ~few] if _leads_to(arm, task, q[k, j], q[k, i], target[k]))
+                one |= any(True for _ in on)
+            chosen[k, i] = i == 0 or not one
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
             if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
                 chosen[k, i] = False
+
+
+def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, target: Array) -> bool:
+    """Whether q (n,) is one with a posture of a self-motion: with the one that has its values of the joints that move.
+
+    others: (J, n) postures of self-motions, curve: (J, n) the joints that these move. Two are one if the posture
+    between them solves the target, too.
+    """
+    unit, goal = np.where(arm.prismatic, arm.reach, 1.0), np.repeat(target[None], len(others), axis=0)
+    start = q + np.where(curve, 0.0, newton.difference(arm, others, q)) * unit
+    there, size = newton.correct(arm, task, start, goal, steps=6, least=WEAK)
+    way = newton.difference(arm, there, q)
+    between = newton.missing(arm, task, q + 0.5 * way * unit, goal)
+    return bool(((size <= SOLUTION) & (between <= SOLUTION) & (np.abs(way).max(axis=1) < HAIR)).any())
 
 
 def _leads_to(arm: Arm, task: Task, q: Array, corner: Array, target: Array) -> bool:
