@@ -11,6 +11,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.inverse import regular_targets
+from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.recognise import solver
 from armkin.model.arm import Arm
@@ -38,11 +39,11 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
     arm, at_once = nearly_singular(name, least, most)
     decided = []
 
-    def nothing(arm: Arm, task: object, q: np.ndarray, *rest: object) -> regular_targets.Regular:
+    def nothing(goals: Goals, q: np.ndarray, valid: np.ndarray) -> regular_targets.Regular:
         decided.append(len(q))
         none = np.zeros(len(q), bool)
         return regular_targets.Regular(
-            none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), arm.n), bool), q, none
+            none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), q.shape[2]), bool), q, none
         )
 
     monkeypatch.setattr(regular_targets, "settle", nothing)

@@ -19,8 +19,9 @@ import armkin
 from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse import singularities
+from armkin.inverse.batch import Goals
 from armkin.inverse.recognise import solver
-from armkin.model.arm import Arm, from_links
+from armkin.model.arm import from_links
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -189,9 +190,9 @@ def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) ->
     asked: list[int] = []
     examine = singularities.examine
 
-    def counted(arm: Arm, task: object, q: np.ndarray, *rest: object) -> object:
+    def counted(goals: Goals, q: np.ndarray, *rest: object) -> object:
         asked.append(len(q))
-        return examine(arm, task, q, *rest)  # type: ignore[arg-type]
+        return examine(goals, q, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(singularities, "examine", counted)
     arm = shipped("puma560")[0]

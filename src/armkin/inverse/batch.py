@@ -11,7 +11,20 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.branches.turns import nearest_row
 
 if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
+
+
+class Goals(NamedTuple):
+    """What is asked of a solver: targets (N, m) or (N, 4, 4) of a task, and the postures to stay close to (N, n)."""
+
+    arm: Arm
+    task: Task
+    target: Array
+    near: Array
+
+    def of(self, rows: NDArray[np.intp]) -> Goals:
+        return Goals(self.arm, self.task, self.target[rows], self.near[rows])
 
 
 class Batch(NamedTuple):

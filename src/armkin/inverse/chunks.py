@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import StraightLineCode
-from armkin.inverse.batch import Batch, empty, pack
+from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.turns import beyond_near, nearest_copy, on_limit
 from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.doubtful import decided
+from armkin.inverse.doubtful import Doubts, decided
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task, read_poses
@@ -35,15 +35,6 @@ class Solved(NamedTuple):
     columns: int
     target: Array
     rounding: Array
-
-
-class _Doubts(NamedTuple):
-    """Targets of a chunk on an edge: rows (K,), candidates (K, B, n), which were accepted, and free joints (K,)."""
-
-    rows: NDArray[np.intp]
-    q: Array
-    valid: Bool
-    free: Bool
 
 
 def solve(
@@ -70,10 +61,10 @@ def solve(
     size = SHARED if threads else arrays.CHUNK
     limited = bool(on_limit(arm, near if one is None else one).any())
 
-    def part(rows: slice) -> list[_Doubts]:
+    def part(rows: slice) -> list[Doubts]:
         """Some rows, by a thread of its own."""
         workspace: list[NDArray[Any]] = []
-        doubts: list[_Doubts] = []
+        doubts: list[Doubts] = []
         for start in range(rows.start, rows.stop, size):
             some = slice(start, min(start + size, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
@@ -87,7 +78,8 @@ def solve(
     parts = shared(part, N, workers if threads else 1, size, size)
     doubts = [doubt for one_part in parts for doubt in one_part]
     if doubts and examine:
-        out = decided(arm, task, runner, out, target, near, *map(np.concatenate, zip(*doubts, strict=True)))
+        together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
+        out = decided(Goals(arm, task, target, near), runner, out, together)
     return Solved(out, math.prod(runner.axes), target, rounding)
 
 
@@ -120,7 +112,7 @@ def _candidates(
 
 def _keep(
     arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], start: int, near: Array, limited: bool
-) -> list[_Doubts]:
+) -> list[Doubts]:
     """Write a chunk's branches, which begins at row `start`; returns the targets on an edge; limited: `on_limit`."""
     *values, miss, doubt, free = found
     N = len(part.q)
@@ -144,7 +136,7 @@ def _keep(
     loose |= np.greater(free[..., doubtful] if np.shape(free)[-1:] == (N,) else free, 0)  # constants are numbers
     q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
     free_somewhere = np.asarray(loose.reshape(B, -1).any(axis=0))
-    return [_Doubts(start + doubtful, q, valid[:, doubtful].T, free_somewhere)]
+    return [Doubts(start + doubtful, q, valid[:, doubtful].T, free_somewhere)]
 
 
 def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:

@@ -3,48 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import regular_targets, singularities
-from armkin.inverse.batch import Batch, named, wider, write
+from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
 from armkin.inverse.numeric.tolerances import SAME
 from armkin.inverse.solutions import Status
-from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 AT_ONCE = 256  # targets examined together
 
 
-def decided(
-    arm: Arm,
-    task: Task,
-    runner: Recorded,
-    out: Batch,
-    target: Array,
-    near: Array,
-    doubtful: NDArray[np.intp],
-    q: Array,
-    valid: Bool,
-    free: Bool,
-) -> Batch:
-    """Decide what doubtful targets (K,) are: those that are regular all at once, the others posture by posture.
+class Doubts(NamedTuple):
+    """Targets on an edge: rows (K,), candidates q (K, B, n), valid (K, B) accepted ones, free (K,) a joint is free."""
 
-    q: (K, B, n) their candidates, valid: (K, B), free: (K,) a joint is free, so that the candidates are not all.
+    rows: NDArray[np.intp]
+    q: Array
+    valid: Bool
+    free: Bool
+
+
+def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch:
+    """Decide what doubtful targets are: those that are regular all at once, the others posture by posture.
+
+    Where a joint is free, the candidates are not all.
     """
+    arm, task, target, near = goals
+    doubtful, q, valid, free = doubts
     left = free.copy()
     for start in range(0, len(doubtful), AT_ONCE):
         part = start + np.flatnonzero(~free[start : start + AT_ONCE])
         rows = doubtful[part]
         if not len(part):
             continue
-        found = regular_targets.settle(arm, task, q[part], valid[part], target[rows], near[rows])
+        found = regular_targets.settle(goals.of(rows), q[part], valid[part])
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
         new = np.flatnonzero(found.known & (found.double | found.changed | moving))
@@ -76,15 +72,12 @@ def decided(
         return np.concatenate([first, other], axis=1), np.concatenate([loose, np.zeros_like(loose)], axis=1)
 
     open_ = np.flatnonzero(left)
-    return examined(arm, task, out, target, near, doubtful[open_], candidates, runner.others)
+    return examined(goals, out, doubtful[open_], candidates, runner.others)
 
 
 def examined(
-    arm: Arm,
-    task: Task,
+    goals: Goals,
     out: Batch,
-    target: Array,
-    near: Array,
     doubtful: NDArray[np.intp],
     candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
     others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64]]],
@@ -98,24 +91,20 @@ def examined(
     """
     for start in range(0, len(doubtful), AT_ONCE):
         rows = doubtful[start : start + AT_ONCE]
-        goal, close, columns = target[rows], near[rows], out.q.shape[1]
+        some, columns = goals.of(rows), out.q.shape[1]
         q, loose = candidates(np.arange(start, start + len(rows)))
 
         incomplete = np.zeros(len(rows), bool) if unsettled is None else unsettled[rows] & ~out.complete[rows]
 
-        def more(
-            some: NDArray[np.int64], lost: Bool, goal: Array = goal, close: Array = close, incomplete: Bool = incomplete
-        ) -> Any:
-            return others(goal[some], close[some], lost | incomplete[some])
+        def more(which: NDArray[np.int64], lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
+            return others(some.target[which], some.near[which], lost | incomplete[which])
 
-        seen = singularities.examine(
-            arm, task, q, np.arange(q.shape[1]) % max(columns, 1), loose, goal, close, more,
-            None if unsettled is None else unsettled[rows],
-        )  # fmt: skip
+        label = np.arange(q.shape[1]) % max(columns, 1)
+        seen = singularities.examine(some, q, label, loose, more, None if unsettled is None else unsettled[rows])
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)
-        write(arm, out, rows, seen.q, seen.valid, named(seen.label, seen.valid), close)
+        write(goals.arm, out, rows, seen.q, seen.valid, named(seen.label, seen.valid), some.near)
         out.status[rows], out.free[rows] = seen.status, seen.free
         out.complete[rows] &= ~seen.again
     return out

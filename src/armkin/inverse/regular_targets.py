@@ -13,6 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import fold_singularities, self_motions
+from armkin.inverse.batch import Goals
 from armkin.inverse.fold_singularities import BENT, CLEAR, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
@@ -61,8 +62,9 @@ class _Weak(NamedTuple):
     joints: Bool
 
 
-def settle(arm: Arm, task: Task, q: Array, valid: Bool, target: Array, near: Array) -> Regular:
-    """Candidates (K, B, n), of which valid ones (K, B) were accepted; target: (K, m) or (K, 4, 4); near: (K, n)."""
+def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
+    """Candidates (K, B, n) of K targets, of which valid ones (K, B) were accepted."""
+    arm, task, target, near = goals
     K, B, n = q.shape
     both = np.concatenate([near[:, None], q], axis=1).reshape(-1, n)
     r, J = newton.scaled(arm, task, both, np.repeat(target, B + 1, axis=0))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import circuits, clusters, fold_singularities, self_motions
+from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
@@ -71,31 +72,20 @@ class _Settled(NamedTuple):
     open: Bool
 
 
-def examine(
-    arm: Arm,
-    task: Task,
-    q: Array,
-    label: Int,
-    loose: Bool,
-    target: Array,
-    near: Array,
-    more: More,
-    unsettled: Bool | None = None,
-) -> Examined:
+def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettled: Bool | None = None) -> Examined:
     """Correct, group and classify candidate branches of doubtful targets.
 
-    q: (K, B, n), nan where there is none; label: (B,); loose: (K, B) candidates that depend on a value preferred
-    for a free joint; target: (K, m) or (K, 4, 4); near: (K, n), a branch itself
-    where it solves the target; more: other candidates, for targets that seem to have no branch, for those of which
-    the preferred value leaves the other joints no solution, and for self-motions that may meet others; unsettled:
-    (K,) targets whose candidates may not be all, of a solver that loses singular ones: more are asked for these and
-    for what is singular.
+    goals: K targets; `near` is a branch itself where it solves its target. q: (K, B, n), nan where there is none;
+    label: (B,); loose: (K, B) candidates that depend on a value preferred for a free joint; more: others, for
+    targets that seem to have no branch, for those of which the preferred value leaves the other joints no solution,
+    and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
+    that loses singular ones: more are asked for these and for what is singular.
     """
-    found = _settle(arm, task, q, np.broadcast_to(label, q.shape[:2]), loose, target, near, SEED)
+    found = _settle(goals, q, np.broadcast_to(label, q.shape[:2]), loose, SEED)
     again = found.open | ~found.valid.any(axis=1)
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
-        first, last = found.free.argmax(axis=1), arm.n - 1 - found.free[:, ::-1].argmax(axis=1)
+        first, last = found.free.argmax(axis=1), goals.arm.n - 1 - found.free[:, ::-1].argmax(axis=1)
         wider = again | found.free.any(axis=1) & (last - first > 2)
     else:
         wider = again | unsettled | (found.status != Status.EXACT)
@@ -110,7 +100,7 @@ def examine(
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     seeds = np.concatenate([found.q[rows], others], axis=1)
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
-    second = _settle(arm, task, seeds, whose, np.zeros(seeds.shape[:2], bool), target[rows], near[rows], HOPELESS)
+    second = _settle(goals.of(rows), seeds, whose, np.zeros(seeds.shape[:2], bool), HOPELESS)
     K, n = found.free.shape
     width = max(found.q.shape[1], second.q.shape[1])
     out = Examined(
@@ -125,12 +115,11 @@ def examine(
     return out
 
 
-def _settle(
-    arm: Arm, task: Task, q: Array, label: Int, loose: Bool, target: Array, near: Array, seed: float
-) -> _Settled:
+def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Settled:
     """Candidates (K, M, n) with their labels (K, M), moved onto their targets and grouped; seed: see `tolerances`."""
+    arm, task, target, near = goals
     K, _, n = q.shape
-    q, label, size = _onto(arm, task, q, label, target, near, seed)
+    q, label, size = _onto(goals, q, label, seed)
     valid = size <= SOLUTION
     M = q.shape[1]
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
@@ -211,18 +200,17 @@ def _settle(
     )
 
 
-def _onto(
-    arm: Arm, task: Task, q: Array, label: Int, target: Array, near: Array, seed: float
-) -> tuple[Array, Int, Array]:
+def _onto(goals: Goals, q: Array, label: Int, seed: float) -> tuple[Array, Int, Array]:
     """`near` and candidates (K, M, n) moved onto their targets: postures, labels and residuals, (K, M + 1)."""
+    arm, task, target, near = goals
     K, _, n = q.shape
     both, whose = np.concatenate([near[:, None], q], axis=1), np.insert(label, 0, OWN, axis=1)
-    flat, goals = both.reshape(-1, n).copy(), np.repeat(target, both.shape[1], axis=0)
+    flat, goal = both.reshape(-1, n).copy(), np.repeat(target, both.shape[1], axis=0)
     known = np.flatnonzero(~np.isnan(flat).any(axis=1))
     size = np.full(len(flat), np.inf)
-    size[known] = newton.missing(arm, task, flat[known], goals[known])
+    size[known] = newton.missing(arm, task, flat[known], goal[known])
     mean = np.concatenate([near[:, None], clusters.means(arm, q)], axis=1).reshape(-1, n)
-    better = newton.missing(arm, task, mean[known], goals[known]) < size[known]
+    better = newton.missing(arm, task, mean[known], goal[known]) < size[known]
     flat[known[better]] = mean[known[better]]
     own = np.zeros(both.shape[:2], bool)
     own[:, 0] = True
@@ -230,7 +218,7 @@ def _onto(
     some = np.flatnonzero((size < seed) & ~own.ravel())
     if len(some):
         steps = 40  # towards a root of third order each step goes a third of the way
-        flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=steps, patience=PATIENCE)
+        flat[some], size[some] = newton.correct(arm, task, flat[some], goal[some], steps=steps, patience=PATIENCE)
     flat[own.ravel() & (size > SOLUTION)] = np.nan
     return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)
 

@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import chunks, one_target
-from armkin.inverse.batch import Batch, empty, pack
+from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import beyond_near, nearest_row
@@ -162,17 +162,8 @@ def _rows(
                 found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
             return found, np.arange(found.shape[1]) % max(B, 1)
 
-        out = examined(
-            arm,
-            task,
-            out,
-            target,
-            near,
-            doubtful,
-            candidates,
-            others,
-            np.zeros(len(target), bool) if lost is None else lost,
-        )
+        unsettled = np.zeros(len(target), bool) if lost is None else lost
+        out = examined(Goals(arm, task, target, near), out, doubtful, candidates, others, unsettled)
     return out, B
 
 
