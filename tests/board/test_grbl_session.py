@@ -53,6 +53,22 @@ def test_a_hold_stands_on_the_line_and_a_reset_there_keeps_the_position() -> Non
     assert board.steps == [x, y]
 
 
+def test_a_hold_that_nobody_asked_for_ends_in_words() -> None:
+    """A byte damaged into `!` holds GRBL, which then reports Hold ten times a second: it was waited for without end."""
+    board = Grbl(axes=2, settings=QUICK)
+    session = opened(board)
+    ticks = iter(range(10_000))  # the old host took them all
+
+    def tick() -> bool:
+        if next(ticks) == 3:
+            board.write(b"!")
+        return False
+
+    with pytest.raises(LinkError, match=r"in state Hold, has left .* bytes without an answer"):
+        session.stream([f"G53G1X{k}F600" for k in range(1, 40)], tick)
+    assert board.now() < 30
+
+
 def test_a_reset_in_motion_is_an_alarm() -> None:
     board = Grbl(axes=2, settings=QUICK)
     session = opened(board)

@@ -24,6 +24,7 @@ _BOOT = 4.0  # [s] a board may take to greet after its port was opened
 _ANSWER = 2.0  # [s] a line may take that moves nothing
 _POLL = 0.1  # [s] between status requests in motion
 _SILENCE = 2.0  # [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
+_HELD = 15.0  # [s] the same while it holds: somebody may have pressed its button, or a byte was damaged into a hold
 _SHORT = 0.25  # [s] that an empty line may take
 _REPORT = 0.5  # [s] a status report may take
 _LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
@@ -146,8 +147,10 @@ class Session:
             self._pump(0.01)
             if self._heard != before:
                 quiet = self.port.now()
-            if self.port.now() > quiet + _SILENCE + self._dwells():
-                raise LinkError(f"GRBL on {self.port.name} has left {waiting} bytes without an answer")
+            state = "" if self.report is None else self.report.state
+            if self.port.now() > quiet + (_HELD if state in ("Hold", "Door") else _SILENCE) + self._dwells():
+                where = f"GRBL on {self.port.name}, in state {state or '?'},"
+                raise LinkError(f"{where} has left {waiting} bytes without an answer")
         self._not_reset()
         return True
 
@@ -211,7 +214,7 @@ class Session:
             self._sent.clear()
         elif (found := replies.report(line)) is not None:
             self.report = self._unseen = found
-            self._heard += found.state not in ("Idle", "Check", "Sleep")  # else it only repeats itself
+            self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself
         elif line:
             self._other.append(line)
             del self._other[:-400]
