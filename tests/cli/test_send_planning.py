@@ -106,3 +106,22 @@ def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -
     alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
     assert (alone.code, alone.out) == (2, "")
     assert "--branch, --task, --near and --lock belong to --target" in alone.err
+
+
+def test_bus_servos_without_a_board_are_told_which(tmp_path: Path) -> None:
+    """It was an internal error: no board of ours has an axis for them."""
+    path = tmp_path / "arm.yaml"
+    path.write_text((ROOT / "robots/so100.yaml").read_text().replace("board: {kind: feetech}\n", ""))
+    for words in (("--dry-run",), ("--port", "sim")):
+        done = run("send", path, "home", *words)
+        assert (done.code, done.out) == (2, "")
+        assert "add to" in done.err
+        assert "board: {kind: feetech}" in done.err
+
+
+def test_an_export_beyond_what_a_robot_file_takes_prints_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    path.write_text((ROOT / "robots/three_dof.yaml").read_text().replace("a: 197, d: -10", "a: 10000000, d: -10", 1))
+    assert run("info", path).code == 0
+    done = run("export", path, "--screws")
+    assert (done.code, done.out) == (4, "")

@@ -74,6 +74,13 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
+    if arm.board is None and any(motor.kind == "bus" for motor in arm.motors):
+        line = "board: {kind: feetech}"
+        raise UsageError(
+            f"{arm.name}: bus servos have a board of their own; add to {arm.path or 'its file'}:\n  {line}",
+            robot_file=arm.path,
+            lines_to_add=[line],
+        )
     if lacks := missing_keys.lacks(arm, board=not rehearsal):
         said = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]

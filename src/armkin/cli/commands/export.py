@@ -72,9 +72,10 @@ def _table(arm: Arm, convention: str, out: str | None) -> None:
     from armkin.robot_file.writing import text
 
     data = tables.screws(arm) if convention == "screws" else tables.dh(arm, modified=convention == "modified")
+    lines = list(tables.differences(arm, data))  # reads it: a number may be beyond what a robot file takes
     with output.destination(out) as write:
         write(text(data))
-    for line in tables.differences(arm, data):
+    for line in lines:
         output.note(line)
 
 
