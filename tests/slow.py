@@ -32,7 +32,11 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_coupled_joints_home_one_after_another",
         "test_the_boards_rows_are_the_joint_limits",
     ),
-    "board/test_protocol.py": ("test_a_stream_in_pieces_gives_its_payloads",),
+    "board/test_protocol.py": (
+        "test_a_stream_in_pieces_gives_its_payloads",
+        "test_cobs_round_trip",
+        "test_image_round_trip",
+    ),
     "board/test_resuming.py": (
         "test_a_motion_that_was_held_goes_on_and_ends_where_it_should",
         "test_what_is_left_of_a_curve_keeps_to_the_joints_limits",
@@ -47,8 +51,15 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_memory_does_not_grow_with_the_rows",
         "test_pulses_cost_at_most_four_times_what_fk_costs",
     ),
-    "cli/test_cli_klipper.py": ("test_stop_ends_the_motion_of_another_terminal",),
-    "cli/test_cli_path.py": ("test_send_follows_a_path_file_and_rounds_waypoints",),
+    "cli/test_cli_boards.py": (),
+    "cli/test_cli_klipper.py": (
+        "test_a_new_klipper_is_told_where_the_arm_stands_then_moved",
+        "test_stop_ends_the_motion_of_another_terminal",
+    ),
+    "cli/test_cli_path.py": (
+        "test_a_million_rows_are_refused_without_being_read",
+        "test_send_follows_a_path_file_and_rounds_waypoints",
+    ),
     "cli/test_cli_process.py": (),
     "cli/test_cli_workspace_plot.py": (
         "test_a_picture_has_the_measure_that_colours_it",
@@ -60,6 +71,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_an_offered_branch_is_understood",
         "test_tab",
     ),
+    "cli/test_default_port.py": (),
     "cli/test_home.py": (),
     "cli/test_inputs_kept.py": ("test_what_comes_through_standard_input_is_not_replaced",),
     "cli/test_new.py": ("test_the_example_shows_every_key",),
@@ -70,6 +82,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "cli/test_pipes.py": ("test_a_heading_costs_no_speed",),
     "cli/test_robots_command.py": ("test_what_a_robot_can_do_is_what_the_commands_do",),
     "cli/test_send_in_real_time.py": (
+        "test_a_board_behind_a_socket",
         "test_a_changed_file_means_a_lost_position",
         "test_a_cut_line",
         "test_a_killed_sender",
@@ -99,6 +112,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_memory.py": ("test_memory_beyond_the_results_does_not_grow_with_the_batch",),
     "inverse/test_near.py": (),
     "inverse/test_nearly_special.py": (),
+    "inverse/test_neighbours.py": ("test_an_answer_is_that_of_its_target",),
     "inverse/test_regular_targets.py": ("test_all_at_once_is_as_one_by_one",),
     "inverse/test_subproblems.py": ("test_a_circle_and_a_conic",),
     "inverse/test_sweep.py": ("test_what_is_dropped_is_not_shown",),
@@ -110,6 +124,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "motion/test_every_way.py": (),
     "motion/test_singular_paths.py": (),
+    "motion/test_time_law.py": ("test_a_long_way_takes_little_memory_beside_its_own",),
     "plot/test_plot.py": (),
     "reach/test_workspace.py": (
         "test_a_full_disk_leaves_no_file",
