@@ -12,6 +12,7 @@ from armkin.calibration.fit import Measured
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -42,7 +43,7 @@ def _moves(arm: Arm, data: Measured) -> None:
             f"{names} never move{'s' if len(still) == 1 else ''} in the rows: what belongs to "
             f"{'it' if len(still) == 1 else 'them'} cannot be seen; measure poses that move every joint"
         )
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     sizes = np.linalg.svd((data.c - data.c.mean(axis=0)) / unit, compute_uv=False)
     if arm.n > 1 and sizes[1] < 1e-3 * sizes[0]:
         raise UsageError(

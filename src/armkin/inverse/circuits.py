@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -54,7 +55,7 @@ def _walk(
     arm: Arm, task: Task, q: Array, joints: Bool, who: NDArray[np.intp], posture: Array, target: Array, way: float
 ) -> tuple[Bool, Bool]:
     """Which postures (P, n) are met on the way from the who-th of q (M, n): (P,); and whether the curve closes (M,)."""
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     at, last, pace = q.copy(), np.zeros_like(q), np.zeros(len(q))
     met, closed, going = np.zeros(len(who), bool), np.zeros(len(q), bool), np.ones(len(q), bool)
     for step in range(MOST):
@@ -95,6 +96,6 @@ def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tupl
     gain[:, 0] = 0.0
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
-        q = q + (back @ r[:, :, None])[:, :, 0] * np.where(arm.prismatic, arm.reach, 1.0)
+        q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
         r = newton.residuals(arm, task, q, target)
     return q, V[:, :, 0], np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))

@@ -15,6 +15,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -71,7 +72,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     q = q[np.argsort(cost, kind="stable")[:FINALISTS]]
     q, converged = _finish(arm, definition, q, np.repeat(goal, len(q), axis=0))
     cost = _cost(arm, definition, q, np.repeat(goal, len(q), axis=0))
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     moved = np.abs((q - close) / unit).sum(axis=1)
     best = np.flatnonzero(cost <= cost.min() * (1 + 1e-9) + 1e-18)
     k = int(best[np.argmin(moved[best])])
@@ -112,7 +113,7 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
     """
     n, h = arm.n, 1e-5
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     converged = np.zeros(len(q), bool)
     cost = _cost(arm, task, q, target)
     for _ in range(40):
@@ -147,7 +148,7 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
 
 def _descend(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Projected Levenberg-Marquardt on all starts at once."""
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     damping = np.full(len(q), 1e-2)
     cost = _cost(arm, task, q, target)
     active = np.arange(len(q))

@@ -9,6 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLUSTER
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -38,5 +39,5 @@ def means(arm: Arm, q: Array) -> Array:
             count[row, at] += 1
     shift = np.where((count > 2)[..., None], total / np.maximum(count, 1)[..., None], 0.0)
     out = np.empty_like(q)
-    np.put_along_axis(out, order[:, :, None], there + shift * np.where(arm.prismatic, arm.reach, 1.0), axis=1)
+    np.put_along_axis(out, order[:, :, None], there + shift * radian_or_reach(arm), axis=1)
     return out

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -68,7 +69,7 @@ def folds(arm: Arm, task: Task, q: Array, target: Array, linear: Linear | None =
         r, J = newton.scaled(arm, task, q, target)
         linear = Linear(r, *np.linalg.svd(J))
     r, U, S, V = linear
-    u, way = U[:, :, -1], WAY * V[:, -1] * np.where(arm.prismatic, arm.reach, 1.0)
+    u, way = U[:, :, -1], WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
     ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
     turn = (ahead + behind - 2.0 * r) / WAY**2

@@ -19,6 +19,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -88,7 +89,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
         ways = np.where(near_by[kc, ic][:, :, None], newton.difference(arm, q[kc], q[kc, ic][:, None]), 0.0)
         mean = ways.sum(axis=1) / near_by[kc, ic].sum(axis=1, keepdims=True)
         shift = np.concatenate([mean, 0.5 * newton.difference(arm, q[k, j], q[k, i])])
-        between = np.concatenate([q[kc, ic], q[k, i]]) + shift * np.where(arm.prismatic, arm.reach, 1.0)
+        between = np.concatenate([q[kc, ic], q[k, i]]) + shift * radian_or_reach(arm)
         missing = newton.missing(arm, task, between, target[np.concatenate([kc, k])])
         clusters[kc, ic] = missing[: len(kc)] < at.size[kc, ic]
         one[k, i, j] = missing[len(kc) :] <= SOLUTION
@@ -116,7 +117,7 @@ def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target:
     if not len(k):
         return q, valid, changed
     step = (np.linalg.pinv(at.J[k, b]) @ at.r[k, b, :, None])[:, :, 0]
-    better = q[k, b] + step * np.where(arm.prismatic, arm.reach, 1.0)
+    better = q[k, b] + step * radian_or_reach(arm)
     r, J = newton.scaled(arm, task, better, target[k])
     size = np.sqrt((r * r).sum(axis=1))
     good = (np.abs(step).max(axis=1) < SHORT) & (size < CLOSED)

@@ -20,6 +20,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import BESIDE, HAIR, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -68,7 +69,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     others: (J, n) postures of self-motions, curve: (J, n) the joints that these move. Two are one if the posture
     between them solves the target, too.
     """
-    unit, goal = np.where(arm.prismatic, arm.reach, 1.0), np.repeat(target[None], len(others), axis=0)
+    unit, goal = radian_or_reach(arm), np.repeat(target[None], len(others), axis=0)
     start = q + np.where(curve, 0.0, newton.difference(arm, others, q)) * unit
     there, size = newton.correct(arm, task, start, goal, steps=6, least=WEAK)
     way = newton.difference(arm, there, q)
@@ -81,7 +82,7 @@ def _leads_to(arm: Arm, task: Task, q: Array, corner: Array, target: Array) -> b
 
     Steps of `STEP` at most along the null direction, the way that comes closer: False where none does.
     """
-    unit, goal = np.where(arm.prismatic, arm.reach, 1.0), target[None]
+    unit, goal = radian_or_reach(arm), target[None]
     left = newton.difference(arm, corner, q)
     while (far := float(np.linalg.norm(left))) > STEP:
         _, V, _ = newton.null_space(arm, task, q[None], goal)
@@ -106,7 +107,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
         for i in np.flatnonzero(chosen[k] & moving[k]):
             apart = newton.difference(arm, q[k, kept], q[k, i])
             close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
-            between = q[k, i] + 0.5 * apart[close] * np.where(arm.prismatic, arm.reach, 1.0)
+            between = q[k, i] + 0.5 * apart[close] * radian_or_reach(arm)
             there = np.repeat(target[k : k + 1], len(between), axis=0)
             held = np.where(curve[k, kept] & curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
             held &= (np.abs(apart) > TURNED).sum(axis=1) <= ALONG
@@ -125,7 +126,7 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool
     may be off by as much as roots of high order are.
     """
     steps = (np.array([0.25, 0.5, 0.75])[:, None, None] * _both_ways(arm, way)).reshape(-1, arm.n)
-    start = q + steps * np.where(arm.prismatic, arm.reach, 1.0)
+    start = q + steps * radian_or_reach(arm)
     there, size = newton.correct(arm, task, start, np.repeat(target[None], len(start), axis=0), steps=3, least=WEAK)
     off = np.abs(newton.difference(arm, there, start)).max(axis=1)
     good = (size <= SOLUTION) & (off < 10 * TURNED)
@@ -147,7 +148,7 @@ def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool
     Not if they are close. If they differ in moving joints alone, one half way between them that misses the target by
     far tells: `drop_twins` would have to move it farther than it does.
     """
-    halfway, unit = [], np.where(arm.prismatic, arm.reach, 1.0)
+    halfway, unit = [], radian_or_reach(arm)
     for i, j in itertools.combinations(np.flatnonzero(curve.any(axis=1)), 2):
         way = newton.difference(arm, q[j], q[i])
         if np.abs(way).max() < BESIDE:
@@ -178,7 +179,7 @@ def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array
 
 def _stays(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Int, Array]:
     """Which postures (M, n), a step (M,) away along push (M, n) and pulled back, are still away; and their growth."""
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     there, size = _follow(arm, task, q + step[:, None] * push * unit, target)
     size -= newton.missing(arm, task, q, target)
     far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
@@ -215,7 +216,7 @@ def _one_way(arm: Arm, task: Task, q: Array, fold: Folds, target: Array) -> tupl
     method, bordered by u and v: Keller 1977). Of a curve that turns away within a long step nothing is known.
     """
     M, n = q.shape
-    unit, v = np.where(arm.prismatic, arm.reach, 1.0), fold.V[:, -1]
+    unit, v = radian_or_reach(arm), fold.V[:, -1]
     # a short step and a long one, both ways, to all of it and to a part: (2, 2, 2, M)
     ways = np.multiply.outer([STEP, 10 * STEP], [[1.0, 0.6], [-1.0, -0.6]])
     s, who = np.repeat(ways.ravel(), M), np.tile(np.arange(M), 8)
@@ -268,7 +269,7 @@ def _moved(away: Array) -> Bool:
 
 def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether postures (M, n) can move along any direction that they lose, pulled back by steps of least norm."""
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
     pushes = list(_null_directions(arm.n, V, nullity))
     who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])

@@ -30,6 +30,7 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -233,7 +234,7 @@ def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: 
         same = away < radius
         row, column = np.nonzero(~same & (away < HAIR))
     if len(row):
-        unit = np.where(arm.prismatic, arm.reach, 1.0)
+        unit = radian_or_reach(arm)
         start = q[k[row], b[row]]
         middle = start + 0.5 * newton.difference(arm, q[k[row], column], start) * unit
         same[row, column] = newton.missing(arm, task, middle, target[k[row]]) <= SOLUTION

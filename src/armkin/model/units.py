@@ -127,6 +127,13 @@ def scale(arm: Arm) -> Array:
     return np.where(arm.prismatic, 1.0, DEGREE)
 
 
+def radian_or_reach(arm: Arm) -> Array:
+    """What motions of joints are compared in: a radian, of a sliding joint the arm's reach [mm]: (n,)."""
+    import numpy as np
+
+    return np.where(arm.prismatic, arm.reach, 1.0)
+
+
 def _label_scale(labels: Sequence[str]) -> list[float]:
     """What one unit of each of a target's numbers is in [mm, rad, 1]."""
     return [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]

@@ -17,6 +17,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian, position
 from armkin.inverse.branches.names import find
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.model.units import radian_or_reach
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.hold_cap import hold_cap
@@ -232,13 +233,11 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
         r = residual(task, T, q * arm.ratio, target) * scale
         J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
         J[:, p : p + k] *= arm.ratio
-        J = J * np.where(arm.prismatic, arm.reach, 1.0)
+        J = J * radian_or_reach(arm)
         H = np.swapaxes(J, 1, 2) @ J + (damping / arm.reach) ** 2 * np.eye(arm.n)
         step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
         size = np.abs(step).max(axis=1, keepdims=True)
-        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * np.where(
-            arm.prismatic, arm.reach, 1.0
-        )
+        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * radian_or_reach(arm)
         if size.max() < 1e-12:
             break
     return np.asarray(q)

@@ -12,6 +12,7 @@ from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -26,7 +27,7 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     r = residual(task, T, q, target)
     J = axis_projected(task, task_jacobian(task, slopes), T)
     r[:, : task.position] /= arm.reach
-    J = J * np.where(arm.prismatic, arm.reach, 1.0)
+    J = J * radian_or_reach(arm)
     J[:, : task.position] /= arm.reach
     return r, J
 
@@ -66,7 +67,7 @@ def correct(
     tenth away after which a start is given up; one at a root of sixth order takes two thirds. stalled: residual
     below which such steps count.
     """
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
     idle = np.zeros(len(q), int)
     active = np.arange(len(q))
@@ -117,7 +118,7 @@ def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[A
 
     Returns the best q met and its `missing`.
     """
-    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit = radian_or_reach(arm)
     q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
     active = np.arange(len(q))
     for _ in range(steps + 1):

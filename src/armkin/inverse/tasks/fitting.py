@@ -12,6 +12,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
 from armkin.model.chain import Chain, axes
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -59,7 +60,7 @@ def rank(arm: Arm, task: Task, tolerance: float = 1e-4) -> int:
     q = np.random.default_rng(1).uniform(-2.0, 2.0, (4, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
     Jt = axis_projected(task, task_jacobian(task, jacobian(arm, q)), fk(arm, q))
     Jt[:, : task.position] /= arm.reach
-    Jt = Jt * np.where(arm.prismatic, arm.reach, 1.0)
+    Jt = Jt * radian_or_reach(arm)
     return int(max(np.linalg.matrix_rank(Jt, tol=tolerance)))
 
 
