@@ -74,6 +74,11 @@ class Straight:
         return np.asarray(self.start + along if order == 0 else along)
 
 
+def brake(stretch: Stretch) -> float:
+    """Share of the motors' accelerations with which a board stops on a stretch: all on a straight line."""
+    return 1.0 if isinstance(stretch, Straight) else BRAKE
+
+
 @dataclass(frozen=True)
 class Trace:
     """A trajectory sampled in time."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.motion.plan import plan
-from armkin.motion.trajectory import BRAKE, Straight
+from armkin.motion.trajectory import brake
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
@@ -85,5 +85,4 @@ def braking(trajectory: Trajectory) -> float:
     """Seconds in which the whole motion is slowed down to a stop, within the joints' max_accel; gently on curves."""
     with np.errstate(invalid="ignore", divide="ignore"):
         needed = trajectory.top_speed / trajectory.arm.max_accel
-    straight = all(isinstance(stretch, Straight) for stretch in trajectory.stretches)
-    return float(np.nanmax(needed, initial=0.0)) / (1.0 if straight else BRAKE)
+    return float(np.nanmax(needed, initial=0.0)) / min(map(brake, trajectory.stretches), default=1.0)

@@ -22,7 +22,7 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.plan import check_limits, check_rates
 from armkin.motion.plan import plan as plan_joints
-from armkin.motion.trajectory import BRAKE, Straight
+from armkin.motion.trajectory import Straight, brake
 from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
 
@@ -91,8 +91,8 @@ class Cut:
             return along(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
-        cycles, brake = round(stretch.duration * self.clock), 1.0 if isinstance(stretch, Straight) else BRAKE
-        return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake)
+        cycles = round(stretch.duration * self.clock)
+        return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake(stretch))
 
 
 def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> Cut:
