@@ -117,3 +117,12 @@ def pose_residual(arm: Arm, found: Array, T: Array) -> float:
     difference = forward(arm, found) - T[:, None]
     difference[..., :3, 3] /= size(arm)
     return float(np.nanmax(np.sqrt(np.sum(difference**2, axis=(-2, -1))), initial=0.0))
+
+
+def rigid(rng: np.random.Generator, count: int) -> Array:
+    """Random rigid motions (count, 4, 4)."""
+    Q, _ = np.linalg.qr(rng.standard_normal((count, 3, 3)))
+    T = np.tile(np.eye(4), (count, 1, 1))
+    T[:, :3, :3] = Q * np.sign(np.linalg.det(Q))[:, None, None]
+    T[:, :3, 3] = rng.standard_normal((count, 3))
+    return T

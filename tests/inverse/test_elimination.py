@@ -1,4 +1,4 @@
-"""The general solver: laws of its algebra, and every branch of arms with and without closed forms."""
+"""The general solver: Newton's polish, and every branch of arms with and without closed forms."""
 
 import numpy as np
 import pytest
@@ -15,21 +15,13 @@ from general_arms import (
     pose_residual,
     random_arm,
     random_joints,
+    rigid,
 )
 
 import armkin
-from armkin.inverse.elimination import line_features, method
+from armkin.inverse.elimination import method
 from armkin.inverse.elimination.polish import refine, shrink
 from armkin.inverse.numeric.linalg import nudged
-
-
-def rigid(rng: np.random.Generator, count: int) -> Array:
-    """Random rigid motions (count, 4, 4)."""
-    Q, _ = np.linalg.qr(rng.standard_normal((count, 3, 3)))
-    T = np.tile(np.eye(4), (count, 1, 1))
-    T[:, :3, :3] = Q * np.sign(np.linalg.det(Q))[:, None, None]
-    T[:, :3, 3] = rng.standard_normal((count, 3))
-    return T
 
 
 def jacobian(arm: Arm, q: Array) -> Array:
@@ -61,38 +53,7 @@ def solve(arm: Arm, T: Array) -> tuple[Array, Bool]:
     return method.solve(method.prepare(*arm), T)[:2]
 
 
-# ---- the algebra -------------------------------------------------------------------------------------------
-
-
-def test_rep_is_a_homomorphism() -> None:
-    X, Y = rigid(np.random.default_rng(0), 40).reshape(2, 20, 4, 4)
-    product = line_features.rep(X) @ line_features.rep(Y)
-    np.testing.assert_allclose(line_features.rep(X @ Y), product, atol=1e-12)
-    np.testing.assert_array_equal(line_features.rep(np.eye(4)), np.eye(15))
-
-
-def test_rigid_motions_act_linearly_on_features() -> None:
-    rng = np.random.default_rng(1)
-    T, p, direction = rigid(rng, 20), rng.standard_normal((20, 3)), rigid(rng, 20)[:, :3, 0]
-    moved = line_features.features(
-        (T[:, :3, :3] @ p[..., None])[..., 0] + T[:, :3, 3], (T[:, :3, :3] @ direction[..., None])[..., 0]
-    )
-    acted = (line_features.rep(T) @ line_features.features(p, direction)[..., None])[..., 0]
-    np.testing.assert_allclose(moved, acted, atol=1e-12)
-
-
-def test_z_axis_are_the_features_of_a_frames_own_axis() -> None:
-    np.testing.assert_array_equal(line_features.Z_AXIS, line_features.features(np.zeros(3), np.eye(3)[2]))
-
-
-@pytest.mark.parametrize("prismatic", [False, True])
-@pytest.mark.parametrize("inverse", [False, True])
-def test_a_joints_rep_is_affine_in_two_numbers(prismatic: bool, inverse: bool) -> None:
-    U = line_features.joint_rep(prismatic, inverse)
-    for q in (-2.5, -0.4, 0.0, 1.3, 3.1):
-        b = (q, q * q) if prismatic else (np.cos(q), np.sin(q))
-        motion = line_features.joint_motion(prismatic, -q if inverse else q)
-        np.testing.assert_allclose(U[0] + U[1] * b[0] + U[2] * b[1], line_features.rep(motion), atol=1e-13)
+# ---- polish ------------------------------------------------------------------------------------------------
 
 
 def test_one_singular_member_does_not_fail_its_batch() -> None:
@@ -100,9 +61,6 @@ def test_one_singular_member_does_not_fail_its_batch() -> None:
     inverse = nudged(np.linalg.inv, matrices)
     np.testing.assert_allclose(inverse[0], np.eye(6), atol=1e-11)
     assert np.isfinite(inverse).all()
-
-
-# ---- polish ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["JACO", "STANFORD"])
