@@ -85,7 +85,8 @@ def test_any_words(seed: int, rounds: int, tmp_path: Path, monkeypatch: pytest.M
             if kind < 2:
                 words.append(rng.choice(NUMBERS))
             elif kind == 2:
-                words.append(rng.choice(OPTIONS))
+                option = rng.choice(OPTIONS)
+                words.insert(2 if option == "--json" else len(words), option)  # never the value of another option
             elif kind == 3:
                 words.append(rng.choice(TEXTS))
             else:
