@@ -81,6 +81,8 @@ class Solutions:
     def best(self) -> NDArray[np.intp]:
         """(...) index of the branch within limits that moves the joints least, or -1."""
         key = np.where(self.within_limits, self.motion, np.inf)
+        if not key.shape[-1]:  # no target of the batch has a branch
+            return np.full(self.status.shape, -1)
         index = np.argmin(key, axis=-1)
         return np.where(np.isfinite(np.min(key, axis=-1)), index, -1)
 

@@ -6,16 +6,25 @@ B = A0^T R A3^T:
 
     (1)  e3^T A1 Rz(q2) A2 e3 = B33                    two values of q2
     (2)  Rz(q1) (A1 Rz(q2) A2 e3) = B e3               q1
-    (3)  (e3^T A1 Rz(q2) A2) Rz(q3) = e3^T B           q3
+    (3)  Rz(q3) = (Rz(q1) A1 Rz(q2) A2)^T B            q3
 
 and the position is affine in the three prismatic values.  Both steps are closed forms, so both branches
 are found; the pair is one where B33 is an extreme value of (1).
+
+With u = e3^T A1, v = A2 e3 and b the first two entries of B e3, (1) is u3 v3 + k cos(q2 - phase) = B33, and
+k^2 sin^2(q2 - phase) = |b|^2 (1 - v3^2) - (u3 - v3 B33)^2, which loses nothing where B e3 approaches e3. There
+axes 1 and 3 are parallel and q1 is free: it gets a value at which the slides' directions are hardly ever coplanar.
+Where these are coplanar, slides can move alone: of the values that place the tool those of least norm are given.
 """
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination.line_features import joint_motion
+
+PARALLEL = 1e-12  # sine between axes 1 and 3 below which joint 1 is free
+FREE = 0.7321  # [rad] its value there
+COPLANAR = 1e-12  # smallest singular value of the slides' directions below which they are coplanar
 
 
 def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
@@ -33,15 +42,15 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
     B = A[0].T @ goal[:, :3, :3] @ A[3].T
     u, v = A[1][2], A[2][:, 2]
     even, odd = u[0] * v[0] + u[1] * v[1], u[1] * v[0] - u[0] * v[1]
-    size = max(float(np.hypot(even, odd)), 1e-300)
-    half = np.arccos(np.clip((B[:, 2, 2] - u[2] * v[2]) / size, -1, 1))
+    off = np.hypot(B[:, 0, 2], B[:, 1, 2])
+    one, other = off * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
+    half = np.arctan2(np.sqrt(np.maximum((one - other) * (one + other), 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
-    c, s = np.cos(q2), np.sin(q2)
-    Rz_v = np.stack([c * v[0] - s * v[1], s * v[0] + c * v[1], np.full_like(c, v[2])], axis=-1)
-    u_Rz = np.stack([c * u[0] + s * u[1], c * u[1] - s * u[0], np.full_like(c, u[2])], axis=-1)
-    left, right = Rz_v @ A[1].T, u_Rz @ A[2]
-    q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(left[..., 1], left[..., 0])
-    q3 = np.arctan2(right[..., 1], right[..., 0]) - np.arctan2(B[:, None, 2, 1], B[:, None, 2, 0])
+    middle = A[1] @ _turns(q2)[..., :3, :3] @ A[2]
+    q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(middle[..., 1, 2], middle[..., 0, 2])
+    q1[off < PARALLEL] = FREE
+    last = np.swapaxes(_turns(q1)[..., :3, :3] @ middle, -1, -2) @ B[:, None]
+    q3 = np.arctan2(last[..., 1, 0] - last[..., 0, 1], last[..., 0, 0] + last[..., 1, 1])
     q = np.zeros((goal.shape[0], 2, 6))
     q[..., turning] = np.stack([q1, q2, q3], axis=-1)
     frame = np.broadcast_to(chain[0], (*q.shape[:2], 4, 4))
@@ -53,7 +62,11 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
         else:
             frame = frame @ _turns(q[..., i]) @ chain[i + 1]
     rest = goal[:, None, :3, 3] - frame[..., :3, 3]
-    q[..., sliding] = (np.linalg.pinv(np.stack(axes, axis=-1)) @ rest[..., None])[..., 0]
+    # an explicit pseudoinverse would lose as many digits as the weakest direction has
+    U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
+    ahead = np.swapaxes(U, -1, -2) @ rest[..., None]
+    moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > COPLANAR)
+    q[..., sliding] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q
 
 

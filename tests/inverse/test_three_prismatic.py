@@ -1,0 +1,82 @@
+"""Arms of three slides and three turning joints where they are singular: slides in one plane, a wrist in line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import truth
+from geometries import AXIS, Case, case, random_case, spatial
+from oracle import goal
+
+import armkin
+from armkin import Status
+from armkin.inverse.recognise import solver
+
+
+def gantry(pattern: str, axes: str) -> Case:
+    """Axes along x, y, z at points at random: no two that turn meet."""
+    return case(spatial(np.random.default_rng(3), pattern, [AXIS[a] for a in axes], [None] * 6), "pose")
+
+
+@pytest.mark.parametrize("pattern", ["RPRPRP", "PRRPRP"])
+def test_slides_in_one_plane_move_alone(pattern: str) -> None:
+    """Three of 29 such targets were answered by the other branch alone: a pseudoinverse had lost their digits."""
+    name = "RPRPRP general"
+    arm, screw, task = random_case(name, 0)
+    if pattern != "RPRPRP":
+        rng = np.random.default_rng(5)
+        arm, screw, task = case(spatial(rng, pattern, [None] * 6, [None] * 6), "pose")
+    definition, _ = solver(arm, task)
+    kinds = truth.singular_postures(arm, screw, task, 12)
+    assert kinds
+    for q in kinds.values():
+        target = goal(definition, screw, q).array()
+        for near in (None, q):
+            verdict = truth.judge(arm, screw, task, q, target, near)
+            assert verdict, verdict
+            assert verdict.solutions.complete.all()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "axes", "turning"),
+    [("PPPRRR", "xyzzxz", "J4 J6"), ("RPPRPR", "zzxyyz", "J1 J6"), ("RPRPRP", "zzyxzy", "J1 J5")],
+)
+def test_a_wrist_in_line_is_a_self_motion(pattern: str, axes: str, turning: str) -> None:
+    """Axes 1 and 3 of those that turn are parallel; such targets were all called unreachable."""
+    arm, screw, task = gantry(pattern, axes)
+    definition, _ = solver(arm, task)
+    middle = np.flatnonzero(~arm.prismatic)[1]
+    for value in (0.0, np.pi):
+        q = np.random.default_rng(1).uniform(-3, 3, (12, 6)) * np.where(arm.prismatic, 100.0, 1.0)
+        q[:, middle] = value
+        target = goal(definition, screw, q).array()
+        for near in (None, q):
+            verdict = truth.judge(arm, screw, task, q, target, near)
+            assert verdict, verdict
+            s = verdict.solutions
+            assert (s.status == Status.SINGULAR).all()
+            joints = [name in turning.split() for name in arm.joint_names]
+            assert (s.free[:, ~arm.prismatic] == np.array(joints)[~arm.prismatic]).all()
+
+
+@pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+def test_nearly_in_line_nothing_is_lost(off: float) -> None:
+    arm, screw, task = gantry("PPPRRR", "xyzzxz")
+    definition, _ = solver(arm, task)
+    q = np.random.default_rng(2).uniform(-3, 3, (20, 6)) * np.where(arm.prismatic, 100.0, 1.0)
+    q[:, 4] = off
+    verdict = truth.judge(arm, screw, task, q, goal(definition, screw, q).array())
+    assert verdict, verdict
+    assert (verdict.solutions.status != Status.SINGULAR).all() == (off > 5e-8)
+
+
+@pytest.mark.parametrize("rows", [(), (3,), (0,)])
+def test_a_batch_without_any_branch_has_no_best_one(rows: tuple[int, ...]) -> None:
+    """It was a ValueError: there is no column of branches at all."""
+    arm, _, task = random_case("RPRPRP general", 0)
+    T = np.eye(4)
+    T[:3, :3] = np.diag([-1.0, -1.0, 1.0])
+    s = armkin.ik(arm, np.broadcast_to(T, (*rows, 4, 4)), task)
+    assert (s.status == Status.UNREACHABLE).all()
+    assert s.best.shape == rows
+    assert (s.best == -1).all()
