@@ -35,6 +35,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="a million inputs for the fuzzers (tests/fuzz)")
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Files of which `-m "not slow"` or `-m "not emulator"` leaves out every test are not read: half of all reading."""
+    left_out = str(config.option.markexpr)
+    if "not emulator" in left_out and collection_path == _HERE / "firmware":
+        return True
+    named = collection_path.is_relative_to(_HERE) and collection_path.relative_to(_HERE).as_posix()
+    return True if "not slow" in left_out and SLOW.get(str(named)) == () else None
+
+
 @pytest.fixture(autouse=True)
 def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """ARMKIN_PORT is somebody's arm."""

@@ -82,8 +82,13 @@ def _room(module: str) -> str:
     return room.split("/")[0] if room.startswith("cli") else room
 
 
-def _imports(module: str) -> Iterator[str]:
+@cache
+def _imports(module: str) -> list[str]:
     """Modules of armkin that a module imports, anywhere in it: for types and inside functions, too."""
+    return sorted({*_imported(module)} - {"armkin"})
+
+
+def _imported(module: str) -> Iterator[str]:
     for node in _nodes(MODULES[module]):
         if isinstance(node, ast.Import):
             yield from (name.name for name in node.names if name.name in MODULES and name.name != "armkin")
@@ -93,15 +98,12 @@ def _imports(module: str) -> Iterator[str]:
                 yield inner if inner in MODULES else str(node.module)
 
 
-IMPORTS = {module: sorted(set(_imports(module)) - {"armkin"}) for module in MODULES}
-
-
 @pytest.mark.parametrize("module", [module for module in MODULES if _room(module) not in TOP])
 def test_a_room_imports_what_stands_above_it(module: str) -> None:
     room = _room(module)
     assert room in MAY_IMPORT, f"{room} is a new room: give it a row in MAY_IMPORT"
     allowed = {room, *MAY_IMPORT[room].split()}
-    wrong = {imported: _room(imported) for imported in IMPORTS[module] if _room(imported) not in allowed}
+    wrong = {imported: _room(imported) for imported in _imports(module) if _room(imported) not in allowed}
     assert not wrong
 
 
@@ -124,7 +126,7 @@ def test_no_row_of_the_table_contradicts_another() -> None:
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
-    assert _circle(IMPORTS) is None
+    assert _circle({module: _imports(module) for module in MODULES}) is None
 
 
 def test_a_circle_is_found() -> None:
