@@ -94,7 +94,18 @@ class NothingHeldError(UsageError):
 
 
 class NoSolutionError(ArmkinError):
-    """No pose reaches the target, or none does so within the limits."""
+    """No pose reaches the target, or none does so within the limits.
+
+    plan: of a path that is not carried the PathPlan as far as it is known.
+    """
+
+    plan: Any = None
+
+    def within(self, place: str, **fields: Any) -> Self:
+        """The same error with the same plan, said of a place."""
+        told = super().within(place, **fields)
+        told.plan = self.plan
+        return told
 
 
 class NoBranchError(NoSolutionError):

@@ -76,7 +76,7 @@ def test_all_moves_together_end_where_they_shall(three_dof: Arm, jerk: float | N
 def test_a_path_beyond_the_reach_is_refused_with_what_each_branch_carries(three_dof: Arm) -> None:
     with pytest.raises(NoSolutionError, match=r"275\.256 of 480\.000 mm, then the path leaves the reach") as refused:
         armkin.path(three_dof, [[390, 80, 300], [390, -400, 300]])
-    plan: PathPlan = refused.value.plan  # type: ignore[attr-defined]
+    plan: PathPlan = refused.value.plan
     # Where the horizontal distance makes the arm straight: its reach from the shoulder is 455, offset 10.
     edge = 80 + np.sqrt(455**2 + 10**2 - 130**2 - 390**2)
     assert plan.branches[0].carries == pytest.approx(edge, abs=0.01)

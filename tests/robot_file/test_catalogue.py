@@ -52,6 +52,7 @@ def test_a_path_wins_over_a_name_and_a_name_over_a_folder(tmp_path: Path, monkey
         ("UR5", "there is no robot UR5; did you mean ur5e?"),
         ("arms/mine.yml", "there is no robot arms/mine.yml; did you mean arms/mine.yaml?"),
         ("arms/mime", "there is no robot arms/mime; did you mean arms/mine.yaml?"),
+        ("arm.yaml", "arm.yaml: cannot read the robot file: No such file or directory"),
         ("no/such.yaml", "no/such.yaml: cannot read the robot file: No such file or directory"),
         ("zzz", "there is no robot zzz: neither a file nor a shipped robot (three_dof, ur5e, ...: armkin robots)"),
         ("arms", "arms: cannot read the robot file: Is a directory; name a file, for example robots/three_dof.yaml"),

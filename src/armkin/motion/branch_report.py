@@ -165,5 +165,5 @@ def refused(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSo
     plan.length += length
     fields: dict[str, Any] = {"splittable": carried.covered}
     error = NoSolutionError(f"{text}: nothing was moved", **fields)
-    error.plan = plan  # type: ignore[attr-defined]
+    error.plan = plan
     return error

@@ -50,8 +50,8 @@ def path_held(
     try:
         plan = path(free, moves, start=here[kept], **parts, **options)
     except NoSolutionError as error:
-        if (refused := getattr(error, "plan", None)) is not None:
-            error.plan = _of_all(refused, arm, held)  # type: ignore[attr-defined]
+        if error.plan is not None:
+            error.plan = _of_all(error.plan, arm, held)
         raise
     whole = _of_all(plan, arm, held)
     first = straight(arm, here, ready, options.get("speed", 1.0), options.get("accel", 1.0), jerk)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.errors import ArmkinError, NoSolutionError, UsageError
+from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.branches.names import find
@@ -369,7 +369,7 @@ def _of_key(file: PathFile, key: str) -> Iterator[None]:
     except (UsageError, NoSolutionError) as error:
         if getattr(file, key) is None or not (place := file.place(key)):
             raise
-        raise _at(place, error) from None
+        raise error.within(place) from None
 
 
 @contextmanager
@@ -380,12 +380,4 @@ def _of_moves(walk: _Walk) -> Iterator[None]:
     except (UsageError, NoSolutionError) as error:
         if not (place := walk.file.place_of(*walk.at)):
             raise
-        raise _at(place, error, move=walk.at[0] + 1) from None
-
-
-def _at(place: str, error: ArmkinError, **fields: int) -> ArmkinError:
-    """The error said of a place, with its plan, if it has one."""
-    told = error.within(place, **fields)
-    if (plan := getattr(error, "plan", None)) is not None:
-        told.plan = plan  # type: ignore[attr-defined]
-    return told
+        raise error.within(place, move=walk.at[0] + 1) from None

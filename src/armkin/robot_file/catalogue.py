@@ -77,10 +77,10 @@ def _near(robot: str) -> list[str]:
         beside = [entry for entry in sorted(os.listdir(folder or ".")) if entry.endswith(_SUFFIXES)]
     except OSError:
         beside = []
-    for choices, where in ((beside, folder), (list(names()), "")):
+    for choices, where, cutoff in ((beside, folder, 0.75), (list(names()), "", 0.76)):  # arm is no xarm6
         # Case, dashes and the suffix are what people get wrong most: compare without them.
         plain = {_plain(choice): choice for choice in choices}
-        close = get_close_matches(_plain(base), plain, n=1, cutoff=0.75)
+        close = get_close_matches(_plain(base), plain, n=1, cutoff=cutoff)
         if close:
             return [os.path.join(where, plain[close[0]])]
     begun = [name for name in names() if len(stem) > 1 and name.startswith(_plain(base))]

@@ -235,9 +235,8 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
             return path_held(arm, moves, locked, **options)
         return armkin.path(arm, moves, **options)
     except NoSolutionError as error:
-        plan: PathPlan | None = getattr(error, "plan", None)
-        if plan is not None:
-            _print(plan, _found(plan, None), json=json)
+        if error.plan is not None:
+            _print(error.plan, _found(error.plan, None), json=json)
         raise
 
 
