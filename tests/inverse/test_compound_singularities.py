@@ -199,3 +199,25 @@ def test_a_lost_branch_is_no_complete_answer() -> None:
     verdict = truth.judge(arm, screw, None, q, target)
     truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 250, 1)
     assert verdict
+
+
+@pytest.mark.parametrize(
+    ("name", "q", "count"),
+    [
+        # six isolated branches and one self-motion, off which a curved valley leads at a corner
+        ("fanuc_crx10ia", [0, 180, 90, 90, 90, 90], 7),
+        # roots of third order in curved valleys: points up to 6e-3 rad away are none of their own
+        (4, [135, 180, 45, -90, 0, 45], 1),
+        (4, [45, 0, 45, -90, 135, 0], 1),
+        (168, [90, 180, 0, -90, 90, 90], 4),
+        (168, [0, 0, 0, -90, -90, 0], 4),
+    ],
+)
+def test_points_in_a_curved_valley_are_one_branch(name: str | int, q: list[float], count: int) -> None:
+    arm, screw = shipped(name) if isinstance(name, str) else case(right_angles(np.random.default_rng(name)), "pose")[:2]
+    task, _ = solver(arm, "pose")
+    joints = np.radians([q])
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array(), near)
+        assert verdict, verdict
+        assert verdict.solutions.valid.sum() == count

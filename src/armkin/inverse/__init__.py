@@ -12,6 +12,7 @@ singularities.py    boundaries and singular postures
 doubtful.py         targets that may be singular: regular_targets.py decides most at once, singularities.py the rest
 fold_singularities.py  postures at which two roots meet, told from self-motions
 clusters.py         what rounding makes of one root of third or fourth order
+valleys.py          whether two roots are points of one curved valley
 self_motions.py     whether joints can move while the target is kept, and what lies on one self-motion
 circuits.py         the connected pieces of a self-motion of three joints or more
 solutions.py        the answer

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import fold_singularities
+from armkin.inverse import fold_singularities, valleys
 from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import BESIDE, HAIR, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import BESIDE, HAIR, HIGH, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
 GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
 NO_GROWTH = 1e-12  # residual that stays as it is
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
@@ -67,14 +66,23 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     """Whether q (n,) is one with a posture of a self-motion: with the one that has its values of the joints that move.
 
     others: (J, n) postures of self-motions, curve: (J, n) the joints that these move. Two are one if the posture
-    between them solves the target, too.
+    between them solves the target, too. The other is sought beside q, and in the direction that q loses: where two
+    directions are lost a valley leaves the self-motion, off which the residual grows.
     """
-    unit, goal = radian_or_reach(arm), np.repeat(target[None], len(others), axis=0)
-    start = q + np.where(curve, 0.0, newton.difference(arm, others, q)) * unit
+    unit = radian_or_reach(arm)
+    apart = np.where(curve, 0.0, newton.difference(arm, others, q))
+    (sigma,), V, _ = newton.null_space(arm, task, q[None], target[None])
+    held = np.where(curve, 0.0, V[0, -1])
+    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), 1e-300)
+    ahead = apart + np.where(curve, V[0, -1] * np.clip(far, -HAIR, HAIR)[:, None], 0.0)
+    start = q + np.concatenate([apart, ahead]) * unit
+    goal = np.repeat(target[None], len(start), axis=0)
     there, size = newton.correct(arm, task, start, goal, steps=6, least=WEAK)
     way = newton.difference(arm, there, q)
-    between = newton.missing(arm, task, q + 0.5 * way * unit, goal)
-    return bool(((size <= SOLUTION) & (between <= SOLUTION) & (np.abs(way).max(axis=1) < HAIR)).any())
+    near = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) < HAIR))
+    start, goal = np.repeat(q[None], len(near), axis=0), goal[near]
+    miss = newton.missing(arm, task, start, goal)
+    return bool(valleys.joined(arm, task, start, way[near], miss, np.full(len(near), sigma), goal).any())
 
 
 def _leads_to(arm: Arm, task: Task, q: Array, corner: Array, target: Array) -> bool:

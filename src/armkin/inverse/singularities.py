@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, clusters, fold_singularities, self_motions
+from armkin.inverse import circuits, clusters, fold_singularities, self_motions, valleys
 from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
@@ -30,7 +30,6 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
-from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -161,7 +160,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
-        one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, target)
+        one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:
             at, goal = q[k[some], b[some]], target[k[some]]
@@ -224,7 +223,9 @@ def _onto(goals: Goals, q: Array, label: Int, seed: float) -> tuple[Array, Int, 
     return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)
 
 
-def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: Array, target: Array) -> Bool:
+def _joined(
+    arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: Array, size: Array, target: Array
+) -> Bool:
     """Which candidates are one with the b-th of their target: (k, M).
 
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
@@ -234,8 +235,11 @@ def _joined(arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: 
         same = away < radius
         row, column = np.nonzero(~same & (away < HAIR))
     if len(row):
-        unit = radian_or_reach(arm)
         start = q[k[row], b[row]]
-        middle = start + 0.5 * newton.difference(arm, q[k[row], column], start) * unit
-        same[row, column] = newton.missing(arm, task, middle, target[k[row]]) <= SOLUTION
+        way = newton.difference(arm, q[k[row], column], start)
+        # a pair's longer Newton step; of rounding alone the quotient says nothing
+        one, other = (k[row], b[row]), (k[row], column)
+        longer = size[other] * sigma[one] > size[one] * sigma[other]
+        miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
+        same[row, column] = valleys.joined(arm, task, start, way, miss, weakest, target[k[row]])
     return np.asarray(same)

@@ -18,6 +18,7 @@ TURNED = 1e-5  # joints that a self-motion holds differ by less along it
 ON_LIMIT = 1e-5  # [rad | mm] a joint this close to a limit is on it, a branch this close to `near` is there
 
 # ---- how singular
+HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
 MOVING = 3e-8  # and below which it is asked whether it is
 DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
