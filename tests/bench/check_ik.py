@@ -1,11 +1,12 @@
 """Every branch of every class of arms, by the thousand: hit rates, branch counts and accuracy as a table.
 
     python tests/bench/check_ik.py [--robots] [--classes] [--near] [--oracle] [--poses 10000] [--arms 50] [--only TEXT]
-    python tests/bench/check_ik.py [--postures] [--surfaces] [--rounded] [--share 1.0] [--only TEXT]
+    python tests/bench/check_ik.py [--postures] [--surfaces] [--rounded] [--share 1.0] [--seed 0] [--only TEXT]
 
 Without a choice all tables are made. The second line asks what people ask: round postures, singular surfaces,
-rounded targets; `--share 0.1` a tenth of them. The oracle is a multi-start Newton iteration on screws that shares
-no code with armkin; EAIK and ssik are compared as well where they are installed and fit the arm.
+rounded targets; `--share 0.1` a tenth of them, `--seed` other arms of the classes and of right angles. The oracle is
+a multi-start Newton iteration on screws that shares no code with armkin; EAIK and ssik are compared as well where they
+are installed and fit the arm.
 """
 
 from __future__ import annotations
@@ -172,20 +173,20 @@ ASKED = "| robot or class | asked | targets | wrong | complete | singular | us/p
 RIGHT_ANGLES = "6R right angles"
 
 
-def asked_arms(only: str) -> Iterator[tuple[str, Arm, oracle.Screws, str | None, int, int]]:
+def asked_arms(only: str, first: int) -> Iterator[tuple[str, Arm, oracle.Screws, str | None, int, int]]:
     """Shipped robots, an arm of every class, right-angled ones; how many postures and how many targets each is asked.
 
-    only: part of a name, "shipped" or "classes".
+    only: part of a name, "shipped" or "classes"; first: seed of a class's arm, and of the first right-angled one.
     """
     for name in NAMES:
         if only in name or only == "shipped":
             yield name, *shipped(name), None, 4096, 1000
     for name in CLASSES:
         if only in name or only == "classes":
-            case = random_case(name, 0)
+            case = random_case(name, first)
             yield name, case.arm, case.screw, case.task, 50, 50
     found: dict[str, int] = {}
-    for seed in range(200 if only in RIGHT_ANGLES else 0):
+    for seed in range(first, first + (200 if only in RIGHT_ANGLES else 0)):
         made = case_of(right_angles(np.random.default_rng(seed)), "pose")
         with suppress(UsageError):  # it cannot reach poses at will
             method = solver(made.arm, "pose")[1].name
@@ -217,26 +218,26 @@ def asked(
     )
 
 
-def postures(share: float, only: str) -> None:
+def postures(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, count, _ in asked_arms(only):
+    for name, arm, screw, task, count, _ in asked_arms(only, seed):
         for step in (90, 45):
             q = truth.round_postures(arm, step, max(int(count * share), 1))
             definition, _ = solver(arm, task)
             asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array(), 25)
 
 
-def surfaces(share: float, only: str) -> None:
+def surfaces(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, _, count in asked_arms(only):
+    for name, arm, screw, task, _, count in asked_arms(only, seed):
         definition, _ = solver(arm, task)
         for label, q in truth.singular_postures(arm, screw, task, max(int(count * share), 1)).items():
             asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array(), 5)
 
 
-def rounded(share: float, only: str) -> None:
+def rounded(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
-    for name, arm, screw, task, _, count in asked_arms(only):
+    for name, arm, screw, task, _, count in asked_arms(only, seed):
         definition, _ = solver(arm, task)
         q = random_joints(screw, max(int(count * share), 1), 5)
         target = oracle.goal(definition, screw, q).array()
@@ -256,6 +257,7 @@ def main() -> None:
     )
     parser.add_argument("--arms", type=int, default=50, help="random arms of a class, for --classes and --oracle")
     parser.add_argument("--share", type=float, default=1.0, help="of the postures, surfaces and rounded targets")
+    parser.add_argument("--seed", type=int, default=0, help="of the arms that are asked round postures and surfaces")
     parser.add_argument("--only", default="", help="robots or classes whose name holds this")
     args = parser.parse_args()
     everything = not (
@@ -271,7 +273,7 @@ def main() -> None:
         against_oracle(args.poses // 10, args.arms, args.only)
     for table in (postures, surfaces, rounded):
         if getattr(args, table.__name__) or everything:
-            table(args.share, args.only)
+            table(args.share, args.seed, args.only)
 
 
 if __name__ == "__main__":
