@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board.firmware import protocol
+from armkin.board.firmware import motion_frame, protocol
 from armkin.board.firmware.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
 from armkin.board.firmware.straight_lines import line
 from armkin.board.sim.board import SimBoard
@@ -95,7 +95,7 @@ class Host:
     ) -> Error:
         plan = [self.board.motors.queue.plan[axis] for axis in axes]  # 2^-23 step
         ends = [(p + sum(s.ticks * s.rates[i] for s in segments)) >> 23 for i, p in enumerate(plan)]
-        return self.say(protocol.motion(0, axes, start, ends, segments, at_rest=at_rest, brake=brake))
+        return self.say(motion_frame.motion(0, axes, start, ends, segments, at_rest=at_rest, brake=brake))
 
 
 AXIS = AxisImage(True, False, -20_000, 20_000, 0, 20_000, 200_000)
@@ -308,7 +308,7 @@ def test_mutated_frames_move_nothing_that_was_not_sent() -> None:
     for _ in range(3000):
         base = list(host.status().counts)
         frame = bytearray(
-            protocol.motion(
+            motion_frame.motion(
                 0,
                 [0, 1],
                 base[:2],

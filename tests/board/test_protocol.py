@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armkin.board.firmware import protocol
+from armkin.board.firmware import motion_frame, protocol
 
 PACK: dict[type, Callable[..., bytes]] = {
     protocol.Ack: protocol.pack_ack,
@@ -66,7 +66,7 @@ def built(name: str, field: dict[str, str]) -> bytes:
             ticks, interval, add, steps = text.split("/")
             segments.append(protocol.Segment(int(ticks), int(interval), 256 * int(add), integers(steps)))
         flags = int(field["flags"])
-        return protocol.motion(
+        return motion_frame.motion(
             tag,
             axes_of(field["mask"]),
             integers(field["start"]),

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from armkin.board.ports import SerialPort, holder, serial_port
+from armkin.board.ports import SerialPort, holder, port_lock, serial_port
 from command_line import THREE_DOF, run
 
 
@@ -89,10 +89,10 @@ def test_every_command_that_opens_a_port_takes_no_reset(monkeypatch: pytest.Monk
 def test_a_holder_is_known_by_its_birth_too(tmp_path: Path) -> None:
     """A process number that was given to another process since is not taken for the holder."""
     name = str(tmp_path / "ttyX")
-    lock = serial_port.Lock(name)
+    lock = port_lock.Lock(name)
     try:
         assert holder(name) == os.getpid()
-        note = Path(serial_port._path(name, "pid"))
+        note = Path(port_lock._path(name, "pid"))
         note.write_text(f"{os.getpid()} 12345")  # an earlier process of this number
         assert holder(name) is None
     finally:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from emulator import EmulatedBoard
 
-from armkin.board.firmware import protocol
+from armkin.board.firmware import motion_frame, protocol
 from armkin.board.firmware.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole
 
 CLOCK = 16_000_000
@@ -54,7 +54,7 @@ class Batch:
 
     def payload(self, tag: int) -> bytes:
         rest, brake = self.at_rest, self.brake
-        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
+        return motion_frame.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
 
 
 def batches(

@@ -168,7 +168,7 @@ def assumed(arm: Arm, text: str | None) -> Array | None:
 
 def standing(arm: Arm, text: str, option: str) -> Array:
     """Joint values (n,) [rad | mm] where an arm stands or a plan begins; NoSolutionError outside its limits."""
-    from armkin.motion.plan import check_limits
+    from armkin.model.limits import check_limits
 
     q: Array = units.joints_in(arm, inputs.joint_list(arm, text, option))
     try:

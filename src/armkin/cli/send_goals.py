@@ -94,7 +94,7 @@ class Goals:
 
 
 def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
-    from armkin.motion.plan import check_limits
+    from armkin.model.limits import check_limits
 
     joints = units.joints_in(arm, values)
     for i, goal in enumerate(joints):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin.errors import NoSolutionError, UsageError
 from armkin.model.units import DEGREE, finite, limits_out
 
 if TYPE_CHECKING:
@@ -49,3 +50,18 @@ def said(arm: Arm, joint: int, value: float) -> str:
     ends = (arm.lower[joint], arm.upper[joint])
     low, high = (f"{end / size + 0.0:.10g}" if math.isfinite(end) else "any" for end in ends)
     return f"{arm.joint_names[joint]} = {value / size:.10g} {unit} is outside {low} to {high} {unit}"
+
+
+def check_limits(arm: Arm, targets: NDArray[np.float64]) -> None:
+    """Raise NoSolutionError, naming row and joint, if a target (w, n) is outside the joint limits.
+
+    A straight line between two poses within the limits stays within them.
+    """
+    if targets.shape[-1] != arm.n:
+        raise UsageError(f"{arm.name} has {arm.n} joints: expected {arm.n} values, got {targets.shape[-1]}")
+    if not np.all(np.isfinite(targets)):
+        raise UsageError("joint values must be finite to be sent")
+    for row, joint in np.argwhere(outside(arm, targets)):
+        which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
+        value = targets[row, joint]
+        raise NoSolutionError(f"{which}{said(arm, joint, value)}: nothing was moved", **fields(arm, joint, value))

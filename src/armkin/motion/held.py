@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
+from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.path import path
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import check_limits, check_rates, straight
+from armkin.motion.plan import check_rates, straight
 from armkin.motion.time_optimal import Knots
 from armkin.motion.trajectory import Straight, Stretch
 

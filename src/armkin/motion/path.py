@@ -19,13 +19,13 @@ from armkin.inverse.solutions import Status
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.limits import outside, said
+from armkin.model.limits import check_limits, outside, said
 from armkin.motion import branch_report, geometry, path_numbers
 from armkin.motion.branch_path import Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.plan import check_limits, check_rates, check_share, straight
+from armkin.motion.plan import check_rates, check_share, straight
 from armkin.motion.profile import at_rest
 from armkin.motion.route import joined
 from armkin.motion.trajectory import Straight, Stretch

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.errors import NoSolutionError, UsageError
+from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.model.limits import fields, outside, said
+from armkin.model.limits import check_limits
 from armkin.motion.profile import at_rest, seven_phases, trapezoid
 from armkin.motion.trajectory import Straight, Trajectory
 from armkin.motors import motor_accel
@@ -123,18 +123,3 @@ def check_rates(arm: Arm) -> None:
 def _add(arm: Arm, lines: list[str]) -> str:
     """The lines to add, said of the robot file."""
     return "".join([f"; add to {arm.path or arm.name}:", *(f"\n  {line}" for line in lines)])
-
-
-def check_limits(arm: Arm, targets: Array) -> None:
-    """Raise NoSolutionError, naming row and joint, if a target (w, n) is outside the joint limits.
-
-    A straight line between two poses within the limits stays within them.
-    """
-    if targets.shape[-1] != arm.n:
-        raise UsageError(f"{arm.name} has {arm.n} joints: expected {arm.n} values, got {targets.shape[-1]}")
-    if not np.all(np.isfinite(targets)):
-        raise UsageError("joint values must be finite to be sent")
-    for row, joint in np.argwhere(outside(arm, targets)):
-        which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
-        value = targets[row, joint]
-        raise NoSolutionError(f"{which}{said(arm, joint, value)}: nothing was moved", **fields(arm, joint, value))

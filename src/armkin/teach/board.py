@@ -18,7 +18,7 @@ from armkin.board.firmware.machine import Machine
 from armkin.board.kinds import Foreign
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model import units
-from armkin.motion.plan import check_limits
+from armkin.model.limits import check_limits
 from armkin.robot_file.catalogue import locate
 from armkin.teach import request_checks
 from armkin.teach.request_checks import RefusedError

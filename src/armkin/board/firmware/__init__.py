@@ -4,7 +4,7 @@ The bytes:
 
 framing.py                payloads to bytes on the line and back
 protocol.py               payloads
-segment_format.py         one segment: its fields and its bytes; motion_frame.py: the payload that carries several
+segment_format.py         one segment and its bytes; motion_frame.py: those of the payload that carries several
 configuration_image.py    the configuration image
 reply_checks.py           what a board may say
 
@@ -26,6 +26,6 @@ An arm on a board:
 configuration.py          a robot file as its board must know it; missing_keys.py: what it lacks
 machine.py                the arm: configured, its position known or lost, moved by plans
 homing.py                 homing by limit switches
-jogging.py, gripping.py   one joint at a constant speed; the gripper
-board_status.py           what `status` tells besides the position
+jogging.py, gripping.py   one joint at a constant speed; the gripper, whose counts are in gripper_counts.py
+board_status.py           what `status` tells besides the position, and why a board refused, in words
 """

@@ -1,4 +1,4 @@
-"""What `armkin status` tells of a board, besides the position."""
+"""What a board says of itself in words: what `armkin status` tells besides the position, and why a board refused."""
 
 from __future__ import annotations
 
@@ -8,6 +8,23 @@ from armkin.board.firmware.protocol import Error, Flag, Info, State, Status
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
+
+
+WHY = {
+    Error.NO_SESSION: "the board was reset (its button, its power, another program?)",
+    Error.ABORT: "the abort input is active: release it",
+    Error.HELD: "it was told to stop",
+    Error.SILENCE: "nothing was heard from this computer for half a second",
+    Error.DRY: "the line was too slow or too noisy to keep its queue filled",
+    Error.OVERRUN: "a tick came late: lower the speed, and report this as a bug",
+    Error.SWITCH: "the homing switch is stuck, bounces, or needs a longer backoff:",
+    Error.TRAVEL: "no switch was met on the whole way: is it wired, is homing.direction right?",
+    Error.TIME: "homing took too long",
+    Error.LOST: "its position is lost",
+    Error.POWER: "the motors have no power",
+    Error.LIMIT_SWITCH: "a limit switch is pressed: move away from it",
+    Error.SPILL: "more was sent than the board could keep",
+}
 
 
 def told(info: Info, status: Status, configuration: Configuration) -> dict[str, Any]:

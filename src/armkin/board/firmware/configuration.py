@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware import missing_keys
+from armkin.board.firmware.gripper_counts import Grip, as_axis
 from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
 from armkin.board_kinds import BOARDS, DRIVERS, Board, Driver
 from armkin.errors import UsageError
@@ -28,28 +29,6 @@ if TYPE_CHECKING:
 _FAR = 2**30  # counts: an axis without a limit
 _SLACK = 1.05  # of a motor's rate: cycles, rates of 15 bits and parabolas make the end of a ramp that much faster
 _SERVO_RANGE = (400, 2600)  # [us] that the boards can make
-
-
-@dataclass(frozen=True)
-class Grip:
-    """The gripper as an axis."""
-
-    axis: int
-    open: int  # counts
-    closed: int
-    top: float | None  # counts/s, None if the file has no max_speed
-    accel: float | None  # counts/s^2
-    per_unit: float  # counts per degree | mm
-    at_zero: float  # counts where the drive's value is 0
-
-    def count(self, value: float) -> int:
-        """Counts of a value in the drive's degrees (or mm)."""
-        exact = self.at_zero + value * self.per_unit
-        return int(math.copysign(math.floor(abs(exact) + 0.5 + 1e-9), exact))
-
-    def value(self, count: int) -> float:
-        """The drive's degrees (or mm) at a count."""
-        return (count - self.at_zero) / self.per_unit
 
 
 @dataclass(frozen=True)
@@ -99,7 +78,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         board = BOARDS[arm.board.kind]
         names = [*(str(motor.axis) for motor in motors), str(arm.gripper.axis) if arm.gripper is not None else ""]
     axes = tuple(board.axes.index(name) for name in names[:-1])
-    grip = _grip(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
+    grip = as_axis(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
     low, high = _limits(arm)
     home = pulses(arm, arm.home)
@@ -240,27 +219,6 @@ def _rate(board: Board, rate: float) -> int:
 
 def _accel(accel: float) -> int:
     return max(1, min(math.ceil(accel - 1e-9), 2**24 - 1))
-
-
-def _grip(axis: int, gripper: Gripper) -> Grip:
-    """The gripper on an axis."""
-    per_unit, zero = gripper.pulses_per_unit(), 0.0
-    if gripper.kind == "servo" and gripper.travel is not None and gripper.pulse_us is not None:
-        zero = gripper.pulse_us[0] + (gripper.zero - gripper.travel[0]) * per_unit
-        per_unit = -per_unit if gripper.invert else per_unit
-    else:
-        zero = -gripper.open * per_unit  # steps are counted from the open gripper
-    top, accel = gripper.max_speed, gripper.max_accel
-    bare = Grip(
-        axis,
-        0,
-        0,
-        None if top is None else top * abs(per_unit),
-        None if accel is None else accel * abs(per_unit),
-        per_unit,
-        zero,
-    )
-    return Grip(axis, bare.count(gripper.open), bare.count(gripper.closed), bare.top, bare.accel, per_unit, zero)
 
 
 def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:

@@ -8,7 +8,8 @@ from armkin.board.firmware.straight_lines import line
 from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.configuration import Configuration, Grip
+    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.gripper_counts import Grip
     from armkin.board.firmware.machine import Machine
 
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
-from armkin.board.firmware.board_status import told
-from armkin.board.firmware.motion_frame import WHY
+from armkin.board.firmware.board_status import WHY, told
 from armkin.board.firmware.protocol import Error, Flag, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.board_kinds import board_name

@@ -1,27 +1,50 @@
-"""What a MOTION frame carries, and what the board's refusals mean in words."""
+"""A MOTION frame: segments of some axes from counts to counts, and their bytes."""
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Error, Segment
+from armkin.board.firmware.protocol import (
+    GENTLE_PARTS,
+    MOTION_END,
+    MOTION_GENTLE,
+    MOTION_WIDE,
+    Type,
+    mask_of,
+)
+from armkin.board.firmware.segment_format import Segment, pack, segment_size
 
-WHY = {
-    Error.NO_SESSION: "the board was reset (its button, its power, another program?)",
-    Error.ABORT: "the abort input is active: release it",
-    Error.HELD: "it was told to stop",
-    Error.SILENCE: "nothing was heard from this computer for half a second",
-    Error.DRY: "the line was too slow or too noisy to keep its queue filled",
-    Error.OVERRUN: "a tick came late: lower the speed, and report this as a bug",
-    Error.SWITCH: "the homing switch is stuck, bounces, or needs a longer backoff:",
-    Error.TRAVEL: "no switch was met on the whole way: is it wired, is homing.direction right?",
-    Error.TIME: "homing took too long",
-    Error.LOST: "its position is lost",
-    Error.POWER: "the motors have no power",
-    Error.LIMIT_SWITCH: "a limit switch is pressed: move away from it",
-    Error.SPILL: "more was sent than the board could keep",
-}
+
+def motion(
+    tag: int,
+    axes: Sequence[int],
+    start: Sequence[int],
+    end: Sequence[int],
+    segments: Sequence[Segment],
+    *,
+    at_rest: bool,
+    wide: bool = False,
+    brake: float = 1.0,
+) -> bytes:
+    """A batch of motion for `axes` (ascending), from absolute counts to absolute counts.
+
+    The short form if all segments fit it, unless `wide`. brake: share of the accelerations that a hold takes, in
+    eighths.
+    """
+    k = len(axes)
+    wide = wide or not all(segment.narrow for segment in segments)
+    gentle = round((1.0 - brake) * GENTLE_PARTS)
+    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle << MOTION_GENTLE
+    head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, mask_of(axes), flags, len(segments), *start, *end)
+    return head + b"".join(pack(segment, axes, wide=wide) for segment in segments)
+
+
+def motion_size(axes: int, segments: Sequence[Segment]) -> int:
+    """Length of a batch's payload in bytes."""
+    narrow = all(segment.narrow for segment in segments)
+    return 6 + 8 * axes + len(segments) * segment_size(axes, wide=not narrow)
 
 
 @dataclass(frozen=True)
@@ -44,4 +67,4 @@ class Batch:
     def payload(self, tag: int) -> bytes:
         """Its frame."""
         rest, brake = self.at_rest, self.brake
-        return protocol.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
+        return motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)

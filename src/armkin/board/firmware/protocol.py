@@ -8,7 +8,7 @@ Host and simulated board share this module; it knows no port and no motion.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
@@ -29,7 +29,6 @@ from armkin.board.firmware.segment_format import HALF as HALF
 from armkin.board.firmware.segment_format import STEP as STEP
 from armkin.board.firmware.segment_format import Segment as Segment
 from armkin.board.firmware.segment_format import nearest_rate as nearest_rate
-from armkin.board.firmware.segment_format import pack
 from armkin.board.firmware.segment_format import read_segment as read_segment
 from armkin.board.firmware.segment_format import segment_size as segment_size
 from armkin.board.firmware.segment_format import whole as whole
@@ -227,37 +226,7 @@ def enable(tag: int, what: int) -> bytes:
 def set_position(tag: int, counts: dict[int, int]) -> bytes:
     """Says what the counts are: {axis: count}."""
     axes = sorted(counts)
-    return struct.pack(f"<BBH{len(axes)}i", Type.SET_POSITION, tag, _mask(axes), *(counts[i] for i in axes))
-
-
-def motion(
-    tag: int,
-    axes: Sequence[int],
-    start: Sequence[int],
-    end: Sequence[int],
-    segments: Sequence[Segment],
-    *,
-    at_rest: bool,
-    wide: bool = False,
-    brake: float = 1.0,
-) -> bytes:
-    """A batch of motion for `axes` (ascending), from absolute counts to absolute counts.
-
-    The short form if all segments fit it, unless `wide`. brake: share of the accelerations that a hold takes, in
-    eighths.
-    """
-    k = len(axes)
-    wide = wide or not all(segment.narrow for segment in segments)
-    gentle = round((1.0 - brake) * GENTLE_PARTS)
-    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle << MOTION_GENTLE
-    head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, _mask(axes), flags, len(segments), *start, *end)
-    return head + b"".join(pack(segment, axes, wide=wide) for segment in segments)
-
-
-def motion_size(axes: int, segments: Sequence[Segment]) -> int:
-    """Length of a batch's payload in bytes."""
-    narrow = all(segment.narrow for segment in segments)
-    return 6 + 8 * axes + len(segments) * segment_size(axes, wide=not narrow)
+    return struct.pack(f"<BBH{len(axes)}i", Type.SET_POSITION, tag, mask_of(axes), *(counts[i] for i in axes))
 
 
 def home(
@@ -281,7 +250,8 @@ def jog(tag: int, rate: Sequence[int]) -> bytes:
     return struct.pack(f"<BB{len(rate)}i", Type.JOG, tag, *rate)
 
 
-def _mask(axes: Sequence[int]) -> int:
+def mask_of(axes: Iterable[int]) -> int:
+    """Axes as bits."""
     return sum(1 << axis for axis in axes)
 
 

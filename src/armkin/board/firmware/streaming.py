@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.board.firmware import protocol
 from armkin.board.firmware.go_back_n import QUESTION
-from armkin.board.firmware.motion_frame import Batch
+from armkin.board.firmware.motion_frame import Batch, motion_size
 from armkin.board.firmware.protocol import Error, Segment, State, Status
 from armkin.board.firmware.reply_checks import DeviceError
 from armkin.board.firmware.straight_lines import Pieces
@@ -177,7 +177,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         while (
             n < min(most, len(todo))
             and todo[n].narrow == todo[0].narrow
-            and protocol.motion_size(len(moving), todo[: n + 1]) <= room
+            and motion_size(len(moving), todo[: n + 1]) <= room
         ):
             n += 1
         part, todo = todo[:n], todo[n:]

@@ -20,7 +20,8 @@ from armkin.board.firmware.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion.plan import check_limits, check_rates
+from armkin.model.limits import check_limits
+from armkin.motion.plan import check_rates
 from armkin.motion.plan import plan as plan_joints
 from armkin.motion.trajectory import Straight, brake
 from armkin.motors import joints as joints_of

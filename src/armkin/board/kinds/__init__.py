@@ -65,6 +65,8 @@ def _class(kind: str) -> type[Foreign]:
         from armkin.board.kinds.klipper import KlipperBoard
 
         return KlipperBoard
-    from armkin.board.kinds.feetech import ServoBusBoard
+    if kind == "feetech":
+        from armkin.board.kinds.feetech import ServoBusBoard
 
-    return ServoBusBoard
+        return ServoBusBoard
+    raise KeyError(kind)

@@ -1,12 +1,14 @@
 """Bytes to and from a board.
 
 port.py         what every port can do
-serial_port.py  serial ports, and the lock that keeps two programs from one arm
+port_lock.py    the lock that keeps two programs from one arm
+serial_port.py  serial ports
 socket_port.py  the Unix socket of a program on this computer
 """
 
 from armkin.board.ports.port import BAUD, SIM, Port
-from armkin.board.ports.serial_port import Found, SerialPort, holder, holder_rate, list_ports, note_path
+from armkin.board.ports.port_lock import holder, holder_rate, note_path
+from armkin.board.ports.serial_port import Found, SerialPort, list_ports
 from armkin.board.ports.socket_port import SocketPort, is_socket
 
 __all__ = [

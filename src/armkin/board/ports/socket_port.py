@@ -9,7 +9,7 @@ import stat
 import time
 from contextlib import suppress
 
-from armkin.board.ports.serial_port import Lock
+from armkin.board.ports.port_lock import Lock
 from armkin.errors import LinkError
 
 

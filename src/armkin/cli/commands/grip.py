@@ -15,7 +15,7 @@ from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.configuration import Grip
+    from armkin.board.firmware.gripper_counts import Grip
     from armkin.board.kinds import Foreign
     from armkin.cli.answers import Grip as Answer
     from armkin.model.arm import Arm
