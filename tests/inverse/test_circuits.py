@@ -59,3 +59,15 @@ def test_each_circuit_is_listed_once(name: str, surface: str) -> None:
     on = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)
     assert (here | on.any(axis=1)).all(), q[k[~(here | on.any(axis=1))]]
     assert (on.sum(axis=1) <= 1).all(), q[k[on.sum(axis=1) > 1]]
+
+
+def test_circuits_that_nearly_meet_are_two() -> None:
+    """0.06 rad apart where the four bars are nearly in one line: long steps went from one to the other."""
+    arm, screw = shipped("mycobot_280")
+    task, _ = solver(arm, None)
+    q = np.array([[1.172430787496, 0.754675891425, 1.099819728616, 1.789600044792, np.pi / 2, -1.650145814715]])
+    goals = oracle.goal(task, screw, q)
+    s = armkin.ik(arm, goals.array())
+    assert s.free.tolist() == [[False, True, True, True, False, True]]
+    assert leads_to(screw, goals, q, s.q).sum() == 1
+    assert s.valid.sum() == 6  # two circuits with a wrist that is straight, four branches with another shoulder

@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 STEP = 0.2  # [rad, reaches] along the curve
-MOST = 150  # steps
-PASSED = 0.75 * STEP  # joint values this close to a step are on the way
-SHORTEST = 0.02  # of them
+MOST = 250  # steps
+PASSED = 0.15  # of a step: joint values this close to its chord are on the way; a curve is half as far off it
+SHORTEST = 1e-4  # of them
+BEND = 4.0  # steps are at most so many times the second smallest singular value: a curve bends where another is near
 STRAIGHT = 0.8  # cosine between the directions of two steps
 OFF = 1e-6  # residual above which the joints move no farther
-CROSSING = 1e-2  # second smallest singular value below which another curve may cross
+CROSSING = 2e-4  # second smallest singular value below which another curve may cross
 
 
 def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: Bool, target: Array) -> Bool:
@@ -66,22 +67,30 @@ def _walk(
         if not step:
             turned = way * ahead[np.arange(len(active)), np.abs(ahead).argmax(axis=1)]
         good = (size < OFF) & ((np.abs(turned) > STRAIGHT) | (step == 0))
-        at[active[good]] = there[good]
+        before, at[active[good]] = at[active], there[good]
         last[active[good]] = (ahead * np.sign(turned)[:, None])[good]
-        pace[active] = np.where(good, np.minimum(2.0 * pace[active], STEP) if step else STEP, 0.5 * pace[active])
+        longest = np.minimum(STEP, BEND * second)
+        pace[active] = np.minimum(longest, np.where(good, 2.0 * pace[active] if step else STEP, 0.5 * pace[active]))
         stuck = ~good & (pace[active] < SHORTEST)
         unsure = np.zeros(len(q), bool)  # nobody knows where it goes on
         unsure[active] = (second < CROSSING) | (stuck & (size < OFF)) | (step == MOST - 1)
         open_ = np.flatnonzero(~met & going[who])
-        off = np.abs(newton.difference(arm, posture[open_], at[who[open_]])).max(axis=1)
-        met[open_] = (off < PASSED) | unsure[who[open_]]
-        home = np.linalg.norm(newton.difference(arm, at[active], q[active]), axis=1) < PASSED
-        closed[active] = home & good & (step > 2)
+        place = np.searchsorted(active, who[open_])
+        chord = newton.difference(arm, at[active], before)
+        met[open_] = _on_chord(arm, posture[open_], before[place], chord[place]) | unsure[who[open_]]
+        closed[active] = _on_chord(arm, q[active], before, chord) & good & (step > 2)
         more = np.bincount(who[~met], minlength=len(q)) > 0
         going[active] = more[active] & ~closed[active] & ~stuck
         if not going.any():
             break
     return met, closed
+
+
+def _on_chord(arm: Arm, posture: Array, start: Array, chord: Array) -> Bool:
+    """Which postures (M, n) a step along chord (M, n) from start (M, n) passes."""
+    way, size = newton.difference(arm, posture, start), (chord * chord).sum(axis=1)
+    part = np.clip((way * chord).sum(axis=1) / np.maximum(size, 1e-300), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))
 
 
 def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
