@@ -116,18 +116,17 @@ class TwoLink:
     ) -> tuple[Pair, Pair, Doubt]:
         """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,); fore: m, if the target changes it."""
         lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
-        # |r|^2 = |l + Rz(q3) m|^2
-        third, doubt3 = linear(
-            2.0 * (lx * mx + ly * my),
-            2.0 * (ly * mx - lx * my),
-            rx * rx + ry * ry - (lx * lx + ly * ly + mx * mx + my * my),
-            1,
-            self.scale**2,
-            prefer3,
-        )
+        upper2, fore2, across2 = lx * lx + ly * ly, mx * mx + my * my, rx * rx + ry * ry
+        # |r|^2 = |l + Rz(q3) m|^2, halved: the product of both lengths and the cosine of the angle between them
+        ahead, beside, known = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
+        third, doubt3 = linear(ahead, beside, known, 1, self.scale**2, prefer3)
         third = third if self.sense > 0 else Pair(third.c, -third.s)
         ux, uy, _ = self.reach(third, fore)
-        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2)
+        # |l + Rz(q3) m| is the same for both elbows: once for both the pair below is normalised
+        aside = np.maximum(upper2 * fore2 - known * known, 0.0)
+        reached2 = ((upper2 + known) ** 2 + aside) / upper2 if upper2 > 0.0 else None
+        length2 = None if reached2 is None else np.sqrt(reached2 * across2)
+        second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2, length2)
         doubt = doubt2 | doubt3
         return second, third, doubt
 

@@ -166,11 +166,10 @@ class SphericalWrist:
         u = pose.turn(turn5, self.B[6:9])
         fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3], across)
         c4, s4 = fourth
-        # what is left is Rz(q6): its first column
+        # what is left is Rz(q6): its first column, which lies in the plane across joint 6
         back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
-        c6, s6, _ = pose.turn_back(self.B, back)
-        column = pose.turn(turn5, arrays.combine(c6, self.B[0:3], s6, self.B[3:6]))
-        wrong = distance2(spin(c4, s4, u), z) + distance2(spin(c4, s4, column), x)
+        c6, s6, off = pose.turn_back(self.B, back)
+        wrong = distance2(spin(c4, s4, u), z) + off * off
         return fourth, Pair(c6, s6), doubt4, wrong
 
     def _mirrored(

@@ -158,21 +158,23 @@ def rotation_between(
 ) -> tuple[Pair, Doubt]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
-    length2: the squared length that u and v both have if the target is reached, where the
-    caller knows it; the pair of a target that is not is then not normalised.
+    length2: the product of the lengths of u and v, where the caller knows it: of their squares where both are as long
+    if the target is reached; the pair of a target that is not is then not normalised.
     Returns the pair and doubt: where u or v vanishes, so that the angle is free.
     """
+    least = FREE * scale * scale
+    if length2 is not None:
+        free = length2 < least
+        inverse = 1.0 / np.maximum(length2, least)
+        vx, vy = arrays.mul(inverse, vx), arrays.mul(inverse, vy)
     c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
     s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
-    least = FREE * scale * scale
     if length2 is None:
         h2 = arrays.add(arrays.mul(c, c), arrays.mul(s, s))
         free = h2 < least * least
         inverse = 1.0 / np.sqrt(np.maximum(h2, least * least))
-    else:
-        free = length2 < least
-        inverse = 1.0 / np.maximum(length2, least)
-    return _prefer(Pair(c * inverse, s * inverse), free, prefer), Doubt(free, free)
+        c, s = c * inverse, s * inverse
+    return _prefer(Pair(c, s), free, prefer), Doubt(free, free)
 
 
 def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:

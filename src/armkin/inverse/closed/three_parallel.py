@@ -142,6 +142,10 @@ class ThreeParallel:
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
         c23, s23 = together(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
+        # its angle is what is left of the sum: one arctangent for both elbows
+        q2, q3 = (np.arctan2(pair.s, pair.c) for pair in (second, third))
+        left = arrays.wrapped(arrays.sub(np.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
+        angles = [None, q2, q3, arrays.mul(self.sense4, left), None, None]
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
@@ -150,7 +154,7 @@ class ThreeParallel:
         miss = miss * (1.0 / self.reach**2)
         along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         miss = miss + distance2(along, [0.0, 0.0, self.sense4])
-        return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss)
+        return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss, angles)
 
 
 def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
