@@ -11,7 +11,6 @@ from test_every_branch import shipped
 import armkin
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.inverse import chunks
 from armkin.inverse.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.inverse.workers import shared
@@ -22,7 +21,6 @@ from armkin.inverse.workers import shared
     [("three_dof", 9000), ("puma560", 9000), ("stanford", 5000), ("ra02", 5000), ("jaco_j2n6s300", 600)],
 )
 def test_results_do_not_depend_on_the_workers(name: str, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks, "SHARED", 4 * 512)  # shares of a batch that a test has time for
     monkeypatch.setattr(arrays, "CHUNK", 512)
     arm, _ = shipped(name)
     q = np.random.default_rng(11).uniform(-3, 3, (count, arm.n))

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Entry = Any  # float | Array: numpy arithmetic accepts both, and the type checker cannot tell them apart
 
-CHUNK = 4096  # poses worked on at once: long enough to hide the calls, short enough for a core's cache
+CHUNK = 8000  # poses worked on at once: long enough to hide the calls, short enough for a processor's cache
 
 
 def real(values: ArrayLike, what: str) -> Array:

@@ -25,8 +25,6 @@ from armkin.model.limits import SLACK
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SHARED = 8192  # poses of a chunk where threads share a batch: longer calls of numpy wait less for each other
-
 
 class Solved(NamedTuple):
     """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`."""
@@ -58,15 +56,14 @@ def solve(
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
     threads = code is not None and workers > 1
-    size = SHARED if threads else arrays.CHUNK
     limited = bool(on_limit(arm, near if one is None else one).any())
 
     def part(rows: slice) -> list[Doubts]:
         """Some rows, by a thread of its own."""
         workspace: list[NDArray[Any]] = []
         doubts: list[Doubts] = []
-        for start in range(rows.start, rows.stop, size):
-            some = slice(start, min(start + size, rows.stop))
+        for start in range(rows.start, rows.stop, arrays.CHUNK):
+            some = slice(start, min(start + arrays.CHUNK, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
             if task.orientation == "full":
                 goal, rounding[some], columns = read_poses(goal)
@@ -75,7 +72,7 @@ def solve(
             doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close, limited)
         return doubts
 
-    parts = shared(part, N, workers if threads else 1, size, size)
+    parts = shared(part, N, workers if threads else 1, arrays.CHUNK, arrays.CHUNK)
     doubts = [doubt for one_part in parts for doubt in one_part]
     if doubts and examine:
         together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
