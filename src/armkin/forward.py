@@ -57,6 +57,11 @@ def position(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, as_joints(arm, q), (3,), point_formula)
 
 
+def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
+    """`position` in plain Python: takes the n joint values of one pose [rad | mm], returns x, y, z [mm]."""
+    return _recorded(arm, point_formula).always().numbers()
+
+
 def frames(arm: Arm, q: ArrayLike) -> Array:
     """Pose of the base, of every joint's frame and of the tool.
 

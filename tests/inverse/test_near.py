@@ -65,3 +65,52 @@ def test_a_posture_on_its_limit_stays_alone_and_in_a_batch() -> None:
     np.testing.assert_allclose(one.q[one.best], q, atol=1e-12)
     np.testing.assert_allclose(many.q[np.arange(3), many.best], [q] * 3, atol=1e-12)
     assert one.status == Status.EXACT
+
+
+@pytest.mark.parametrize("name", ["yaw_two_link", "three_dof", "ur5e", "puma560", "irb120", "jaco_j2n6s300"])
+def test_a_posture_that_solves_a_rounded_target_stays_beside_singular_ones(name: str) -> None:
+    """There the exact answer may be 1e-6 to 0.5 rad away, though no two branches are close: both solve the target."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(2)
+    q = np.concatenate([rows[:30] for rows in truth.singular_postures(arm, screw, None, 30).values()])
+    q = q + rng.normal(size=q.shape) * 10.0 ** rng.uniform(-9, -2.5, (len(q), 1))
+    q = np.clip(q, arm.lower, arm.upper)  # some have a joint on its limit
+    target = goal(task, screw, q).array()
+    for digits in (9, 10, 12):
+        seen = truth.typed(task, target, digits)
+        verdict = truth.judge(arm, screw, None, q, seen, near=q)
+        assert not verdict.moves, f"{digits} digits: {verdict}"
+        assert not verdict.false, f"{digits} digits: {verdict}"
+
+
+def test_a_posture_that_solves_its_target_is_listed_to_the_bit() -> None:
+    """Alone and in a batch, near home and anywhere, in place of the branch that is a hair away."""
+    arm, screw = shipped("yaw_two_link")
+    task, _ = solver(arm, None)
+    rng = np.random.default_rng(6)
+    q = rng.uniform(-3, 3, (400, arm.n))
+    q[:200, -1] = 10.0 ** rng.uniform(-4, -2, 200)  # all but stretched
+    target = truth.typed(task, goal(task, screw, q).array(), 9)
+    solves = armkin.ik(arm, target, near=q)
+    rows = np.flatnonzero(truth.miss_of(arm, screw, truth.goal_of(task, target), q) < 0.9e-9)
+    assert len(rows) > 200
+    np.testing.assert_array_equal(solves.q[rows, solves.best[rows]], q[rows])
+    assert solves.within_limits[rows, solves.best[rows]].all()
+    for k in rows[::20]:
+        one = armkin.ik(arm, target[k], near=q[k])
+        np.testing.assert_array_equal(one.q[one.best], q[k])
+        same = armkin.ik(arm, target, near=q[k])
+        np.testing.assert_array_equal(same.q[k, same.best[k]], q[k])
+
+
+def test_a_posture_just_beyond_its_limits_is_no_better_than_the_branch_within() -> None:
+    """It solves the target, too; but what is answered has to be within limits."""
+    arm, _ = shipped("irb120")
+    for joint in range(arm.n):
+        q = np.full(arm.n, 0.3)
+        q[joint] = arm.upper[joint]
+        beyond = q + 5e-9 * (np.arange(arm.n) == joint)
+        for near in (beyond, np.stack([beyond] * 3)):
+            s = armkin.ik(arm, np.broadcast_to(armkin.fk(arm, q), (*near.shape[:-1], 4, 4)), near=near)
+            assert (s.best >= 0).all()

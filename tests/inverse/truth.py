@@ -239,7 +239,7 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         solves = miss_of(arm, screw, goals, there) < 0.5 * SOLVES
         legal = ((there >= arm.lower - 1e-9) & (there <= arm.upper + 1e-9)).all(axis=1)
         best = np.take_along_axis(s.q, np.maximum(s.best, 0)[:, None, None], axis=1)[:, 0]
-        stays = (s.best >= 0) & (np.abs((best - there) * unit).max(axis=1) < 1e-6)
+        stays = (s.best >= 0) & (np.abs((best - there) * unit).max(axis=1) < 1e-9)
         verdict.moves = np.flatnonzero(solves & legal & ~stays).tolist()
     return verdict
 

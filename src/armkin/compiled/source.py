@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from armkin.export.c import elimination, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_code import number
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, ON_LIMIT
+from armkin.inverse.near_itself import room
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, THERE
 from armkin.inverse.tasks.task import LARGEST
+from armkin.model.limits import SLACK
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -78,7 +81,13 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         "target": str(program.target_size(task)),
         "goal": str(kernel.goal_size(task)),
         "accepted": number(accepted),
-        "beside": number(ON_LIMIT),
+        "room": number(room(arm)),
+        "close": ", ".join(number(THERE * unit) for unit in radian_or_reach(arm).tolist()),
+        "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
+        "lowest": ", ".join(number(v - SLACK) for v in arm.lower.tolist()),
+        "highest": ", ".join(number(v + SLACK) for v in arm.upper.tolist()),
+        "position": str(task.position),
+        "first": str(9 if task.orientation == "full" else 0),
         "farthest": number(_farthest(arm)),
         "most": ", ".join(most),
         "axis": str(int(task.orientation == "axis")),
@@ -108,19 +117,12 @@ def _fast_numbers() -> str:
 
 
 def _choose(arm: Arm, branches: int) -> str:
-    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits.
-
-    And `arm_on_limit`, whether a posture has a joint on a limit.
-    """
-    loops, ends = [], ["0"]
+    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits."""
+    loops = []
     for j in range(arm.n):
         lower, upper = (number(float(limit[j])) for limit in (arm.lower, arm.upper))
         at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
         close = f"near[{j} * ARM_LANES + i]"
-        if math.isfinite(arm.lower[j]):
-            ends.append(f"near[{j} * ARM_LANES] <= {number(float(arm.lower[j]) + ON_LIMIT)}")
-        if math.isfinite(arm.upper[j]):
-            ends.append(f"near[{j} * ARM_LANES] >= {number(float(arm.upper[j]) - ON_LIMIT)}")
         if arm.prismatic[j]:
             loops.append(_every(f"in[i] &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);"))
             continue
@@ -145,12 +147,6 @@ static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, 
             in[i] = 1;
 {body}
     }}
-}}
-
-static int arm_on_limit(const double *near)
-{{
-    (void)near;
-    return {" || ".join(ends)};
 }}
 """
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import StraightLineCode
+from armkin.inverse import near_itself
 from armkin.inverse.batch import Batch, Goals, empty, pack
-from armkin.inverse.branches.turns import beyond_near, nearest_copy, on_limit
+from armkin.inverse.branches.turns import nearest_copy
 from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import Doubts, decided
@@ -56,7 +57,7 @@ def solve(
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
     threads = code is not None and workers > 1
-    limited = bool(on_limit(arm, near if one is None else one).any())
+    tip = None if one is None else near_itself.tip(arm, one)
 
     def part(rows: slice) -> list[Doubts]:
         """Some rows, by a thread of its own."""
@@ -69,7 +70,9 @@ def solve(
                 goal, rounding[some], columns = read_poses(goal)
             target[some] = goal
             found, workspace = _candidates(runner, code, goal, columns, close, workspace)
-            doubts += _keep(arm, runner.axes or (), out.part(some), found, start, close, limited)
+            there = near_itself.reached(arm, task, goal, near_itself.tip(arm, close) if tip is None else tip)
+            goals = Goals(arm, task, goal, near[some])
+            doubts += _keep(goals, runner.axes or (), out.part(some), found, start, close, there if examine else None)
         return doubts
 
     parts = shared(part, N, workers if threads else 1, arrays.CHUNK, arrays.CHUNK)
@@ -108,9 +111,19 @@ def _candidates(
 
 
 def _keep(
-    arm: Arm, axes: tuple[int, ...], part: Batch, found: list[Array], start: int, near: Array, limited: bool
+    goals: Goals,
+    axes: tuple[int, ...],
+    part: Batch,
+    found: list[Array],
+    start: int,
+    near: Array,
+    there: NDArray[np.intp] | None,
 ) -> list[Doubts]:
-    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge; limited: `on_limit`."""
+    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge.
+
+    there: `near_itself.reached`, if that is asked.
+    """
+    arm = goals.arm
     *values, miss, doubt, free = found
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
@@ -119,8 +132,8 @@ def _keep(
     _fill(arm, part, values, valid.reshape(shape), near)
     full = bool(valid.all())
     doubtful = _doubtful(miss, valid, doubt, full)
-    if limited and (beyond := beyond_near(arm, part.q, part.valid, part.within, near)).any():
-        doubtful = np.union1d(doubtful, np.flatnonzero(beyond))
+    if there is not None and len(there):
+        doubtful = np.union1d(doubtful, near_itself.take(goals, part, there))
     if not full:
         count = valid.sum(axis=0)
         part.status[count == 0] = Status.UNREACHABLE

@@ -17,14 +17,18 @@ from numpy.typing import ArrayLike
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.formula.recording import axes_of
+from armkin.forward import point_numbers
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, ON_LIMIT
+from armkin.inverse.near_itself import room
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, THERE
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
 from armkin.model.arm import actual
+from armkin.model.limits import SLACK
+from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -59,11 +63,9 @@ class OneTarget:
         code = recorded(arm, definition, geometry).code.always()
         self._run, self._off = code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
-        self._limited = [
-            (i, low + ON_LIMIT, high - ON_LIMIT)
-            for i, (low, high, _) in enumerate(self._joints)
-            if math.isfinite(low) or math.isfinite(high)
-        ]
+        self._point, self._home, self._room = point_numbers(arm), arm.home, room(arm)
+        self._home_tip = self._point(*arm.home.tolist())
+        self._close = [THERE * unit for unit in radian_or_reach(arm).tolist()]
         own = [axes_of(x) for x in code.outputs]
         axes = np.broadcast_shapes((1, 1, 1), *own[: arm.n])
         self.count = math.prod(axes)
@@ -109,21 +111,29 @@ class OneTarget:
         there = [b for b, m in enumerate(misses) if m <= ACCEPTED**2]
         if len(there) < self.count and sum(m > NEARBY**2 for m in misses) + len(there) < self.count:
             return None
-        return self._found(kept, near, values, there, off)
+        tip = self._home_tip if near is self._home else self._point(*near.tolist())
+        at_near = math.dist(point, tip[: self.position]) <= self._room
+        return self._found(kept, near, values, there, off, at_near)
 
-    def _beyond(self, near: list[float], legal: list[float], there: list[int], within: list[bool]) -> bool:
-        """`turns.beyond_near` of the branches that are there."""
-        for b, ok in zip(there, within, strict=True):
-            away = [v - c for v, c in zip(self._rows[b](legal), near, strict=False)]
-            beside = all(abs(math.remainder(d, TURN)) < ON_LIMIT for d in away)
-            if beside and not (ok and all(abs(d) < ON_LIMIT for d in away)):
-                return True
-        return False
+    def _stands(self, near: list[float]) -> bool:
+        """Whether `near`, where the tool is at the target, is within limits."""
+        return all(low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(near, self._joints, strict=True))
+
+    def _beside(self, near: list[float], legal: list[float], there: list[int]) -> int | None:
+        """Which of the branches that are there, at their nearest legal copies, is at `near`; None if none is."""
+        for place, b in enumerate(there):
+            ways = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
+            if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= most for v, c, j, most in ways):
+                return place
+        return None
 
     def _found(
-        self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float
+        self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float, at_near: bool
     ) -> Solutions | None:
-        """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be better."""
+        """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be another.
+
+        at_near: whether the tool is at the target where the joints are at `near`.
+        """
         legal: list[float] = []
         inside: list[bool] = []
         where = near.tolist()
@@ -140,10 +150,11 @@ class OneTarget:
             for place, b in enumerate(there):
                 q[place] = self._rows[b](legal)[:-1]
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
-        if any(not low < where[i] < high for i, low, high in self._limited) and self._beyond(
-            where, legal, there, within
-        ):
-            return None
+        if at_near and self._stands(where):
+            own = self._beside(where, legal, there)
+            if own is None:
+                return None
+            q[own], within[own] = near, True
         none = B - count
         block = np.array([
             *[True] * count, *[False] * none, *within, *[False] * none,

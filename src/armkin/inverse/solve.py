@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import chunks, one_target
+from armkin.inverse import chunks, near_itself, one_target
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
-from armkin.inverse.branches.turns import beyond_near, nearest_row
+from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.doubtful import examined
 from armkin.inverse.many_starts import many_starts
@@ -140,7 +140,10 @@ def _rows(
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
     pack(out, count)
-    doubtful = np.flatnonzero(doubt | beyond_near(arm, out.q, out.valid, out.within, near))
+    goals = Goals(arm, task, target, near)
+    if examine:
+        doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, near_itself.tip(arm, near)))] = True
+    doubtful = np.flatnonzero(doubt)
     if examine and len(doubtful):
         solve = geometry.rows
 
@@ -163,7 +166,7 @@ def _rows(
             return found, np.arange(found.shape[1]) % max(B, 1)
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
-        out = examined(Goals(arm, task, target, near), out, doubtful, candidates, others, unsettled)
+        out = examined(goals, out, doubtful, candidates, others, unsettled)
     return out, B
 
 

@@ -2,17 +2,46 @@
    rounding, not finite, too large). */
 enum { ARM_DONE = 0, ARM_OPEN = 1, ARM_UNREAD = 2 };
 
-/* Whether a branch at `near` is outside limits or a whole turn away from there: `near` may solve the target, too. */
-static int arm_beside(const double *q, const double *near, int inside)
+/* Where the tool is at `near`, of count poses whose joint values stand `step` apart; nan where `near` is outside limits.
+   wild: whether an angle is so large that Python has to say. */
+static void arm_stand(const double *near, int64_t step, double *point, int *wild, int count)
 {
-    int j, there = inside;
-    for (j = 0; j < ARM_JOINTS; j++) {
-        const double d = q[j * ARM_LANES] - near[j * ARM_LANES];
-        there &= fabs(d) < @beside@;
-        if (!(fabs(d - ARM_TURN * rint(d / ARM_TURN)) < @beside@)) /* of a slide, too: Python decides */
-            return 0;
+    static const double lowest[ARM_JOINTS] = {@lowest@}, highest[ARM_JOINTS] = {@highest@};
+    double q[ARM_JOINTS * ARM_POINTS];
+    int legal[ARM_POINTS];
+    int i, j;
+    for (i = 0; i < count; i++) {
+        legal[i] = 1;
+        wild[i] = 0;
+        for (j = 0; j < ARM_JOINTS; j++) {
+            const double value = near[i * step + j];
+            q[j * ARM_POINTS + i] = value;
+            legal[i] &= (value >= lowest[j]) & (value <= highest[j]);
+            wild[i] |= !(fabs(value) <= ARM_WILD);
+        }
     }
-    return !there;
+    arm_point(q, point, count);
+    for (i = 0; i < count; i++)
+        if (!legal[i])
+            point[i] = NAN;
+}
+
+/* Which branch is at `near`, modulo whole turns; -1 if none is. */
+static int arm_beside(const double *q, const double *near, const double *miss)
+{
+    static const double close[ARM_JOINTS] = {@close@};
+    static const int slides[ARM_JOINTS] = {@slides@};
+    int b, j;
+    for (b = 0; b < ARM_BRANCHES; b++) {
+        int there = miss[b * ARM_LANES] <= @accepted@;
+        for (j = 0; there && j < ARM_JOINTS; j++) {
+            const double d = q[(b * ARM_JOINTS + j) * ARM_LANES] - near[j * ARM_LANES];
+            there = fabs(slides[j] ? d : d - ARM_TURN * rint(d / ARM_TURN)) <= close[j];
+        }
+        if (there)
+            return b;
+    }
+    return -1;
 }
 
 /* All branches of n targets, in the layout of `armkin.Solutions`; near_step: 0 if one `near` serves all, else the
@@ -22,8 +51,8 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
 {
     double goal[ARM_GOAL * ARM_LANES], close[ARM_JOINTS * ARM_LANES];
     double q[ARM_BRANCHES * ARM_JOINTS * ARM_LANES], miss[ARM_BRANCHES * ARM_LANES];
-    int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES],
-        limit[ARM_LANES];
+    double point[3 * ARM_POINTS];
+    int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES], wild[ARM_POINTS], at_near[ARM_LANES];
     int64_t start, left = 0;
     int i, j, b;
     for (i = 0; i < ARM_LANES; i++)
@@ -36,18 +65,30 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
             for (i = 0; i < count; i++)
                 for (j = 0; j < ARM_JOINTS; j++)
                     close[j * ARM_LANES + i] = near[(start + i) * near_step + j];
-        if (near_step || !start)
-            for (i = 0; i < ARM_LANES; i++)
-                limit[i] = arm_on_limit(close + i);
+        if (near_step)
+            arm_stand(near + start * near_step, near_step, point, wild, count);
+        else if (!start)
+            arm_stand(near, 0, point, wild, n < ARM_LANES ? (int)n : ARM_LANES);
         arm_candidates(goal, close, q, miss, doubt, count);
         arm_choose(close, q, inside, count);
         for (b = 0; b < ARM_BRANCHES; b++)
             for (i = 0; i < count; i++)
                 doubt[i] |= !(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY);
-        for (b = 0; b < ARM_BRANCHES; b++)
-            for (i = 0; i < count; i++)
-                if (limit[i] && !doubt[i])
-                    doubt[i] = arm_beside(q + b * ARM_JOINTS * ARM_LANES + i, close + i, inside[b * ARM_LANES + i]);
+        for (i = 0; i < count; i++) {
+            at_near[i] = 1;
+            for (j = 0; j < @position@; j++) /* where the tool is elsewhere, `near` is no solution */
+                at_near[i] &= fabs(goal[(@first@ + j) * ARM_LANES + i] - point[j * ARM_POINTS + i]) <= @room@;
+            doubt[i] |= wild[i];
+        }
+        for (i = 0; i < count; i++)
+            if (at_near[i] && !doubt[i]) {
+                b = arm_beside(q + i, close + i, miss + i);
+                doubt[i] = b < 0; /* it may solve the target all the same */
+                for (j = 0; b >= 0 && j < ARM_JOINTS; j++)
+                    q[(b * ARM_JOINTS + j) * ARM_LANES + i] = close[j * ARM_LANES + i];
+                if (b >= 0)
+                    inside[b * ARM_LANES + i] = 1;
+            }
         for (i = 0; i < count; i++) {
             const int64_t at = start + i;
             double *row = out_q + at * ARM_BRANCHES * ARM_JOINTS;

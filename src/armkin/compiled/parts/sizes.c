@@ -1,3 +1,4 @@
+enum { ARM_POINTS = ARM_LANES }; /* lanes of `arm_point` */
 #undef ARM_LANES
 #define ARM_LANES @lanes@ /* an elimination takes one pose at a time */
 #define ARM_FARTHEST @farthest@ /* mm: beyond, a target is left to Python first */

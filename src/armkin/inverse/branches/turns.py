@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Entry, wrapped
 from armkin.forward import one_pose
-from armkin.inverse.numeric.tolerances import ON_LIMIT
 from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 
@@ -117,33 +116,6 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
             out[..., i], ok = nearest_copy(principal, near[..., i], lower, upper)
         inside &= ok
     return out, inside
-
-
-def on_limit(arm: Arm, near: Array) -> NDArray[np.bool_]:
-    """Whether postures (..., n) are legal with a joint on a limit: (...)."""
-    on = ((near >= arm.lower - SLACK) & (near <= arm.upper + SLACK)).all(axis=-1)
-    on &= ((near <= arm.lower + ON_LIMIT) | (near >= arm.upper - ON_LIMIT)).any(axis=-1)
-    return np.asarray(on)
-
-
-def beyond_near(
-    arm: Arm, q: Array, valid: NDArray[np.bool_], within: NDArray[np.bool_], near: Array
-) -> NDArray[np.bool_]:
-    """Targets of which the branch at `near` is just outside limits, or a whole turn away from there: (N,).
-
-    A posture on a limit, its target rounded: the exact answer may lie beyond, and `near` solves the target, too.
-    q: (N, B, n) at the nearest legal copies; valid, within: (N, B); near: (n,) or (N, n).
-    """
-    on = on_limit(arm, near)
-    out = np.zeros(len(q), bool)
-    if on.any():
-        rows = np.flatnonzero(on & valid.any(axis=1))
-        away = q[rows] - (near if near.ndim == 1 else near[rows, None])
-        with np.errstate(invalid="ignore"):
-            there = within[rows] & (np.abs(away).max(axis=2) < ON_LIMIT)
-            beside = np.abs(np.where(arm.prismatic, away, wrapped(away))).max(axis=2) < ON_LIMIT
-        out[rows] = (beside & valid[rows] & ~there).any(axis=1)
-    return out
 
 
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:

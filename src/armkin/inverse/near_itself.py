@@ -1,0 +1,81 @@
+"""`near` itself: where it is within limits and solves its target, it is a branch, and the best one.
+
+The exact answer to a rounded target may be 1e-9 over the smallest singular value away from the posture that the target
+was made from. Both solve it: the arm that stands there stays.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.forward import position
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import HAIR, SOLUTION, THERE
+from armkin.model import limits
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.inverse.batch import Batch, Goals
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+AT_ONCE = 4096  # targets whose branches are compared with `near` together
+
+
+def room(arm: Arm) -> float:
+    """How far the tool may be from a target [mm] that `near` might solve: twice the tolerance, for rounding."""
+    return 2.0 * SOLUTION * arm.reach
+
+
+def tip(arm: Arm, near: Array) -> Array:
+    """Where the tool is at `near`, (n,) or (N, n): (3,) or (N, 3) [mm]."""
+    return position(arm, near)
+
+
+def reached(arm: Arm, task: Task, target: Array, tip: Array) -> NDArray[np.intp]:
+    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`; tip: (3,) or (N, 3)."""
+    point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+    most = room(arm)
+    rows = np.flatnonzero(np.abs(point[:, 0] - tip[..., 0]) <= most)  # one coordinate tells nearly all others
+    if len(rows):
+        away = point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]
+        rows = rows[(np.abs(away) <= most).all(axis=1)]
+    return rows
+
+
+def take(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
+
+    goals, out: N targets and their branches; rows: those of `reached`. Two are one if the posture between them solves
+    the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
+    """
+    left = [_taken(goals, out, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
+    return np.concatenate(left) if left else rows
+
+
+def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    arm, task = goals.arm, goals.task
+    rows = rows[~limits.outside(arm, goals.near[rows]).any(axis=1)]
+    if not len(rows):
+        return rows
+    near, target = goals.near[rows], goals.target[rows]
+    away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
+    away = np.where(out.valid[rows], away, np.inf)
+    place = away.argmin(axis=1)
+    least = away.min(axis=1)
+    stays, solves = least <= THERE, np.ones(len(rows), bool)
+    some = np.flatnonzero(~stays)
+    if len(some):
+        solves[some] = newton.missing(arm, task, near[some], target[some]) <= SOLUTION
+        some = some[solves[some] & ((away[some] < HAIR).sum(axis=1) == 1)]
+        way = newton.difference(arm, out.q[rows[some], place[some]], near[some])
+        between = near[some] + 0.5 * way * radian_or_reach(arm)
+        stays[some] = newton.missing(arm, task, between, target[some]) <= SOLUTION
+    out.q[rows[stays], place[stays]] = near[stays]
+    out.within[rows[stays], place[stays]] = True
+    left: NDArray[np.intp] = rows[solves & ~stays]
+    return left
