@@ -239,3 +239,26 @@ def test_a_posture_on_its_limit_stays() -> None:
         found = fast.ik(target, near=q)
         same(found, armkin.ik(arm, target, near=q))
         assert np.abs(found.q.reshape(-1, 8, 6)[0, np.ravel(found.best)[0]] - q).max() < 1e-12
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "puma560", "ur5e", "jaco_j2n6s300"])
+def test_a_posture_that_solves_its_target_is_listed_to_the_bit(robot: str) -> None:
+    """Beside singular postures, where the exact answer to a rounded target is elsewhere; alone and as a batch."""
+    arm = armkin.load(ROBOTS / f"{robot}.yaml")
+    fast = armkin.compile(arm)
+    q = np.random.default_rng(3).uniform(-1.5, 1.5, (24, arm.n))
+    q[:, -2] = 10.0 ** np.linspace(-9, -2, 24)
+    q = np.clip(q, arm.lower, arm.upper)
+    task, _ = solver(arm, None)
+    exact = targets_of(task, armkin.fk(arm, q), q)
+    rounded = exact.copy()
+    rounded[..., :3, -1] = np.round(exact[..., :3, -1], 7)
+    for target in (exact, rounded):
+        many = fast.ik(target, near=q)
+        np.testing.assert_array_equal(many.q[np.arange(24), many.best], q)
+        for k in range(0, 24, 3):
+            one, slow = fast.ik(target[k], near=q[k]), armkin.ik(arm, target[k], near=q[k])
+            np.testing.assert_array_equal(one.q[one.best], q[k])
+            np.testing.assert_array_equal(slow.q[slow.best], q[k])
+            all_near_one = fast.ik(target, near=q[k])
+            np.testing.assert_array_equal(all_near_one.q[k, all_near_one.best[k]], q[k])
