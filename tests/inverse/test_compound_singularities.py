@@ -54,6 +54,29 @@ def test_compound_singularities(name: str, q: list[float]) -> None:
         assert verdict, verdict
 
 
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        # a short step is drawn back into the corner, and ends 1e-4 rad beside it in joints that do not move
+        ("thor", [180, 90, 180, -90, 180, -90]),
+        ("ar4", [-90, 0, 90, 180, 180, 180]),
+        ("fanuc_crx10ia", [0, 0, -90, 0, 0, 0]),
+        ("ur10e", [180, 90, 0, 90, 0, -90]),
+        ("ur3e", [90, -90, 180, 90, 180, 0]),
+        # a self-motion of roots of high order, which are 3e-5 rad off
+        ("thor", [90, 0, 180, 0, 90, 0]),
+    ],
+)
+def test_joints_called_free_do_move(name: str, q: list[float]) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    target = goal(task, screw, np.radians([q])).array()
+    s = armkin.ik(arm, target)
+    assert s.status == Status.SINGULAR
+    assert s.free.any()
+    assert truth.idle(screw, s, target) == []
+
+
 @pytest.mark.parametrize("q", [[0, -90, 0, -90, 0, 90], [180, 180, 0, 180, 180, 180], [-90, -90, 0, 0, 180, -90]])
 def test_compound_singularities_of_a_ur5e(q: list[float]) -> None:
     arm = shipped("ur5e")[0]

@@ -315,6 +315,37 @@ def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
     return q
 
 
+def movable(screw: Screws, goals: Goal, q: Array, joint: int, way: float = 0.1) -> Bool:
+    """Whether postures (M, n) of the same targets exist with this joint moved by `way`, the others by up to a radian.
+
+    The joint is held there, the others go by Newton steps of least norm: (M,).
+    """
+    unit = np.where(screw.prismatic, screw.size, 1.0)
+    others = unit * (np.arange(q.shape[1]) != joint)
+    there = q + way * (unit - others)
+    for _ in range(60):
+        r, J = oracle._residual(screw, goals, there)
+        U, S, Vt = np.linalg.svd(J * others, full_matrices=False)
+        gain = np.where(S > 1e-5, 1 / np.maximum(S, 1e-5), 0.0)
+        step = np.einsum("mki,mk,mrk,mr->mi", Vt, gain, U, r, optimize=True)
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        there = there + others * step
+    size = np.linalg.norm(oracle._residual(screw, goals, there)[0], axis=1)
+    return np.asarray((size < 1e-10) & (np.abs((there - q) / unit).max(axis=1) < 1.0))
+
+
+def idle(screw: Screws, solutions: Any, target: Array) -> list[tuple[int, int]]:
+    """Rows and joints that are called free, but of which no branch's self-motion moves the joint, either way."""
+    goals, out = goal_of(solutions.task, target), []
+    for row in np.flatnonzero(solutions.free.any(axis=1)):
+        q = solutions.q[row][solutions.valid[row]]
+        one = goals.take(np.full(len(q), row))
+        for joint in np.flatnonzero(solutions.free[row]):
+            if not any(movable(screw, one, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
+                out.append((int(row), int(joint)))
+    return out
+
+
 def ask_oracle(
     arm: Arm, screw: Screws, verdict: Verdict, target: Array, rows: NDArray[np.int64], starts: int, seed: int
 ) -> None:

@@ -255,7 +255,7 @@ def _one_way(arm: Arm, task: Task, q: Array, fold: Folds, target: Array) -> tupl
     short, long = _slow(left.max(axis=1) - fold.miss) & _apart(whole, v)
     known = there[0] & (~short | there[1])
     moving = short & ((left[0].max(axis=0) - fold.miss <= NO_GROWTH) | long)
-    return known, known & moving, (known & moving)[:, None] & _moved(whole)
+    return known, known & moving, (known & moving)[:, None] & _moved(whole, long)
 
 
 def _slow(grown: Array) -> Bool:
@@ -270,9 +270,14 @@ def _apart(away: Array, push: Array) -> Bool:
     return np.asarray(far & (np.abs(away[:, 0] - away[:, 1]).max(axis=2) > 0.3 * least))
 
 
-def _moved(away: Array) -> Bool:
-    """Joints (M, n) that move at all on one of these ways (2, 2, M, n)."""
-    return np.asarray((np.abs(away) > 1e-3 * STEP).any(axis=(0, 1)))
+def _moved(away: Array, long: Bool) -> Bool:
+    """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
+
+    Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back into a corner ends anywhere
+    nearby: neither is motion of a joint.
+    """
+    far = (np.abs(away) > np.array([10 * TURNED, 1e-3 * 10 * STEP])[:, None, None, None]).any(axis=1)
+    return np.asarray(np.where(long[:, None], far[1], far[0]))
 
 
 def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
@@ -305,7 +310,7 @@ def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Ar
     # radian costs nothing
     along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & several)
     np.logical_or.at(moving, who, along)
-    np.logical_or.at(joints, who, along[:, None] & _moved(away))
+    np.logical_or.at(joints, who, along[:, None] & _moved(away, long))
     return moving, joints
 
 
