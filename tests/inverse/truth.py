@@ -340,7 +340,7 @@ def idle(screw: Screws, solutions: Any, target: Array) -> list[tuple[int, int]]:
     for row in np.flatnonzero(solutions.free.any(axis=1)):
         q = solutions.q[row][solutions.valid[row]]
         one = goals.take(np.full(len(q), row))
-        for joint in np.flatnonzero(solutions.free[row]):
+        for joint in np.flatnonzero(solutions.free[row]).tolist():
             if not any(movable(screw, one, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
                 out.append((int(row), int(joint)))
     return out

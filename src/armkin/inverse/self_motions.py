@@ -276,8 +276,8 @@ def _moved(away: Array, long: Bool) -> Bool:
     Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back into a corner ends anywhere
     nearby: neither is motion of a joint.
     """
-    far = (np.abs(away) > np.array([10 * TURNED, 1e-3 * 10 * STEP])[:, None, None, None]).any(axis=1)
-    return np.asarray(np.where(long[:, None], far[1], far[0]))
+    most = np.abs(away).max(axis=1)
+    return np.asarray(np.where(long[:, None], most[1] > 1e-3 * 10 * STEP, most[0] > 10 * TURNED))
 
 
 def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
