@@ -63,6 +63,9 @@ def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]
     if not len(rows):
         return rows
     near, target = goals.near[rows], goals.target[rows]
+    if not out.valid.shape[1]:  # an elimination that found nothing at all
+        alone: NDArray[np.intp] = rows[newton.missing(arm, task, near, target) <= SOLUTION]
+        return alone
     away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
     away = np.where(out.valid[rows], away, np.inf)
     place = away.argmin(axis=1)
