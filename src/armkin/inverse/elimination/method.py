@@ -50,8 +50,8 @@ from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
 
-CHUNK = 256  # poses worked on at once: more of them leave the cache
-BLOCK = 16384  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
+CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13 MB
+BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
