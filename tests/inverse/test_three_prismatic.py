@@ -55,8 +55,29 @@ def test_a_wrist_in_line_is_a_self_motion(pattern: str, axes: str, turning: str)
             assert verdict, verdict
             s = verdict.solutions
             assert (s.status == Status.SINGULAR).all()
+            assert s.complete.all() == (pattern != "RPRPRP")
             joints = [name in turning.split() for name in arm.joint_names]
             assert (s.free[:, ~arm.prismatic] == np.array(joints)[~arm.prismatic]).all()
+
+
+@pytest.mark.parametrize("seed", [7, 18, 52, 67, 75])
+def test_what_only_some_values_of_a_free_joint_reach_is_found(seed: int) -> None:
+    """Axes 1 and 3 parallel, or two orientations in one, and slides in one plane: up to 16 of 36 were unreachable.
+
+    Such answers are not called complete; those of arms whose slides turn together are.
+    """
+    rng = np.random.default_rng([78, seed])
+    pattern = "".join(rng.permutation(list("RRRPPP")))
+    axes = [np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0]) for _ in range(6)]
+    points = [rng.choice([0.0, 0.0, 100.0, 200.0, -150.0], 3) for _ in range(6)]
+    arm, screw, _ = case(spatial(rng, pattern, axes, points), "pose")
+    definition, _ = solver(arm, "pose")
+    q = truth.round_postures(arm, 90, 8, seed=seed)
+    target = goal(definition, screw, q).array()
+    for near in (None, q):
+        verdict = truth.judge(arm, screw, "pose", q, target, near)
+        assert verdict, verdict
+    assert not verdict.solutions.complete.all()
 
 
 @pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])

@@ -236,8 +236,8 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
     goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
     if not elimination.plans:
-        answers, touching = _slides(closed, goal)
-        settled, shaken = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        answers, touching, settled = _slides(closed, goal)
+        shaken = ~settled
         near = _none()
     else:
         answers, near, touching, settled, shaken = _passes(elimination, goal)
@@ -342,20 +342,21 @@ def _shaken(goal: Array, size: float) -> Array:
     return np.asarray(move @ goal)
 
 
-def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool]:
-    """Both answers of a chain with three prismatic joints."""
-    found, touching = [_none()], np.zeros(goal.shape[0], dtype=np.bool_)
+def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
+    """Both answers of a chain with three prismatic joints; and whether roots touch, and whether they are all, (N,)."""
+    found, touching, all_ = [_none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
     if np.sum(closed.prismatic) > 3:
-        return found[0], touching
+        return found[0], touching, all_
     for begin in range(0, goal.shape[0], CHUNK):
         part = goal[begin : begin + CHUNK]
-        q = three_prismatic.branches(closed.chain, closed.prismatic, part).reshape(-1, 6)
+        q, all_[begin : begin + CHUNK] = three_prismatic.branches(closed.chain, closed.prismatic, part)
+        q = q.reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
         good = done.residual < GRAZING
         touching[begin + pose[good & (done.residual > ELIMINATED)]] = True
         found.append(_answers(closed, begin + pose, done, good))
-    return concatenate(found), touching
+    return concatenate(found), touching, all_
 
 
 def _answers(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:

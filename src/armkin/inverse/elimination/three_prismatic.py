@@ -24,15 +24,19 @@ from armkin.inverse.elimination.line_features import joint_motion
 
 PARALLEL = 1e-12  # sine between axes 1 and 3 below which joint 1 is free
 FREE = 0.7321  # [rad] its value there
+OTHERS = (0.0, 1.3, 2.9)  # [rad] values of it at which the slides' directions are compared, beside that one
 COPLANAR = 1e-12  # smallest singular value of the slides' directions below which they are coplanar
+MERGED = 3e-15  # square of the sine of half the angle between the two values of q2 below which they are one
+NEARLY = 1e-5  # smallest singular value and sine below which both happen at once, as far as arithmetic can tell
 
 
-def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
+def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     """Both solutions (N, 2, 6) of a chain (7, 4, 4) with three prismatic joints for goals (N, 4, 4).
 
-    Unreachable orientations give the nearest value of q2; the caller checks the pose.
+    Unreachable orientations give the nearest value of q2; the caller checks the pose. Also whether they are all, (N,):
+    not where joint 1 is free and the slides' directions turn with it, so that only some of its values may reach the
+    goal, nor where the two values of q2 are one and these directions coplanar.
     """
-    turning, sliding = np.flatnonzero(~prismatic), np.flatnonzero(prismatic)
     A = [np.eye(3)]
     for i in range(6):
         A[-1] = A[-1] @ chain[i, :3, :3]
@@ -44,15 +48,33 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
     even, odd = u[0] * v[0] + u[1] * v[1], u[1] * v[0] - u[0] * v[1]
     off = np.hypot(B[:, 0, 2], B[:, 1, 2])
     one, other = off * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
-    half = np.arctan2(np.sqrt(np.maximum((one - other) * (one + other), 0.0)), B[:, 2, 2] - u[2] * v[2])
+    square = (one - other) * (one + other)
+    free = off < PARALLEL
+    square[(square < MERGED) & ~free] = 0.0
+    half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
     middle = A[1] @ _turns(q2)[..., :3, :3] @ A[2]
     q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(middle[..., 1, 2], middle[..., 0, 2])
-    q1[off < PARALLEL] = FREE
-    last = np.swapaxes(_turns(q1)[..., :3, :3] @ middle, -1, -2) @ B[:, None]
-    q3 = np.arctan2(last[..., 1, 0] - last[..., 0, 1], last[..., 0, 0] + last[..., 1, 1])
-    q = np.zeros((goal.shape[0], 2, 6))
-    q[..., turning] = np.stack([q1, q2, q3], axis=-1)
+    q1[free] = FREE
+
+    def whole(q1: Array, rows: Bool) -> tuple[Array, Array]:
+        """Solutions (K, 2, 6) of some goals for values of q1 (K, 2), and the weakest of the slides' directions (K,)."""
+        last = np.swapaxes(_turns(q1)[..., :3, :3] @ middle[rows], -1, -2) @ B[rows, None]
+        q3 = np.arctan2(last[..., 1, 0] - last[..., 0, 1], last[..., 0, 0] + last[..., 1, 1])
+        return _with_slides(chain, prismatic, np.stack([q1, q2[rows], q3], axis=-1), goal[rows])
+
+    q, weakest = whole(q1, np.ones(len(goal), bool))
+    sure = ~((square < NEARLY**2) & (weakest < NEARLY)) | free
+    sure[free] = weakest[free] > NEARLY
+    for value in OTHERS if free.any() else ():
+        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < NEARLY
+    return q, sure
+
+
+def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> tuple[Array, Array]:
+    """Joint values (N, 2, 6) from those that turn (N, 2, 3), and the slides' smallest singular value (N,)."""
+    q = np.zeros((*turned.shape[:2], 6))
+    q[..., ~prismatic] = turned
     frame = np.broadcast_to(chain[0], (*q.shape[:2], 4, 4))
     axes = []
     for i in range(6):
@@ -66,8 +88,8 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> Array:
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
     ahead = np.swapaxes(U, -1, -2) @ rest[..., None]
     moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > COPLANAR)
-    q[..., sliding] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
-    return q
+    q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
+    return q, S[..., -1].min(axis=1)
 
 
 def _turns(q: Array) -> Array:
