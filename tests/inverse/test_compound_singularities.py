@@ -244,3 +244,21 @@ def test_points_in_a_curved_valley_are_one_branch(name: str | int, q: list[float
         verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array(), near)
         assert verdict, verdict
         assert verdict.solutions.valid.sum() == count
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        [-90, -90, 0, 180, 90, 180],  # joint 2 is free where joint 3 is a double root, which rounding parts by 1e-8
+        [0, -90, 0, 180, 90, 180],  # eight places where self-motions meet, each found four times
+        [-90, 90, 0, -90, 0, -90],  # the wrist is in line at a round value of joint 2
+        [0, 135, 0, 45, -90, 135],  # where it is, the second singular value rises unevenly
+    ],
+)
+def test_a_wrist_is_in_line_somewhere_on_a_self_motion_of_the_shoulder(q: list[float]) -> None:
+    arm, screw, *_ = case(right_angles(np.random.default_rng(1089)), "pose")
+    task, geometry = solver(arm, "pose")
+    assert geometry.name == "spherical wrist"
+    joints = np.radians([q])
+    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    assert verdict, verdict

@@ -15,7 +15,7 @@ from armkin.formula.trace import LazyCode
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import HOPELESS, SEED
+from armkin.inverse.numeric.tolerances import HOPELESS, SAME, SEED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 
 FREED = 24  # values tried for joints that a target leaves free
+BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
 SHAKEN, SHAKE = 8, 1e-4  # moves of a target to where nothing is free, and their size [reaches, rad]
 MEETING = 0.1  # second smallest singular value, at values tried, from which on no two self-motions meet near there
-MEETINGS = 6  # such places looked at for each target
+MEETINGS = 12  # such places looked at for each target
 AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
 
 
@@ -70,7 +71,9 @@ class Recorded:
         rng = np.random.default_rng(4)
         N, n = len(target), self.arm.n
         unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
-        offsets = np.repeat(np.linspace(-1.0, 1.0, FREED, endpoint=False)[:, None], n, axis=1) * unit
+        # beside round values: where a wrist is straight its joints are free, too, and jump to what is preferred
+        steps = (np.arange(FREED) + BESIDE_ROUND) * 2.0 / FREED - 1.0
+        offsets = np.repeat(steps[:, None], n, axis=1) * unit
         if lost.any():  # else what follows the first ones would be dropped
             offsets = np.concatenate([offsets, rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
         goals = np.repeat(target[:, None], len(offsets), axis=1)
@@ -107,7 +110,10 @@ class Recorded:
         before, after = np.roll(second, 1, axis=1), np.roll(second, -1, axis=1)
         near, far = np.minimum(before, after), np.maximum(before, after)
         with np.errstate(invalid="ignore"):  # a zero in between: |x| falls as fast on one side as it rises on the other
-            least = (second <= before) & (second < after) & (second < MEETING) & (near + second < 1.7 * (far - second))
+            least = (second <= before) & (second < after) & (second < MEETING) & (near + second < 3.0 * (far - second))
+        for b in range(1, B):  # double roots are there twice
+            twin = np.abs(newton.difference(self.arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
+            least[:, :, b] &= ~twin.any(axis=2)
         lowest = np.argsort(np.where(least, second, np.inf).reshape(N, -1), axis=1)[:, :MEETINGS]
         at = np.take_along_axis(q.reshape(N, -1, n), lowest[:, :, None], axis=1).reshape(-1, n)
         at[~np.take_along_axis(least.reshape(N, -1), lowest, axis=1).ravel()] = np.nan

@@ -36,7 +36,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import EXACT, NEAR
+from armkin.inverse.numeric.tolerances import EXACT, NEAR, ONE_ROOT
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
@@ -191,7 +191,12 @@ class Position:
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
-            third, doubt = linear(alone[1], alone[2], arrays.mul(-1.0, alone[0]), 0, size, prefer[2])
+            a, b, c = alone[1], alone[2], arrays.mul(-1.0, alone[0])
+            h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
+            disc = h2 - c * c
+            # rounding parts a double root by 1e-8; where the tip is then on axis 2, joint 2 must be seen to be free
+            disc = np.where(np.abs(disc) < ONE_ROOT * h2, 0.0, disc)
+            third, doubt = linear(a, b, c, 0, size, prefer[2], disc)
             third = normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, known)

@@ -27,6 +27,7 @@ CLUSTER = 0.02  # candidates this close may be one root of third or fourth order
 # ---- closed forms, relative to the equation's own size
 TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
 SHARP = 1e-15  # the same of a wrist of right angles, whose two roots differ by half a turn of its neighbours
+ONE_ROOT = 1e-14  # discriminant below which the middle of two roots misses by less than rounding does
 FREE = 1e-18  # squared amplitude below which an equation says nothing about its angle
 TOUCHING = 1e-4  # complex roots this close to the real line may be a double root seen through rounding
 
