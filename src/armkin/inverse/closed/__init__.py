@@ -3,6 +3,7 @@
 geometry.py        what a class provides
 subproblems.py     the equations of the closed forms
 candidates.py      a class's candidates with their residuals, from recorded code
+crossings.py       where a self-motion of a class meets another one
 
 planar.py          all joints in the base's x-y plane, and SCARAs
 elbow.py           joints 2 and 3 (and 4) parallel: positions, with pitch, with pitch and roll

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import LazyCode
+from armkin.inverse.closed import crossings
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
-from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import HOPELESS, SAME, SEED
+from armkin.inverse.numeric.tolerances import HOPELESS, SEED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 FREED = 24  # values tried for joints that a target leaves free
 BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
 SHAKEN, SHAKE = 8, 1e-4  # moves of a target to where nothing is free, and their size [reaches, rad]
-MEETING = 0.1  # second smallest singular value, at values tried, from which on no two self-motions meet near there
-MEETINGS = 12  # such places looked at for each target
-AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
 
 
 class Recorded:
@@ -88,43 +85,10 @@ class Recorded:
         q, miss = rows[:, :, :n], rows[:, :, n]
         q = np.where((miss < HOPELESS**2)[:, :, None], q, np.nan)
         on = np.where((miss < SEED**2)[:, :, None], q, np.nan)[:, : FREED * B].reshape(N, FREED, B, n)
-        meeting = self._crossings(on, target)
+        meeting = crossings.beside(self.arm, self.task, on, target)
         q[~lost] = np.nan
         branch = np.concatenate([np.tile(np.arange(B), len(offsets)), np.arange(meeting.shape[1]) % B])
         return np.concatenate([q, meeting], axis=1), branch
-
-    def _crossings(self, q: Array, target: Array) -> Array:
-        """Postures (N, M, n) beside those at which another self-motion leaves that of q (N, FREED, B, n), all round.
-
-        There the second smallest singular value vanishes; a step off, in the plane of the two null directions, leads
-        onto the other one.
-        """
-        N, steps, B, n = q.shape
-        flat = q.reshape(-1, n)
-        some = np.flatnonzero(~np.isnan(flat).any(axis=1))
-        size = np.full(len(flat), np.inf)
-        _, J = newton.scaled(self.arm, self.task, flat[some], np.repeat(target, steps * B, axis=0)[some])
-        rank = min(self.task.constraints, n)
-        size[some] = np.linalg.svd(J, compute_uv=False)[:, rank - 2]
-        second = size.reshape(N, steps, B)
-        before, after = np.roll(second, 1, axis=1), np.roll(second, -1, axis=1)
-        near, far = np.minimum(before, after), np.maximum(before, after)
-        with np.errstate(invalid="ignore"):  # a zero in between: |x| falls as fast on one side as it rises on the other
-            least = (second <= before) & (second < after) & (second < MEETING) & (near + second < 3.0 * (far - second))
-        for b in range(1, B):  # double roots are there twice
-            twin = np.abs(newton.difference(self.arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
-            least[:, :, b] &= ~twin.any(axis=2)
-        lowest = np.argsort(np.where(least, second, np.inf).reshape(N, -1), axis=1)[:, :MEETINGS]
-        at = np.take_along_axis(q.reshape(N, -1, n), lowest[:, :, None], axis=1).reshape(-1, n)
-        at[~np.take_along_axis(least.reshape(N, -1), lowest, axis=1).ravel()] = np.nan
-        out = np.full((len(at), 8, n), np.nan)
-        some = np.flatnonzero(~np.isnan(at).any(axis=1))
-        _, V, _ = newton.null_space(self.arm, self.task, at[some], np.repeat(target, MEETINGS, axis=0)[some])
-        u, v = V[:, rank - 1], V[:, rank - 2]
-        ways = np.stack([u, v, (u + v) / 2**0.5, (u - v) / 2**0.5], axis=1)
-        unit = np.where(self.arm.prismatic, self.arm.reach, 1.0)
-        out[some] = at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)
-        return out.reshape(N, -1, n)
 
 
 def preferred(arm: Arm, near: Array) -> list[Pair]:

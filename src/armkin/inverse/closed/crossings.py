@@ -1,0 +1,93 @@
+"""Crossings: places of a self-motion at which another one leaves it.
+
+There the second smallest singular value vanishes. In between the steps of a walk along the self-motion it is seen to
+fall and rise, or, of square Jacobians, the product of all but the smallest one to change its sign: the determinant of
+the Jacobian bordered by its null vectors (Keller, Numerical solution of bifurcation problems, 1977).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import SAME
+from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near there
+MOST = 12  # places looked at for each target
+AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
+STEP = 1.0  # [rad, reaches] joints that move farther from one step to the next are not on one curve
+
+
+def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Postures (N, M, n) beside the crossings of B self-motions, q (N, steps, B, n) all round; nan where there is none.
+
+    A step off, in the plane of the two null directions, leads onto the other self-motion.
+    """
+    N, steps, B, n = q.shape
+    flat = q.reshape(-1, n)
+    some = np.flatnonzero(~np.isnan(flat).any(axis=1))
+    _, J = newton.scaled(arm, task, flat[some], np.repeat(target, steps * B, axis=0)[some])
+    rank = min(task.constraints, n)
+    U, S, V = np.linalg.svd(J)
+    size = np.full(len(flat), np.inf)
+    size[some] = S[:, rank - 2]
+    second, place, unit = size.reshape(N, steps, B), q.copy(), radian_or_reach(arm)
+    found = _least(second)
+    if J.shape[1] == n == rank:
+        bordered = np.full((len(flat), 2 * n + 1), np.nan)
+        product = np.linalg.det(U) * np.linalg.det(V) * S[:, :-1].prod(axis=1)
+        bordered[some] = np.concatenate([product[:, None], U[:, :, -1], V[:, -1]], axis=1)
+        way, share = _change(arm, q, bordered.reshape(N, steps, B, -1))
+        changes = ~np.isnan(share) & ~found
+        place[changes] += share[changes][:, None] * way[changes] * unit
+        found |= changes
+    for b in range(1, B):  # double roots are there twice
+        with np.errstate(invalid="ignore"):
+            twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
+        found[:, :, b] &= ~twin.any(axis=2)
+    lowest = np.argsort(np.where(found, second, np.inf).reshape(N, -1), axis=1)[:, :MOST]
+    at = np.take_along_axis(place.reshape(N, -1, n), lowest[:, :, None], axis=1)
+    at = np.where(np.take_along_axis(found.reshape(N, -1), lowest, axis=1)[:, :, None], at, np.nan).reshape(-1, n)
+    out = np.full((len(at), 8, n), np.nan)
+    some = np.flatnonzero(~np.isnan(at).any(axis=1))
+    _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, lowest.shape[1], axis=0)[some])
+    one, other = V[:, rank - 1], V[:, rank - 2]
+    ways = np.stack([one, other, (one + other) / 2**0.5, (one - other) / 2**0.5], axis=1)
+    out[some] = at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)
+    return out.reshape(N, -1, n)
+
+
+def _least(second: Array) -> Bool:
+    """Steps (N, steps, B) nearest to a zero of the second smallest singular value."""
+    before, after = np.roll(second, 1, axis=1), np.roll(second, -1, axis=1)
+    near, far = np.minimum(before, after), np.maximum(before, after)
+    with np.errstate(invalid="ignore"):  # a zero in between: |x| falls as fast on one side as it rises on the other
+        falls = (second <= before) & (second < after) & (near + second < 3.0 * (far - second))
+    return np.asarray(falls & (second < MEETING))
+
+
+def _change(arm: Arm, q: Array, bordered: Array) -> tuple[Array, Array]:
+    """The way to the next step (N, steps, B, n), and the share of it after which the product changes its sign.
+
+    bordered: (N, steps, B, 1 + 2 n) the product and the null vectors, left and right, whose own signs mean nothing: one
+    that turns round turns the product's. The share is nan where the sign stays, or no posture of the next step is near.
+    """
+    n = q.shape[3]
+    ways = newton.difference(arm, np.roll(q, -1, axis=1)[:, :, None], q[:, :, :, None])  # (N, steps, B, B, n)
+    far = np.nan_to_num(np.abs(ways).max(axis=4), nan=np.inf)
+    nearest = far.argmin(axis=3)[..., None]  # a closed form's branches change places where a wrist is straight
+    way = np.take_along_axis(ways, nearest[..., None], axis=3)[:, :, :, 0]
+    after = np.take_along_axis(np.roll(bordered, -1, axis=1), nearest, axis=2)
+    turned = (bordered[..., 1:] * after[..., 1:]).reshape(*q.shape[:3], 2, n).sum(axis=4).prod(axis=3)
+    product, then = bordered[..., 0], after[..., 0] * np.sign(turned)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        changes = (product * then < 0.0) & (far.min(axis=3) < STEP)
+        return way, np.where(changes, product / (product - then), np.nan)
