@@ -174,9 +174,7 @@ def missing(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
         parts.append(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
     if goals.orientation != "none":
         first = 2 if goals.orientation == "axis" else 0
-        columns = (T - goals.T)[:, :3, first:3].reshape(len(q), 3 * (3 - first))
-        # of all three columns of a rotation two are at right angles to its axis, and each moves by the angle
-        parts.append(columns / np.sqrt(2.0) if first == 0 else columns)
+        parts.append((T - goals.T)[:, :3, first:3].reshape(len(q), 3 * (3 - first)))
     return mm, np.linalg.norm(np.concatenate(parts, axis=1), axis=1)
 
 
