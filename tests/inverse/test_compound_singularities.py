@@ -38,6 +38,9 @@ from armkin.inverse.recognise import solver
         # a root of third order on the self-motion of joints 1 and 4: points beside it are no branches
         ("fanuc_crx10ia", [135, 0, 90, 90, -135, 135]),
         ("fanuc_crx10ia", [-135, 180, 90, -135, 135, -135]),
+        # points of the valley beside that self-motion, one with it, do not stand for it
+        ("fanuc_crx10ia", [-90, 0, 90, -45, 90, -90]),
+        ("fanuc_crx10ia", [-90, 180, 90, -90, 90, 180]),
         # self-motions of double roots, known to 1e-8 rad: two postures of each were listed
         ("stanford", [90, 0, 660, -90, 180, -90]),
         ("iiwa7", [90, -45, 0, 180, 0, 0]),

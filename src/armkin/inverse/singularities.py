@@ -159,21 +159,22 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
+        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < MOVING)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:
             at, goal = q[k[some], b[some]], target[k[some]]
             mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
-        mine |= one
         mine[np.arange(len(k)), b] = True
+        on = mine.copy()  # but not what is one with it in a valley beside the self-motion
+        mine |= one
         group[k] = np.where(mine, b[:, None], group[k])
         double[k] |= (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
         singular[k] |= moving
         free[k] |= joints & moving[:, None]
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
-        pick = np.where(mine, np.where(moving[:, None], motion, size[k]), np.inf).argmin(axis=1)
+        pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, size[k], np.inf)).argmin(axis=1)
         own = np.flatnonzero(label[k, b] == OWN)
         pick[own] = b[own]
         chosen[k, pick] = True
