@@ -110,6 +110,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     where a self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
     """
     moving = np.asarray(curve.any(axis=2))
+    moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
     for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
         kept: list[int] = []
         for i in np.flatnonzero(chosen[k] & moving[k]):
@@ -117,8 +118,10 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
             between = q[k, i] + 0.5 * apart[close] * radian_or_reach(arm)
             there = np.repeat(target[k : k + 1], len(between), axis=0)
-            held = np.where(curve[k, kept] & curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
+            # one kept may be where its own self-motion and this one meet
+            held = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
             held &= (np.abs(apart) > TURNED).sum(axis=1) <= ALONG
+            held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
             if (newton.missing(arm, task, between, there) <= SOLUTION).any() or any(
                 _straight(arm, task, q[k, i], d, target[k]) for d in apart[held]
             ):

@@ -159,7 +159,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < MOVING)
+        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:

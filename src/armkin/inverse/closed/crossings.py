@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SAME
+from armkin.inverse.numeric.tolerances import SAME, SEED
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -61,7 +61,12 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, lowest.shape[1], axis=0)[some])
     one, other = V[:, rank - 1], V[:, rank - 2]
     ways = np.stack([one, other, (one + other) / 2**0.5, (one - other) / 2**0.5], axis=1)
-    out[some] = at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)
+    start = (at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
+    goal = np.repeat(target, lowest.shape[1], axis=0)[np.repeat(some, 8)]
+    there, size = newton.correct(arm, task, start, goal, steps=10)
+    # what falls back stands for no self-motion: it is on both, nearly
+    back = np.abs(newton.difference(arm, there, np.repeat(at[some], 8, axis=0))).max(axis=1) < 0.5 * AWAY
+    out[some] = np.where((back | (size > SEED))[:, None], np.nan, there).reshape(-1, 8, n)
     return out.reshape(N, -1, n)
 
 
