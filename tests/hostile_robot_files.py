@@ -273,6 +273,7 @@ def _edits() -> dict[str, tuple[str, str, str]]:
         "motor of no joint": (MOTORS, "joints: {J3: 1}", "joints: {}"),
         "motor with a list of joints": (MOTORS, "joints: {J3: 1}", "joints: [J3]"),
         "motor with weight 0": (MOTORS, "{J1: 1, J2: 2}", "{J1: 1, J2: 0}"),
+        "motor with a weight of next to nothing": (MOTORS, "{J1: 1, J2: 2}", "{J1: 1, J2: -5.0e-324}"),
         "motor with a weight in text": (MOTORS, "{J1: 1, J2: 2}", "{J1: 1, J2: two}"),
         "motors that do not suffice": (MOTORS, "{J1: -1, J2: 2}", "{J1: 2, J2: 4}"),
         "motors and a drive": (

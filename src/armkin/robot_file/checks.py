@@ -29,6 +29,7 @@ _KEYS: dict[str, tuple[str, ...]] = {
     "spindle": (),
 }
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
+_LEAST_WEIGHT = 1e-6  # of a joint on a motor: less would divide by nothing
 # A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
 _ROUNDING = 1e-3
 
@@ -265,8 +266,8 @@ def _weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
     for name, weight in motor.joints.items():
         if name not in types:
             yield ("joints", name), f"there is no joint {name}; the joints are {', '.join(types)}"
-        if weight == 0:
-            yield ("joints", name), f"weight 0 does nothing; leave {name} out"
+        if abs(weight) < _LEAST_WEIGHT:
+            yield ("joints", name), f"weight {weight:g} does nothing; leave {name} out"
     turned = {types[name] for name in motor.joints if name in types}
     if motor.lead is not None and "revolute" in turned:
         yield ("lead",), "is for motors of prismatic joints only; give weights in degrees per mm instead"
