@@ -67,7 +67,7 @@ class Machine:
 
     def position(self) -> Position:
         """Whether the arm's position is known: a board configured for another arm does not know it."""
-        mask = _mask(self.configuration.axes)
+        mask = protocol.mask_of(self.configuration.axes)
         if not self.configured or self.status.known & mask != mask:
             return "lost"
         return "retained" if self.status.flags & Flag.RETAINED else "known"
@@ -141,7 +141,7 @@ class Machine:
     def enable(self, axes: Sequence[int]) -> None:
         """Switch on what these axes need, and what was on or has a position already."""
         servos = self.configuration.board.servo_mask
-        need = (_mask(axes) | self.status.known) & _mask(
+        need = (protocol.mask_of(axes) | self.status.known) & protocol.mask_of(
             i for i, axis in enumerate(self.configuration.image.axes) if axis.used
         )
         on = self.status.flags & (Flag.DRIVERS | Flag.SERVOS)
@@ -284,7 +284,3 @@ def describe(arm: Arm, q: Array) -> str:
     values = [f"{name} = {value:.4f}" for name, value in zip(arm.joint_names, joints_out(arm, q), strict=True)]
     words = "mm" if arm.prismatic.all() else "deg" if not arm.prismatic.any() else "(deg, mm)"
     return f"{', '.join(values)} {words}"
-
-
-def _mask(axes: Iterable[int]) -> int:
-    return sum(1 << axis for axis in axes)

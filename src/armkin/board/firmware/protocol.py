@@ -1,6 +1,6 @@
 """Frames of the wire protocol: firmware/PROTOCOL.md is the text, firmware/golden/ the vectors.
 
-    fields  --hello(), motion(), ...-->  payload  --framing-->  bytes on the line  --framing, parse()-->  fields
+    fields  --hello(), home(), ...-->  payload  --framing-->  bytes on the line  --framing, parse()-->  fields
 
 Host and simulated board share this module; it knows no port and no motion.
 """
