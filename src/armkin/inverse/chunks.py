@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import StraightLineCode
+from armkin.forward import position
 from armkin.inverse import near_itself
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.turns import nearest_copy
@@ -57,7 +58,7 @@ def solve(
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
     threads = code is not None and workers > 1
-    tip = None if one is None else near_itself.tip(arm, one)
+    tip = None if one is None else position(arm, one)
 
     def part(rows: slice) -> list[Doubts]:
         """Some rows, by a thread of its own."""
@@ -70,9 +71,11 @@ def solve(
                 goal, rounding[some], columns = read_poses(goal)
             target[some] = goal
             found, workspace = _candidates(runner, code, goal, columns, close, workspace)
-            there = near_itself.reached(arm, task, goal, near_itself.tip(arm, close) if tip is None else tip)
+            there = None
+            if examine:
+                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip)
             goals = Goals(arm, task, goal, near[some])
-            doubts += _keep(goals, runner.axes or (), out.part(some), found, start, close, there if examine else None)
+            doubts += _keep(goals, runner.axes or (), out.part(some), found, start, close, there)
         return doubts
 
     parts = shared(part, N, workers if threads else 1, arrays.CHUNK, arrays.CHUNK)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.forward import position
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import HAIR, SOLUTION, THERE
 from armkin.model import limits
@@ -31,13 +30,8 @@ def room(arm: Arm) -> float:
     return 2.0 * SOLUTION * arm.reach
 
 
-def tip(arm: Arm, near: Array) -> Array:
-    """Where the tool is at `near`, (n,) or (N, n): (3,) or (N, 3) [mm]."""
-    return position(arm, near)
-
-
 def reached(arm: Arm, task: Task, target: Array, tip: Array) -> NDArray[np.intp]:
-    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`; tip: (3,) or (N, 3)."""
+    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`; tip: (3,) or (N, 3), its `position`."""
     point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
     most = room(arm)
     rows = np.flatnonzero(np.abs(point[:, 0] - tip[..., 0]) <= most)  # one coordinate tells nearly all others

@@ -166,8 +166,8 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
             at, goal = q[k[some], b[some]], target[k[some]]
             mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
         mine[np.arange(len(k)), b] = True
-        on = mine.copy()  # but not what is one with it in a valley beside the self-motion
-        mine |= one
+        on = mine  # but not what is one with it in a valley beside the self-motion
+        mine = on | one
         group[k] = np.where(mine, b[:, None], group[k])
         double[k] |= (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
         singular[k] |= moving

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
+from armkin.forward import position
 from armkin.inverse import chunks, near_itself, one_target
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
@@ -142,7 +143,7 @@ def _rows(
     pack(out, count)
     goals = Goals(arm, task, target, near)
     if examine:
-        doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, near_itself.tip(arm, near)))] = True
+        doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
     doubtful = np.flatnonzero(doubt)
     if examine and len(doubtful):
         solve = geometry.rows
