@@ -98,15 +98,17 @@ def wider(out: Batch, width: int) -> Batch:
 
 
 def pack(part: Batch, count: NDArray[np.int64]) -> None:
-    """Move the branches of targets, count (N,) of them, to the front, nan behind; those of as many together."""
-    for c in np.flatnonzero(np.bincount(count)[: part.valid.shape[1]]).tolist():
-        rows = np.flatnonzero(count == c)
-        every = slice(None) if len(rows) == len(part.valid) else rows
-        valid = part.valid[every]
-        B = valid.shape[1]
-        there = np.flatnonzero(valid)
-        for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
-            width = array.shape[2:]
-            kept = array[every].reshape(len(rows) * B, *width).take(there, axis=0).reshape(len(rows), c, *width)
-            array[every, :c], array[every, c:] = kept, missing
-        part.valid[every] = np.arange(B) < c
+    """Move the branches of targets, count (N,) of them, to the front, nan behind."""
+    B = part.valid.shape[1]
+    rows = np.flatnonzero(count < B)
+    front = np.arange(B) < count[rows, None]
+    # which of these branches goes where: behind the last one of all stands one that is missing
+    source = np.full(front.size, front.size)
+    source[np.flatnonzero(front)] = np.flatnonzero(part.valid[rows])
+    for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+        width = array.shape[2:]
+        found = np.empty((front.size + 1, *width), array.dtype)
+        array.take(rows, axis=0, out=found[:-1].reshape(len(rows), B, *width), mode="clip")
+        found[-1] = missing
+        array[rows] = found.take(source, axis=0).reshape(len(rows), B, *width)
+    part.valid[rows] = front

@@ -163,9 +163,10 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
         if inside is not True:
             within = within & inside
     for i, value in enumerate(legal):
-        grid[..., i] = value
-    for mask, out in ((valid, part.valid), (within, part.within)):
-        out[...] = True if mask.all() else mask.reshape(-1, N).T
+        # values on all branch axes, one after the other, are written branch by branch in one loop
+        grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, valid.shape))
+    part.valid[...] = True if valid.all() else valid.reshape(-1, N).T
+    part.within[...] = part.valid if within is valid else within.reshape(-1, N).T
     part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
 
 

@@ -31,13 +31,12 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     at_zero = isinstance(near, float) and near == 0.0
     if lower >= -np.pi and upper <= np.pi:
         # the principal value is the only one that can be legal, but for half a turn, which has two
-        if (lower - SLACK <= -np.pi or upper + SLACK >= np.pi) and (half := np.abs(value) > np.pi - SLACK).any():
-            other = value - np.copysign(TURN, value)
-            legal = (value >= lower - SLACK) & (value <= upper + SLACK)
-            better = (other >= lower - SLACK) & (other <= upper + SLACK)
-            better &= ~legal | (np.abs(other - near) < np.abs(value - near))
-            value = np.where(half & better, other, value)
-        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
+        low, high = lower - SLACK, upper + SLACK
+        if low <= -np.pi or high >= np.pi:
+            value = _half_turned(value, near, low, high)
+        if low <= -np.pi and high >= np.pi:
+            return value, True
+        return value, (value >= low) & (value <= high)
     principal = value
     if not at_zero:
         turned = np.asarray(near - value)  # one array for all steps: it stays in the cache
@@ -64,6 +63,21 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     if value is not principal:
         value = np.where(outside, principal, value)
     return value, ~outside
+
+
+def _half_turned(value: Array, near: Entry, low: float, high: float) -> Array:
+    """Principal values; of half a turn, which has two, the one that is legal and nearer."""
+    some = np.flatnonzero(np.abs(value) > np.pi - SLACK)
+    if not len(some):
+        return value
+    one, close = value.take(some), np.broadcast_to(near, value.shape).flat[some]
+    other = one - np.copysign(TURN, one)
+    legal = (one >= low) & (one <= high)
+    better = (other >= low) & (other <= high)
+    better &= ~legal | (np.abs(other - close) < np.abs(one - close))
+    value = value.copy()
+    value.put(some, np.where(better, other, one))
+    return value
 
 
 def nearest_number(value: float, near: float, lower: float, upper: float, slides: bool) -> tuple[float, bool]:
