@@ -43,7 +43,14 @@ SMOOTH: dict[str, Callable[..., Any]] = {
     "cbrt": lambda a: np.cbrt(8.0 + np.abs(a)),
 }
 INPUTS = 3
-COLUMNS = [np.array([[1.0], [-1.0]]), np.array([[0.0], [2.5]]), np.array([[[1.0]], [[-0.5]], [[0.0]]])]
+COLUMNS = [
+    np.array([[1.0], [-1.0]]),
+    np.array([[0.0], [2.5]]),
+    np.array([[[1.0]], [[-0.5]], [[0.0]]]),
+    np.array([[[1.0]], [[-1.0]], [[-1.0]]]),
+    np.array([[0.0], [-1.0]]),
+    np.array([[-2.0], [2.0]]),
+]
 
 
 def expressions(operations: dict[str, Callable[..., Any]]) -> st.SearchStrategy[Expression]:
@@ -117,6 +124,28 @@ def test_equal_operations_are_recorded_once_and_known_zeros_not_at_all() -> None
 def test_signs_move_outwards() -> None:
     made = record(lambda x: [(-x[0]) * (-x[1]), (-x[0]) - x[1], x[0] - (-x[1])], 2)
     assert [node.op for node in made.nodes] == ["multiply", "add", "negative"]
+
+
+def test_signs_of_branches_move_outwards() -> None:
+    """What they are multiplied with is computed once for both, and their square not at all."""
+    sign = COLUMNS[0]
+    made = record(lambda x: [(sign * x[0]) * x[1] * 3.0, (sign * x[0]) ** 2, np.arctan2(sign * x[0], x[1])], 2)
+    rows = [(node.op, node.axes) for node in made.nodes]
+    one, both = (), (2,)
+    assert rows == [
+        ("multiply", one), ("multiply", one), ("multiply", both),
+        ("multiply", one),
+        ("arctan2", one), ("multiply", both),
+    ]  # fmt: skip
+
+
+def test_a_sum_with_both_signs_is_written_half_by_half() -> None:
+    formula = StraightLineCode(lambda x: [x[0] + COLUMNS[0] * x[1], x[0] - COLUMNS[0] * x[1]], 2)
+    buffers = formula.workspace(3)
+    assert sum(b.flags.owndata for b in buffers) == 2, "no buffer for the value with both signs"
+    total, difference = formula.run([np.arange(3.0), np.full(3, 10.0)], buffers)
+    assert total.tolist() == [[10, 11, 12], [-10, -9, -8]]
+    assert difference.tolist() == total[::-1].tolist()
 
 
 def test_a_buffer_is_used_again() -> None:

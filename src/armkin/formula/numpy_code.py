@@ -3,57 +3,122 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.python_code import function_of
-from armkin.formula.recording import BOOLEAN, Node, Recording
+from armkin.formula.recording import BOOLEAN, Node, Recording, axes_of, branch_signs
 
 Run = Callable[..., tuple[Any, ...]]
-Buffer = tuple[tuple[int, ...], type]  # branch axes in front of the batch, and what it holds
+Place = tuple[int | slice, ...]
+
+
+class Buffer(NamedTuple):
+    """Branch axes in front of the batch and what it holds; or which part it is of which buffer before it."""
+
+    axes: tuple[int, ...]
+    dtype: type
+    whole: int = -1
+    part: Place = ()
+
+
+def workspace(buffers: list[Buffer], length: int) -> list[NDArray[Any]]:
+    """The buffers for batches of that length."""
+    made: list[NDArray[Any]] = []
+    for axes, dtype, whole, part in buffers:
+        made.append(np.empty((*axes, length), dtype) if whole < 0 else made[whole][part])
+    return made
 
 
 def write(recording: Recording) -> tuple[Run, list[Buffer]]:
     """One numpy call a line, its result in a buffer that is free again after its last use.
 
+    A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``.
     Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
     """
     names = {id(node): f"i{k}" for k, node in enumerate(recording.inputs)}
     constants: dict[str, Any] = {}
-    last = {id(x): k for k, node in enumerate(recording.nodes) for x in node.args}
+    both_signs = _both_signs(recording)
+    reads = {
+        id(node): [y for x in node.args for y in (x.args if id(x) in both_signs else [x]) if isinstance(y, Node)]
+        for node in recording.nodes
+    }
+    last = {id(x): k for k, node in enumerate(recording.nodes) if id(node) not in both_signs for x in reads[id(node)]}
     last |= {id(x): len(recording.nodes) for x in recording.outputs}
     free: dict[tuple[tuple[int, ...], type], list[str]] = {}
     kinds: dict[int, tuple[tuple[int, ...], type]] = {}
     buffers: list[Buffer] = []
+    parts: dict[tuple[str, str], str] = {}
     lines = []
 
-    def name(x: Any) -> str:
-        if isinstance(x, Node):
-            return names[id(x)]
-        # an array of no axes reaches the loop 0.2 us sooner than a Python number
-        constants[f"k{len(constants)}"] = x if np.ndim(x) else np.array(float(x))
-        return f"k{len(constants) - 1}"
+    def name(x: Any, half: tuple[int | None, ...] = ()) -> str:
+        """A value, or its part; half: the place on each of the last branch axes, None for all places."""
+        axes = axes_of(x)
+        place: Place = tuple(
+            slice(None) if k is None else min(k, size - 1) for k, size in zip(half[-len(axes) :], axes, strict=False)
+        )
+        if not isinstance(x, Node):
+            # an array of no axes reaches the loop 0.2 us sooner than a Python number
+            constants[f"k{len(constants)}"] = x[place] if np.ndim(x) else np.array(float(x))
+            return f"k{len(constants) - 1}"
+        whole = names[id(x)]
+        if all(isinstance(k, slice) for k in place):
+            return whole
+        if (whole, str(place)) not in parts:
+            parts[whole, str(place)] = f"b{len(buffers)}"
+            buffers.append(Buffer(*kinds[id(x)], int(whole[1:]), place))
+        return parts[whole, str(place)]
 
     for k, node in enumerate(recording.nodes):
-        arguments = [name(x) for x in node.args]
-        for x in {id(x): x for x in node.args}.values():
-            if isinstance(x, Node) and x.op != "input" and last[id(x)] == k:
+        if id(node) in both_signs:
+            continue
+        term = _term(node)
+        signed = term if id(term) in both_signs else None
+        arguments = [name(x) for x in node.args] if signed is None else []
+        for x in {id(x): x for x in reads[id(node)]}.values():
+            if x.op != "input" and last[id(x)] == k:
                 free.setdefault(kinds[id(x)], []).append(names[id(x)])
         kind = kinds[id(node)] = (node.axes, bool if node.op in BOOLEAN else float)
         if free.get(kind):
             names[id(node)] = free[kind].pop()
         else:
             names[id(node)] = f"b{len(buffers)}"
-            buffers.append(kind)
-        # numpy deprecates a positional third argument of minimum and maximum
-        out = "out=" if node.op in ("minimum", "maximum") else ""
-        lines.append(f"{node.op}({', '.join(arguments)}, {out}{names[id(node)]})")
+            buffers.append(Buffer(*kind))
+        if signed is None:
+            # numpy deprecates a positional third argument of minimum and maximum
+            out = "out=" if node.op in ("minimum", "maximum") else ""
+            lines.append(f"{node.op}({', '.join(arguments)}, {out}{names[id(node)]})")
+            continue
+        plain = node.args[0] if signed is node.args[1] else node.args[1]
+        factors, value = signed.args
+        for at in np.ndindex(factors.shape[:-1]):
+            half = tuple(i if size > 1 else None for i, size in zip(at, factors.shape, strict=False))
+            factor = factors[at][0] if node.op == "add" else -factors[at][0]
+            if factor == 0:
+                lines.append(f"positive({name(plain, half)}, {name(node, half)})")
+            else:
+                op = "add" if factor > 0 else "subtract"
+                lines.append(f"{op}({name(plain, half)}, {name(value, half)}, {name(node, half)})")
     parameters = [names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers))]
     outputs = list(map(name, recording.outputs))
-    scope = {**constants, **{node.op: getattr(np, node.op) for node in recording.nodes}, "where": _where}
+    scope = {**constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
+    scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op != "where"}
     return function_of(parameters, lines, outputs, scope), buffers
+
+
+def _term(node: Node) -> Node | None:
+    """The argument of a sum that is a value times signs of branches, or times nothing on some."""
+    terms = {"add": node.args, "subtract": node.args[1:]}.get(node.op, ())
+    return next((x for x in terms[::-1] if branch_signs(x, zeros=True)), None)
+
+
+def _both_signs(recording: Recording) -> set[int]:
+    """Values times signs of branches that are only asked for as such terms."""
+    terms = {id(x) for node in recording.nodes if (x := _term(node)) is not None and node.args[0] is not node.args[1]}
+    asked = {id(x) for node in recording.nodes for x in node.args if x is not _term(node)}
+    return terms - asked - {id(x) for x in recording.outputs}
 
 
 def _where(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:

@@ -57,17 +57,27 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
         return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
 
     todo: list[tuple[Value, str, list[Value | str]]] = []
-    uses: Counter[Value | str] = Counter()
+    minus: dict[Value | str, Value | str] = {}  # negated values
     for node in recording.nodes:
         for index in np.ndindex(*node.axes):
-            args = [value(x, index) for x in node.args]
-            if node.op == "multiply" and "1.0" in args:  # a sign of branches
+            op, args = node.op, [value(x, index) for x in node.args]
+            if op == "multiply" and "1.0" in args:  # a sign of branches
                 same[id(node), index] = args[1 - args.index("1.0")]
                 continue
-            todo.append(((id(node), index), node.op, args))
-            uses.update(args * 2 if node.op == "sign" else args)
+            if op == "multiply" and "-1.0" in args:
+                op, args = "negative", [args[1 - args.index("-1.0")]]
+            if op == "negative":
+                minus[id(node), index] = args[0]
+            if op == "add" and args[0] in minus:
+                args = args[::-1]
+            if op == "add" and args[1] in minus:
+                op, args = "subtract", [args[0], minus[args[1]]]
+            todo.append(((id(node), index), op, args))
     outputs = [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
-    uses.update(x for every in outputs for x in every)
+    uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
+    for result, op, args in reversed(todo):
+        if uses[result]:
+            uses.update(args * 2 if op == "sign" else args)
     texts: dict[Value | str, tuple[str, int]] = {
         (id(node), ()): (f"i{k}", 0) for k, node in enumerate(recording.inputs)
     }
@@ -77,6 +87,8 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
         return (x, 0) if isinstance(x, str) else texts[x]
 
     for result, op, args in todo:
+        if not uses[result]:
+            continue
         shown = [text(x) for x in args]
         line, depth = _PYTHON[op].format(*(t for t, _ in shown)), 1 + max(d for _, d in shown)
         if uses[result] == 1 and depth < DEEPEST:

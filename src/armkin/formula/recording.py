@@ -17,7 +17,11 @@ from typing import Any
 import numpy as np
 
 BOOLEAN = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "equal"}
+ODD = {"arctan2", "rint", "tan", "cbrt"}  # functions whose sign is that of their first argument
 COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
+
+
+Sign = Any  # 1.0, -1.0 or an array of them on branch axes
 
 
 class Node(np.lib.mixins.NDArrayOperatorsMixin):
@@ -51,41 +55,63 @@ class Trace:
         self.known: dict[tuple[Any, ...], Node] = {}
 
     def simplify(self, op: str, inputs: Sequence[Any]) -> Any:
-        """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards."""
-        if op == "negative":
-            x = inputs[0]
-            return x.args[0] if x.op == "negative" else self.record(op, inputs)
+        """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards.
+
+        Signs are those of branches, too: ``(s a) (s b)`` is computed once for both values of s.
+        """
         if op in ("bitwise_and", "bitwise_or"):
             for x, y in (inputs, inputs[::-1]):
                 if isinstance(x, bool | np.bool_):  # of two constants
                     return y if bool(x) == (op == "bitwise_and") else bool(x)
-        if op in ("multiply", "add", "subtract"):
-            a, b = inputs
-            minus_a, minus_b = _is_negative(a), _is_negative(b)
-            a, b = (a.args[0] if minus_a else a), (b.args[0] if minus_b else b)
-            if op == "multiply":
-                for x, y in ((a, b), (b, a)):
-                    if not isinstance(x, Node) and np.ndim(x) == 0 and abs(x) in (0.0, 1.0):
-                        if x == 0.0:
-                            return 0.0
-                        return self._signed(y, (x < 0) != (minus_a != minus_b))
-                return self._signed(self._product(a, b), minus_a != minus_b)
-            minus_b ^= op == "subtract"
-            if a is b and minus_a != minus_b:
-                return 0.0
-            if _is_zero(b):
-                return self._signed(a, minus_a)
-            if _is_zero(a):
-                return self._signed(b, minus_b)
-            if minus_a == minus_b:
-                return self._signed(self.record("add", (a, b)), minus_a)
-            return self.record("subtract", (b, a) if minus_a else (a, b))
         if op == "power" and inputs[1] == 2:
-            return self.record("multiply", (inputs[0], inputs[0]))
-        return self.record(op, inputs)
+            return self.simplify("multiply", (inputs[0], inputs[0]))
+        if op not in ODD and op not in ("negative", "absolute", "multiply", "divide", "add", "subtract"):
+            return self.record(op, inputs)
+        (s, a), (t, b) = _split(inputs[0]), _split(inputs[-1])
+        if op == "negative":
+            return self._signed(a, -s)
+        if op == "absolute":
+            return self.record(op, (a,))
+        if op in ODD:
+            return self._signed(self.record(op, (a, *inputs[1:])), s)
+        if op == "divide":
+            return self._signed(self.record(op, (a, b)), _product(s, t))
+        if op == "multiply":
+            sign = _product(s, t)
+            for x, y in ((a, b), (b, a)):
+                if not isinstance(x, Node) and np.ndim(x) == 0 and abs(x) in (0.0, 1.0):
+                    return self._signed(y, _product(sign, x)) if x else 0.0
+            return self._signed(self._product(a, b), sign)
+        return self._sum(s, a, -t if op == "subtract" else t, b)
 
-    def _signed(self, x: Any, minus: bool) -> Any:
-        return self.simplify("negative", (x,)) if minus and isinstance(x, Node) else -x if minus else x
+    def _sum(self, s: Sign, a: Any, t: Sign, b: Any) -> Any:
+        """``s a + t b``."""
+        if _is_zero(b):
+            return self._signed(a, s)
+        if _is_zero(a):
+            return self._signed(b, t)
+        if np.ndim(s) and not np.ndim(t):
+            s, a, t, b = t, b, s, a
+        relative = _product(s, t)
+        if np.ndim(relative):
+            return self._signed(self.record("add", (a, self._signed(b, relative))), s)
+        if relative > 0:
+            return self._signed(self.record("add", (a, b)), s)
+        if a is b:
+            return 0.0
+        if np.ndim(s) == 0 and s < 0:
+            return self.record("subtract", (b, a))
+        return self._signed(self.record("subtract", (a, b)), s)
+
+    def _signed(self, x: Any, sign: Sign) -> Any:
+        """``sign x``."""
+        own, x = _split(x)
+        sign = _product(sign, own)
+        if not isinstance(x, Node):
+            return sign * x
+        if np.ndim(sign):
+            return self.record("multiply", (sign, x))
+        return x if sign > 0 else self.record("negative", (x,))
 
     def _product(self, a: Any, b: Any) -> Any:
         """The product of two factors; constant ones are multiplied now: ``k1 (k2 x)`` is one operation."""
@@ -111,8 +137,30 @@ def _place(x: Any) -> float:
     return x.number if isinstance(x, Node) else -math.inf
 
 
-def _is_negative(x: Any) -> bool:
-    return isinstance(x, Node) and x.op == "negative"
+def branch_signs(x: Any, zeros: bool = False) -> bool:
+    """Whether a node is a value times an array of signs on branch axes; zeros: of which some may be zero."""
+    if not isinstance(x, Node) or x.op != "multiply" or not isinstance(x.args[0], np.ndarray) or not x.args[0].ndim:
+        return False
+    size = np.abs(x.args[0])
+    return bool(((size == 1.0) | (zeros & (size == 0.0))).all())
+
+
+def _split(x: Any) -> tuple[Sign, Any]:
+    """A value as a sign and what is left: minus moves out of nodes, signs of branches out of nodes and constants."""
+    if isinstance(x, Node):
+        return (-1.0, x.args[0]) if x.op == "negative" else x.args if branch_signs(x) else (1.0, x)
+    if np.ndim(x) and np.all(abs(x) == abs(x).flat[0]) and x.flat[0]:
+        return _product(np.sign(x), 1.0), abs(float(x.flat[0]))
+    return 1.0, x
+
+
+def _product(s: Sign, t: Sign) -> Sign:
+    """The product of two signs, without branch axes on which it is the same."""
+    sign = s * t
+    for axis in range(np.ndim(sign)):
+        first = sign.take([0], axis)
+        sign = first if (sign == first).all() else sign
+    return float(sign.flat[0]) if np.ndim(sign) and sign.size == 1 else sign
 
 
 def _is_zero(x: Any) -> bool:

@@ -33,14 +33,14 @@ class StraightLineCode:
 
     def workspace(self, length: int) -> list[NDArray[Any]]:
         """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
-        if self._batch is None:
-            from armkin.formula import numpy_code
+        from armkin.formula import numpy_code
 
+        if self._batch is None:
             self._batch = numpy_code.write(self._recording)
         kept: dict[int, list[NDArray[Any]]] = self._kept.__dict__.setdefault("buffers", {})
         if length in kept:
             return kept[length]
-        buffers: list[NDArray[Any]] = [np.empty((*axes, length), dtype) for axes, dtype in self._batch[1]]
+        buffers = numpy_code.workspace(self._batch[1], length)
         if length <= SMALL:
             if len(kept) >= LENGTHS:
                 kept.clear()

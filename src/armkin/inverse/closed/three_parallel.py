@@ -150,10 +150,10 @@ class ThreeParallel:
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
         reached = spin(*second, self.two_link.reach(third))
-        miss = distance2(reached, p[:2]) + (p[2] - self.height4) ** 2
-        miss = miss * (1.0 / self.reach**2)
         along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
-        miss = miss + distance2(along, [0.0, 0.0, self.sense4])
+        scale = 1.0 / self.reach**2
+        aside = (p[2] - self.height4) ** 2 * scale + distance2(along, [0.0, 0.0, self.sense4])
+        miss = distance2(reached, p[:2]) * scale + aside
         return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss, angles)
 
 
