@@ -10,9 +10,11 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.tolerances import ELIMINATED
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
 CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower
+SLOW, MORE = 1e-3, 3  # candidates this close that are no answers yet take so many steps more
 
 
 class Polished(NamedTuple):
@@ -100,7 +102,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         link, prismatic: the chain, scaled to about unit length.
         q: (M, 6) first guesses, scaled.
         goal: (M, 4, 4), scaled.
-        steps: at most so many steps; candidates that have converged drop out.
+        steps: at most so many steps, and undamped ones `MORE` on slow ways to an answer; what has converged drops out.
         damped: damp all but the last two steps by the residual, for poor guesses and weak Jacobians.
     """
     count = q.shape[0]
@@ -109,7 +111,8 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     best, residual = value.copy(), np.full(count, np.inf)
     weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
     active, last = np.arange(count), np.zeros(count)
-    for step in range(steps + 1):
+    most = steps if damped else steps + MORE
+    for step in range(most + 1):
         frame, joints = tip(link, prismatic, value)
         error, size = pose_error(frame, target)
         if step == 0:
@@ -132,8 +135,8 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        going = np.flatnonzero(size > CONVERGED)
-        if step == steps or going.size == 0:
+        going = np.flatnonzero(size > CONVERGED if step < steps else (size > ELIMINATED) & (size < SLOW))
+        if step == most or going.size == 0:
             break
         if going.size < active.size:
             active, value, target = active[going], value[:, going], target[..., going]
