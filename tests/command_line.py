@@ -55,6 +55,6 @@ def process(*words: object, **settings: Any) -> Result:
     """Run `python -m armkin` as a process."""
     done = subprocess.run(
         [sys.executable, "-m", "armkin", *map(str, words)],
-        **{"cwd": ROOT, "capture_output": True, "timeout": 60, **settings},
+        **{"cwd": ROOT, "capture_output": True, "timeout": 180, **settings},
     )
     return Result(done.returncode, (done.stdout or b"").decode(), (done.stderr or b"").decode())

@@ -6,11 +6,12 @@ import os
 import random
 import select
 import time
+from collections.abc import Callable
 
 from armkin.board.firmware.protocol import State
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
-from pty_port import Pty
+from pty_port import Patient, Pty
 
 
 class PtyBoard(Pty):
@@ -21,6 +22,7 @@ class PtyBoard(Pty):
         self.board = SimBoard(BOARDS[kind])
         self.noise = noise  # probability that a byte is flipped, and that it is dropped
         self.cut = False
+        self.time = Patient()
         self._random = random.Random(seed)
 
     @property
@@ -40,25 +42,39 @@ class PtyBoard(Pty):
         with self.lock:
             return self.board.motors.state
 
-    def wait(self, state: State, timeout: float = 10.0) -> None:
+    def wait(self, state: State) -> None:
         """Until the board is in a state."""
-        end = time.monotonic() + timeout
-        while self.state != state:
-            assert time.monotonic() < end, f"not {state.name} within {timeout} s"
+        self.until(lambda: self.state == state, state.name)
+
+    def until(self, there: Callable[[], bool], what: str) -> None:
+        """Until something has happened."""
+        end = time.monotonic() + 60
+        while not there():
+            assert time.monotonic() < end, f"not {what} within a minute: {self.state.name} at {self.net}"
             time.sleep(0.005)
 
+    def _open(self) -> None:
+        super()._open()
+        os.close(self._slave)  # from here on a hang-up says: no program has it open
+
+    def _close(self) -> None:
+        os.close(self._master)
+
     def _serve(self) -> None:
-        last = time.monotonic()
+        line = select.poll()
+        line.register(self._master, select.POLLIN)
         while not self._end.is_set():
-            ready, _, _ = select.select([self._master], [], [], 0.002)
-            data = os.read(self._master, 4096) if ready else b""
+            events = dict(line.poll(2)).get(self._master, 0)
+            there = not events & select.POLLHUP
+            data = os.read(self._master, 4096) if events & select.POLLIN else b""
             with self.lock:
-                now = time.monotonic()
-                self.board.advance(min(now - last, 0.2))  # a busy machine lets the board's time slip
-                last = now
+                self.board.advance(self.time.passed(heard=bool(data), there=there))
                 if data:
                     self.board.receive(self._line(data))
                 out = self._line(self.board.take())
+            if not there:
+                time.sleep(0.002)  # a hang-up does not wait
+                continue  # nobody listens: what the board says is gone
             while out and not self._end.is_set():
                 try:
                     out = out[os.write(self._master, out) :]

@@ -23,6 +23,35 @@ class Simulated(Protocol):
         """Simulated seconds."""
 
 
+class Patient:
+    """The time that passes for a board: the clock's, which waits for a host that has fallen silent.
+
+    A busy machine may give the host no time for longer than the board waits for it. `patience`: [s] of the board's
+    time after which it waits; a host asks ten times a second. Infinite: it never waits.
+    """
+
+    def __init__(self, patience: float = 0.12) -> None:
+        self.patience = patience
+        self._silent = 0.0  # [s] of the board's time since the host was heard
+        self._last = self._heard = time.monotonic()
+
+    def passed(self, *, heard: bool, there: bool = True) -> float:
+        """Seconds since this was asked last, for a board; heard: the host was; there: it has the port open.
+
+        At most 20 ms: a machine that was busy is not made up for, while the host has had no chance to answer.
+        """
+        now = time.monotonic()
+        seconds, self._last = min(now - self._last, 0.02), now
+        if heard or not there:
+            self._silent, self._heard = 0.0, now
+        elif (
+            self._silent >= self.patience and now - self._heard < 20
+        ):  # whoever says nothing for 20 s does so on purpose
+            return 0.0
+        self._silent += seconds
+        return seconds
+
+
 class Served:
     """What serves a name that other programs open, from `with` to the end of its block, in a thread."""
 

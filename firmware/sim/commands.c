@@ -21,7 +21,7 @@ static const char HELP[] =
     "stats | clear | cycles | quit | reset power|brownout|external|watchdog | pin A0 0|1|z | switch X 1|0|auto | "
     "set-switch X at -2000 above|below [bounce 3ms] [nc|no] [pin D9] | noise [flip P] [drop P] [seed N] [dir in|out|both] | "
     "cut in|out|both | restore | after 5ms COMMAND | mark N | peek NAME|ADDRESS N | poke NAME|ADDRESS HEX | flush | "
-    "bootloader MS|off | reset-on-open on|off | speed N|max | baud N|auto | send HEX | run 5ms [until HEX] [HEX]";
+    "bootloader MS|off | reset-on-open on|off | speed N|max | patience MS|off | baud N|auto | send HEX | run 5ms [until HEX] [HEX]";
 
 static void fail(FILE *reply, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
@@ -287,6 +287,12 @@ static void do_speed(FILE *reply) {
     }
 }
 
+static void do_patience(FILE *reply) {
+    double v;
+    if (setting(reply, "off", 0, 0, 1e5, &v))
+        pace_patience = (uint64_t)(v * (CLOCK_HZ / 1e3));
+}
+
 static void do_baud(FILE *reply) {
     double v;
     if (setting(reply, "auto", 0, 300, 4e6, &v))
@@ -339,7 +345,8 @@ void commands_execute(char *line, FILE *reply) {
         {"switch", do_switch}, {"set-switch", do_set_switch}, {"noise", do_noise}, {"cut", do_cut},
         {"restore", do_restore}, {"after", do_after}, {"peek", do_peek}, {"poke", do_poke}, {"cycles", do_cycles},
         {"help", do_help}, {"clear", do_clear}, {"flush", do_flush}, {"quit", do_quit}, {"mark", do_mark},
-        {"speed", do_speed}, {"baud", do_baud}, {"bootloader", do_bootloader}, {"reset-on-open", do_reset_on_open},
+        {"speed", do_speed}, {"patience", do_patience}, {"baud", do_baud}, {"bootloader", do_bootloader},
+        {"reset-on-open", do_reset_on_open},
     };
     words_begin(line);
     const char *name = word();

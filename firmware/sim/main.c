@@ -28,6 +28,7 @@ static const char USAGE[] =
     "  --stdin              take commands from standard input and end with it\n"
     "  --speed N|max|step   simulated per real second (1); as fast as the host keeps talking; or only by `run`\n"
     "  --ahead MS           with --speed max: free run after the host's last byte (50)\n"
+    "  --patience MS        simulated time waits for a host that has the port open and is silent for so long (0: never)\n"
     "  --bootloader MS      a bootloader that hides MCUSR and, after an external reset, takes MS\n"
     "  --no-reset-on-open   opening the port does not reset the board\n"
     "  --driver NAME        timing to hold: a4988 (default), drv8825, tmc2209\n"
@@ -80,7 +81,10 @@ static void wait_ns(int64_t ns) {
 }
 
 static void service(void) {
-    if (!pace_stepped && port_service())
+    bool was_there = pace_host_is_there;
+    bool spoke = !pace_stepped && port_service();
+    pace_host_is_there = port_is_open();
+    if (spoke || (pace_host_is_there && !was_there))
         pace_host_spoke();
     control_service();
 }
@@ -103,10 +107,10 @@ static void loop(void) {
 }
 
 int main(int argc, char **argv) {
-    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, BOOT, NO_RESET, DRIVER, DO, BAUD, TRACE, STATS, SEED, QUIET, HELP };
+    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, PATIENCE, BOOT, NO_RESET, DRIVER, DO, BAUD, TRACE, STATS, SEED, QUIET, HELP };
     static const struct option options[] = {
         {"board", 1, 0, BOARD}, {"elf", 1, 0, ELF}, {"link", 1, 0, LINK}, {"control", 1, 0, CONTROL},
-        {"stdin", 0, 0, STDIN}, {"speed", 1, 0, SPEED}, {"ahead", 1, 0, AHEAD}, {"bootloader", 1, 0, BOOT},
+        {"stdin", 0, 0, STDIN}, {"speed", 1, 0, SPEED}, {"ahead", 1, 0, AHEAD}, {"patience", 1, 0, PATIENCE}, {"bootloader", 1, 0, BOOT},
         {"no-reset-on-open", 0, 0, NO_RESET}, {"driver", 1, 0, DRIVER}, {"do", 1, 0, DO}, {"baud", 1, 0, BAUD},
         {"trace", 1, 0, TRACE}, {"stats", 1, 0, STATS}, {"seed", 1, 0, SEED}, {"quiet", 0, 0, QUIET},
         {"help", 0, 0, HELP}, {0},
@@ -133,6 +137,7 @@ int main(int argc, char **argv) {
             pace_speed = !strcmp(optarg, "max") || pace_stepped ? 0 : positive("--speed", optarg);
             break;
         case AHEAD: pace_ahead = (uint64_t)(positive("--ahead", optarg) * (CLOCK_HZ / 1e3)); break;
+        case PATIENCE: pace_patience = (uint64_t)(positive("--patience", optarg) * (CLOCK_HZ / 1e3)); break;
         case BOOT: chip_bootloader_ms = positive("--bootloader", optarg); break;
         case NO_RESET: port_reset_on_open = false; break;
         case DRIVER:

@@ -7,13 +7,19 @@
 bool pace_stepped;
 double pace_speed = 1;
 uint64_t pace_ahead = CLOCK_HZ / 20;
+uint64_t pace_patience;
+bool pace_host_is_there;
 
 /* A simulator that fell behind (a busy machine) lets its clock slip by what exceeds this, rather than
  * race through the lost time while the host has had no chance to answer. */
 static const int64_t MOST_CATCHING_UP = 20000000;
 
+/* Whoever is silent for so long is silent on purpose [ns]. */
+static const int64_t MOST_PATIENCE = 20000000000;
+
 static int64_t anchor_real;
 static uint64_t anchor_cycle, host_cycle;
+static int64_t host_real;                            /* when the host spoke last, ns */
 static int64_t slipped, waited, waiting_since;       /* ns; the last: 0 while not waiting */
 
 static int64_t now_ns(void) {
@@ -27,7 +33,15 @@ void pace_reset(void) {
     anchor_cycle = chip_now();
 }
 
-void pace_host_spoke(void) { host_cycle = chip_now(); }
+void pace_host_spoke(void) {
+    host_cycle = chip_now();
+    host_real = now_ns();
+}
+
+static bool host_is_awaited(int64_t now) {
+    return pace_patience && pace_host_is_there && chip_now() >= host_cycle + pace_patience &&
+           now < host_real + MOST_PATIENCE;
+}
 
 /* Nanoseconds until simulated time may go on; negative if it is late. */
 static int64_t early(int64_t now) {
@@ -38,6 +52,10 @@ static int64_t early(int64_t now) {
             return 0;
         }
         speed = 1;
+    }
+    if (host_is_awaited(now)) {
+        pace_reset();
+        return 1000000;
     }
     return anchor_real + (int64_t)((double)(chip_now() - anchor_cycle) * (1e9 / CLOCK_HZ) / speed) - now;
 }

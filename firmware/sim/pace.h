@@ -12,6 +12,11 @@ extern double pace_speed;                 /* simulated per real second; 0: as fa
 /* At speed 0, how far simulated time may run away from the host, in cycles after its last byte. */
 extern uint64_t pace_ahead;
 
+/* How long simulated time waits for a host that has the port open and is silent: it stands so many cycles after the
+ * host's last byte; 0: it does not wait. A host that the computer gives no time is no silent host. */
+extern uint64_t pace_patience;
+extern bool pace_host_is_there;           /* has the port open */
+
 void pace_reset(void);
 void pace_host_spoke(void);
 int64_t pace_wait(void);                  /* nanoseconds to wait before simulating on */

@@ -155,6 +155,8 @@ bool port_service(void) {
     return any;
 }
 
+bool port_is_open(void) { return users > 0; }
+
 void port_json(FILE *out) {
     fprintf(out, "{\"path\": \"%s\", \"open\": %s, \"opened\": %llu, \"unread\": %llu}", port_path(),
             users ? "true" : "false", (unsigned long long)opened, (unsigned long long)unread);

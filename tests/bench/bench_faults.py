@@ -93,7 +93,7 @@ def one(fault: str, seed: int) -> Struck:
     rng = random.Random(f"{fault} {seed}")
     moment = rng.uniform(-0.2, 1.05) * SECONDS
     wrong: list[str] = []
-    with EmulatedBoard(seed=seed + 1, bootloader=200 if seed % 2 else None) as board:
+    with EmulatedBoard(seed=seed + 1, bootloader=200 if seed % 2 else None, patience=0) as board:
         sender = begin(board, moment)
         moving = net(board) != START
         strike(board, sender, fault, rng)

@@ -35,7 +35,7 @@ def first_steps(runs: int) -> tuple[list[float], float, list[float]]:
     arm = armkin.load("three_dof")
     out, leads, own = [], [], 0.0
     for _ in range(runs):
-        with EmulatedBoard(trace=True, reset_on_open=False) as board:
+        with EmulatedBoard(trace=True, reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
             machine = Machine(port, arm, configure(arm))
             machine.prepare(assume=arm.home)
@@ -68,7 +68,7 @@ def short_moves(moves: int, load: int) -> tuple[int, int, float]:
     arrived = held = 0
     begin = time.monotonic()
     try:
-        with EmulatedBoard(reset_on_open=False) as board:
+        with EmulatedBoard(reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
             machine = Machine(port, arm, configure(arm))
             machine.prepare(assume=arm.home)

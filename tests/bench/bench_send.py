@@ -36,7 +36,7 @@ def noisy(seed: int) -> str:
     arm = arms.load(ROBOT)
     rng = np.random.default_rng(seed)
     configuration = configure(arm)
-    with EmulatedBoard(seed=seed, reset_on_open=False) as board:
+    with EmulatedBoard(seed=seed, reset_on_open=False, patience=0) as board:
         port = SerialPort(board.port)
         machine = Machine(port, arm, configuration)
         machine.prepare(assume=machine.arm.home)

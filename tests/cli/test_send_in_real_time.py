@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import select
 import signal
 import socket
@@ -21,6 +22,7 @@ from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
 from pty_board import PtyBoard
+from pty_port import Patient
 
 
 @pytest.fixture
@@ -34,18 +36,23 @@ def started(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]
     return subprocess.Popen(command, cwd=ROOT, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def moving(board: PtyBoard, speed: int = 40) -> subprocess.Popen[bytes]:
-    """A send that is well under way."""
+def moving(board: PtyBoard, speed: int = 10) -> subprocess.Popen[bytes]:
+    """A send that is well under way, and takes 14 s: on a busy machine, too, it is disturbed before its end."""
     sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", speed, "--assume-home")
-    board.wait(State.MOVING, 20)
-    time.sleep(0.7)
+    board.until(lambda: board.net[1] < -400, "under way")
     return sender
 
 
 def on_the_path(net: Sequence[int]) -> None:
     """Between home and the pose, on the straight line."""
+    assert 0.02 < net[1] / COUNTS[1] < 0.98
+    on_the_line(net)
+
+
+def on_the_line(net: Sequence[int]) -> None:
+    """On the straight line from home to the pose, its ends included."""
     share = net[1] / COUNTS[1]
-    assert 0.02 < share < 0.98
+    assert 0 <= share <= 1
     for count, end in zip(net, COUNTS, strict=False):
         assert abs(count - share * end) <= 2
 
@@ -89,7 +96,7 @@ def test_a_changed_file_means_a_lost_position(board: PtyBoard, tmp_path: Path) -
 def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, code: int) -> None:
     sender = moving(board)
     sender.send_signal(number)
-    out, err = sender.communicate(timeout=20)
+    out, err = sender.communicate(timeout=60)
     assert sender.returncode == code
     assert out == b""
     assert b"stopped: the arm stands at" in err
@@ -117,7 +124,7 @@ def test_a_cut_line(board: PtyBoard) -> None:
     net = board.net
     on_the_path(net)
     board.cut = False  # nothing resumes by itself
-    _, err = sender.communicate(timeout=20)
+    _, err = sender.communicate(timeout=60)
     assert sender.returncode == 5
     assert b"the arm stands at" in err or b"does not answer any more" in err
     assert board.net == net
@@ -131,24 +138,30 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
     assert f"process {sender.pid}" in busy.err
     stop = process("stop", "--port", board.port)
     assert stop.code == 0, stop.err
-    sender.communicate(timeout=20)
+    sender.communicate(timeout=60)
     assert sender.returncode == 143
     assert board.state == State.IDLE
     assert "the arm stands" in stop.err  # the board itself was asked
     finish(board)
 
 
-def test_stop_beside_a_suspended_sender(board: PtyBoard) -> None:
-    sender = moving(board, speed=5)
-    sender.send_signal(signal.SIGSTOP)
-    began = time.monotonic()
-    stop = process("stop", "--port", board.port)
-    assert stop.code == 0, stop.err
-    assert time.monotonic() - began < 6  # with both programs' start on a busy computer
-    assert "the arm stands" in stop.err
-    sender.communicate(timeout=20)
-    assert sender.returncode == 143
-    finish(board)
+def test_stop_beside_a_suspended_sender() -> None:
+    seconds = []
+    while not seconds or (min(seconds) > 6 and len(seconds) < 5):  # a busy computer may be slow, once
+        with PtyBoard() as board:
+            sender = moving(board, speed=5)
+            board.time.patience = math.inf  # the board, too, notices
+            sender.send_signal(signal.SIGSTOP)
+            began = time.monotonic()
+            stop = process("stop", "--port", board.port)
+            seconds.append(time.monotonic() - began)
+            assert stop.code == 0, stop.err
+            assert "the arm stands" in stop.err
+            sender.communicate(timeout=60)
+            assert sender.returncode == 143
+            board.time.patience = 0.12
+            finish(board)
+    assert min(seconds) < 6
 
 
 def test_stop_without_a_sender(board: PtyBoard) -> None:
@@ -163,11 +176,10 @@ def test_rows_that_trickle_in(board: PtyBoard) -> None:
     assert sender.stdin is not None
     sender.stdin.write(b"1,89,-89\n")
     sender.stdin.flush()
-    board.wait(State.MOVING, 20)  # the first row moves before the second one is written
-    board.wait(State.IDLE)
+    board.until(lambda: board.net[:3] == [36, -119, 67], "at the first row")  # before the second one is written
     time.sleep(0.7)
     assert board.net[:3] == [36, -119, 67]
-    out, _ = sender.communicate(b"2,88,-88\n", timeout=20)
+    out, _ = sender.communicate(b"2,88,-88\n", timeout=60)
     assert sender.returncode == 0
     assert json.loads(out)["waypoints"] == 2
     assert board.net[:3] == [71, -239, 133]
@@ -183,7 +195,7 @@ def test_a_noisy_line(seed: int) -> None:
         else:  # a machine too busy to keep the queue filled: held, known, and it ends
             assert done.code == 5
             assert "position is known" in done.err
-            on_the_path(board.net)
+            on_the_line(board.net)
 
 
 def test_a_board_behind_a_socket() -> None:
@@ -194,15 +206,13 @@ def test_a_board_behind_a_socket() -> None:
         def serve() -> None:
             line, _ = server.accept()
             with line, suppress(ConnectionError):  # the host hangs up when it has heard enough
-                last = time.monotonic()
+                clock = Patient()
                 while True:
                     ready, _, _ = select.select([line], [], [], 0.002)
                     data = line.recv(4096) if ready else b""
                     if ready and not data:
                         return
-                    now = time.monotonic()
-                    board.advance(min(now - last, 0.2))
-                    last = now
+                    board.advance(clock.passed(heard=bool(data)))
                     board.receive(data)
                     line.sendall(board.take())
 

@@ -137,6 +137,9 @@ class EmulatedBoard:
     `elf`: the program; default: the firmware, built for this board.
     `speed`: simulated seconds per second; "max": free-running until `ahead_ms` after the host's last byte,
     then 1; "step": only in `run`.
+    `patience`: seconds of silence after which simulated time waits for a host that has the port open, at a speed
+    that follows the clock: a busy machine may give the host no time for longer than the firmware waits for it. A host
+    asks ten times a second. 0, here or by `control("patience off")`: it never waits.
     `bootloader`: milliseconds that a bootloader takes after an external reset; it hides the reset's cause.
     `commands`: of the control channel, carried out before the program starts: ("pin A0 0",).
     `baud`: the host's true rate, if it shall differ from what the board has set.
@@ -150,6 +153,7 @@ class EmulatedBoard:
         elf: Path | None = None,
         speed: float | Literal["max", "step"] = 1,
         ahead_ms: float = 50,
+        patience: float = 0.12,
         bootloader: float | None = None,
         reset_on_open: bool = True,
         driver: str = "a4988",
@@ -165,6 +169,8 @@ class EmulatedBoard:
         self._elf = elf
         self._options = ["--speed", str(speed), "--ahead", str(ahead_ms)]
         self._options += ["--driver", driver, "--seed", str(seed)]
+        if speed not in ("max", "step"):
+            self._options += ["--patience", str(patience * 1e3)]
         if bootloader is not None:
             self._options += ["--bootloader", str(bootloader)]
         if not reset_on_open:
@@ -190,7 +196,7 @@ class EmulatedBoard:
             command += ["--trace", str(self._folder / "trace")]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         try:
-            self.port = str(self._answer(10)["port"])
+            self.port = str(self._answer(60)["port"])
         except BaseException:
             self.close()
             raise
@@ -209,7 +215,7 @@ class EmulatedBoard:
             assert process.stdout is not None
             process.stdin.close()  # the emulator ends with its standard input
             try:
-                process.wait(5)
+                process.wait(30)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

@@ -17,7 +17,7 @@ def net(board: EmulatedBoard) -> list[int]:
 
 def at_rest(board: EmulatedBoard) -> list[int]:
     """Net steps once they have not changed for 0.15 s."""
-    end = time.monotonic() + 10
+    end = time.monotonic() + 60
     before = net(board)
     while time.monotonic() < end:
         board.wait(0.15)

@@ -57,14 +57,14 @@ def rows(count: int) -> Array:
     return np.round(ring + np.random.default_rng(7).uniform(-0.3, 0.3, ring.shape), 4)
 
 
-def stream(count: int, *, blend: float = BLEND) -> Streamed:
-    """Send so many waypoints from home, look at every edge."""
+def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Streamed:
+    """Send so many waypoints from home, look at every edge; patience: as of the emulated board."""
     arm, q = armkin.load("three_dof"), rows(count)
     plan = Planner(arm, configure(arm), 1.0, blend).plan([0, 0, 0], np.deg2rad(q))
     assert isinstance(plan, Cut)
     segments = [one for move in plan.moves() for one in move.segments]
     wanted = predicted(segments, [0, 0, 0])
-    with EmulatedBoard(trace=True) as board, tempfile.TemporaryDirectory() as folder:
+    with EmulatedBoard(trace=True, patience=patience) as board, tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "rows.csv"
         file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))
         words = ["send", THREE_DOF, "--batch", file, "--port", board.port, "--assume-home", "--json"]

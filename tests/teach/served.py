@@ -57,7 +57,7 @@ def teaching(*words: str) -> Iterator[str]:
         yield process.stdout.readline().strip()
     finally:
         process.terminate()
-        assert process.communicate(timeout=20)[1] == (MOVES if "--port" in words else ENDS)
+        assert process.communicate(timeout=60)[1] == (MOVES if "--port" in words else ENDS)
         assert process.returncode == 143
 
 
@@ -69,7 +69,7 @@ def ask(
     server: Server, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None
 ) -> tuple[int, dict[str, str], bytes]:
     """One request; status, headers, body."""
-    connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=60)
     try:
         connection.request(method, path, body, headers or {})
         answer = connection.getresponse()
@@ -102,7 +102,7 @@ class Page:
         status, self.opened = act(server, "open")
         assert status == 200, self.opened
         self.id = self.opened["tab"]
-        self._connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=10)
+        self._connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=60)
         self._connection.request("GET", f"/events?tab={self.id}")
         self._events = self._connection.getresponse()
         assert self._events.status == 200
@@ -126,11 +126,24 @@ class Page:
         """The board's state once it has nothing to do."""
         board = self.server.actions.board
         assert board is not None
-        end = time.monotonic() + 40
+        end = time.monotonic() + 120
         while board.thread.doing or board.thread.stopping:
             assert time.monotonic() < end, board.thread.state()
             time.sleep(0.005)
         return board.thread.state()
+
+    def state(self) -> Any:
+        """The board's state, as pages are told it."""
+        board = self.server.actions.board
+        assert board is not None
+        return board.thread.state()
+
+    def clock(self) -> float:
+        """Seconds that have passed for the board: a simulated one's time waits where the machine is late."""
+        board = self.server.actions.board
+        assert board is not None
+        assert board.thread.link is not None
+        return board.thread.link.now()
 
     def close(self) -> None:
         """As a browser closes a page: the connection ends."""
@@ -149,17 +162,18 @@ class Elsewhere:
     def listen(self) -> None:
         """Hold control, as a page that is open does, once the board has answered."""
         self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}")
-        for _ in range(200):
+        for _ in range(1200):
             if not self.act("open")["board"]["doing"]:
-                break
+                return
             time.sleep(0.05)
+        raise AssertionError("the board does not answer")
 
     def act(self, name: str, **fields: Any) -> Any:
         headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}
         request = urllib.request.Request(
             f"{self.base}/api/{name}", json.dumps(fields).encode(), {**headers, "X-Armkin-Tab": self.tab}
         )
-        for _ in range(100):
+        for _ in range(1200):
             try:
                 return json.load(urllib.request.urlopen(request))
             except urllib.error.HTTPError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -84,18 +84,25 @@ def test_a_robot_file_that_has_changed_moves_nothing(tmp_path: Path) -> None:
 
 
 def test_a_jog_lasts_as_long_as_it_is_asked_for(sim: Page) -> None:
-    for _ in range(6):
-        assert sim.act("jog", joint=0, percent=50)[0] == 200
-        time.sleep(0.1)
-    began = time.monotonic()  # the page falls silent
+    jogged(sim, 50, lambda at: at > 15)
+    began = sim.clock()  # the page falls silent
     state = sim.idle()
-    assert time.monotonic() - began < 1.0
-    assert 10 < state["joints"][0] < 80  # 30 deg/s for about a second; 60 s would have taken it to its limit
-    assert sim.act("jog", joint=0, percent=-50)[0] == 200
+    assert sim.clock() - began < 1.0
+    assert 15 < state["joints"][0] < 80  # 30 deg/s for about a second; 60 s would have taken it to its limit
+    jogged(sim, -50, lambda at: at < state["joints"][0] - 3)
     assert sim.act("jog_end")[0] == 200
-    began = time.monotonic()
+    began = sim.clock()
     sim.idle()
-    assert time.monotonic() - began < 0.5
+    assert sim.clock() - began < 0.5
+
+
+def jogged(page: Page, percent: float, there: Callable[[float], bool]) -> None:
+    """The first joint jogs, as its button is held, until it is there."""
+    end = time.monotonic() + 60
+    while not there(page.state()["joints"][0]):
+        assert time.monotonic() < end, page.state()
+        assert page.act("jog", joint=0, percent=percent)[0] in (200, 409)  # 409: it has come too late, and comes again
+        time.sleep(0.05)
 
 
 def test_the_gripper(sim: Page) -> None:
@@ -138,16 +145,16 @@ def test_nothing_follows_unless_it_is_told_to(sim: Page) -> None:
     assert sim.idle()["pulses"] == [0, 0, 0]
     assert sim.act("follow", on=True)[1] == {"on": True}
     sim.act("look", q=[6, 90, -90])
-    time.sleep(0.2)
     state = sim.idle()
     assert state["joints"] == pytest.approx([6, 90, -90], abs=0.02)
     sim.act("look", q=[6, 130, -90])  # outside: not followed
     time.sleep(0.4)
     assert sim.idle()["joints"] == pytest.approx([6, 90, -90], abs=0.02)
     sim.act("look", q=[60, 90, -90])
-    time.sleep(0.5)
+    sim.hear("board", lambda state: state["doing"] == "follow" and state["joints"][0] > 8)
     sim.act("stop")
     stopped = sim.idle()["pulses"]
+    assert stopped[0] < 60 * 12800 / 360 - 100
     sim.act("look", q=[0, 90, -90])
     time.sleep(0.4)
     assert sim.idle()["pulses"] == stopped  # STOP has switched it off
@@ -186,18 +193,21 @@ def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
         assert page.act("send", q=goal, speed=100)[0] == 200
         assert page.idle()["error"] == ""
         assert page.idle()["joints"] == pytest.approx(goal, abs=1)
-        assert page.act("jog", joint=0, percent=-20)[0] == 200
-        state = page.idle()
-        assert state["error"] == ""
+        for _ in range(20):  # a page that is not heard of for 0.3 s, on a busy machine, has let the button go
+            assert page.act("jog", joint=0, percent=-20)[0] == 200
+            state = page.idle()
+            assert state["error"] == ""
+            if state["joints"][0] < goal[0] - 1:
+                break
         assert state["joints"][0] < goal[0] - 1
-        began = time.monotonic()
-        assert page.act("send", q=units.home_out(arm), speed=10)[0] == 200
+        began = page.clock()
+        assert page.act("send", q=units.home_out(arm), speed=2)[0] == 200  # 3 s or more
         page.hear("board", lambda news: bool(news["doing"]))
         assert page.act("stop")[0] == 200  # in the clock's time: there is something to stop
         state = page.idle()
         assert state["position"] == "known"
         assert state["joints"][0] > units.home_out(arm)[0] + 1
-        assert time.monotonic() - began < 5
+        assert page.clock() - began < 5
         assert page.act("home")[0] in (200, 422)
         page.idle()
         page.close()

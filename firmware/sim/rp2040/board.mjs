@@ -15,7 +15,8 @@ const SLICE = CLOCK_HZ / 4000;
 const { values: options } = parseArgs({
   options: {
     board: { type: 'string' }, elf: { type: 'string' }, port: { type: 'string', default: '' }, stdin: { type: 'boolean' },
-    speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, 'no-reset-on-open': { type: 'boolean' },
+    speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, patience: { type: 'string', default: '0' },
+    'no-reset-on-open': { type: 'boolean' },
     driver: { type: 'string', default: 'a4988' }, do: { type: 'string', multiple: true, default: [] }, baud: { type: 'string', default: '250000' },
     trace: { type: 'string' }, seed: { type: 'string', default: '1' }, fd: { type: 'string' },
     by: { type: 'string', default: 'uart' },
@@ -23,7 +24,11 @@ const { values: options } = parseArgs({
 });
 
 const stepped = options.speed === 'step';
-const pace = { speed: options.speed === 'max' || stepped ? 0 : Number(options.speed), ahead: Number(options.ahead) / 1e3 };
+const pace = {
+  speed: options.speed === 'max' || stepped ? 0 : Number(options.speed), ahead: Number(options.ahead) / 1e3,
+  patience: Number(options.patience) / 1e3,
+};
+const MOST_PATIENCE = 3_000_000_000n; // [ns] whoever is silent for so long has closed the port, which is not seen here
 const heard = []; // bytes from the board that nobody has taken yet
 
 const pins = new Pins(options.driver, options.trace);
@@ -90,12 +95,19 @@ function end() {
 
 let port = null;
 let spoken = 0; // cycle at which the host last said something
+let spokenAt = 0n; // [ns] the clock then; nobody has spoken yet
 let from = { cycle: chip.cycle, time: process.hrtime.bigint() };
 
-/** Cycles that may have passed by now. */
-function allowed() {
+/** The cycle that it is by the clock. */
+function clock() {
   const seconds = Number(process.hrtime.bigint() - from.time) / 1e9;
   return from.cycle + seconds * (pace.speed || 1) * CLOCK_HZ;
+}
+
+/** The cycle that it may be by now: time waits for a host that is silent. */
+function allowed() {
+  const patient = pace.patience > 0 && process.hrtime.bigint() < spokenAt + MOST_PATIENCE;
+  return patient ? Math.min(clock(), spoken + pace.patience * CLOCK_HZ) : clock();
 }
 
 function free() {
@@ -110,7 +122,7 @@ function turn() {
       port.write(Buffer.from(heard.splice(0)));
     }
   }
-  if (free() || allowed() - chip.cycle > 0.05 * CLOCK_HZ) {
+  if (free() || clock() - chip.cycle > 0.05 * CLOCK_HZ) {
     from = { cycle: chip.cycle, time: process.hrtime.bigint() }; // a busy machine lets time slip
   }
   if (free() || chip.cycle < allowed()) {
@@ -125,6 +137,7 @@ if (!stepped) {
   port.on('data', (data) => {
     host.write(data);
     spoken = chip.cycle;
+    spokenAt = process.hrtime.bigint();
   });
   port.on('error', end);
   port.on('close', end);

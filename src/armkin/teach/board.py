@@ -128,8 +128,9 @@ class BoardActions:
             self._alive = time.monotonic() + DEAD_MAN
             return {}
         self.check_file()
-        self.thread.submit("jog", lambda machine: self._jog(machine, joint, percent))
-        self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
+        with self._lock:  # the job asks how long it goes on as soon as it is submitted
+            self.thread.submit("jog", lambda machine: self._jog(machine, joint, percent))
+            self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
         return {}
 
     def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -230,7 +231,7 @@ class BoardActions:
         share = percent / 100
         top = float(self.arm.max_speed[joint])
         if isinstance(self.thread.board, Foreign):
-            while time.monotonic() < self._alive:
+            while self._held_down():
                 end = time.monotonic() + FOREIGN_JOG
                 self.thread.board.jog(machine, joint, share * top, FOREIGN_JOG)
                 while time.monotonic() < min(end, self._alive) and not self.thread.stopping:
@@ -241,9 +242,12 @@ class BoardActions:
         if machine.position() == "lost":
             share = float(np.clip(share, -1 / jogging.SLOW, 1 / jogging.SLOW))
         speed = share * float(units.joints_out(self.arm, self.arm.max_speed)[joint])
-        jogging.jog(
-            machine, jogging.rates(machine, joint, speed), _LONGEST_JOG, more=lambda: time.monotonic() < self._alive
-        )
+        jogging.jog(machine, jogging.rates(machine, joint, speed), _LONGEST_JOG, more=self._held_down)
+
+    def _held_down(self) -> bool:
+        """Whether the page was heard of lately: its button is held."""
+        with self._lock:
+            return time.monotonic() < self._alive
 
     def _follow(self, machine: Backend) -> None:
         """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""

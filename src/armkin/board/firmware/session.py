@@ -19,7 +19,8 @@ _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
 _POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
 _POLL_SOON = 0.01  # [s] while waiting for credit, which only answers bring, and for the queue's end
 _ENDS = 50  # [ms] of motion that the queue holds when its end is near
-_GIVE_UP = 1.5  # [s] without any answer
+_GIVE_UP = 1.5  # [s] without any answer,
+_TURN = 0.1  # [s] of which one turn counts at most: a program that had to wait longer for its own turn was deaf
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
@@ -44,6 +45,7 @@ class Session:
         self._status: Status | None = None
         self._error: Ack | Status | None = None
         self.heard = port.now()
+        self._silent_for = 0.0  # [s] in which an answer would have been heard
         self._asked = 0.0
         self._until = 0.0  # something has to go on by then
 
@@ -102,7 +104,7 @@ class Session:
         self._digest = info.nonce & 0xFFFF
         self._window.begin(info)
         self._error = None
-        self.heard = self.port.now()
+        self.heard, self._silent_for = self.port.now(), 0.0
         self._patient()
 
     def _patient(self) -> None:
@@ -166,7 +168,10 @@ class Session:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
-        if self.port.now() - self.heard > _GIVE_UP:
+        self._silent_for += min(self.port.now() - now, _TURN)
+        if self.heard >= now:
+            self._silent_for = 0.0
+        elif self._silent_for > _GIVE_UP:
             raise self._silent()
         if self._window:
             self._stalled()
