@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -18,7 +19,7 @@ settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("same")
 # Since 6.130 it also tries numbers that stand in whatever modules are imported by then: with several workers, other
 # ones in every run, as it was left to how fast each of them was.
-_providers = sys.modules.get("hypothesis.internal.conjecture.providers")
+_providers: Any = sys.modules.get("hypothesis.internal.conjecture.providers")
 if hasattr(_providers, "_get_local_constants"):
     _providers._get_local_constants = lambda: _providers._local_constants
 

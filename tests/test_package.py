@@ -63,7 +63,7 @@ def test_a_clean_environment_runs_it_from_any_folder(wheel: Path, tmp_path: Path
 
     def armkin(*words: str) -> str:
         done = subprocess.run(
-            [bin_folder / "armkin", *words], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+            [bin_folder / "armkin", *words], cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False
         )
         assert done.returncode == 0, done.stderr
         return done.stdout

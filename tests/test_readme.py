@@ -29,7 +29,7 @@ def run(command: str) -> str:
     words = shlex.split(command)
     assert words[0] == "armkin"
     answer = subprocess.run(
-        [sys.executable, "-m", "armkin", *words[1:]], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-m", "armkin", *words[1:]], cwd=ROOT, capture_output=True, text=True, timeout=180, check=False
     )
     assert "Traceback" not in answer.stderr
     return answer.stdout.rstrip("\n")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import time
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.planner import Planner
 from command_line import ROOT, run
+from quick import least
 
 LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
 
@@ -24,11 +24,13 @@ LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
 def test_long_words_take_no_long_time(text: str, tmp_path: Path) -> None:
     robot = tmp_path / "arm.yaml"
     robot.write_text((ROOT / "robots/three_dof.yaml").read_text().replace("d: 170", f"d: {text}"))
-    began = time.process_time()
-    assert run("fk", "three_dof", text, 0, 0).code == 2
-    assert run("info", robot).code == 4
-    assert run("fk", "three_dof", "--batch", "-", stdin=f"{text},0,0\n".encode()).code == 2
-    assert time.process_time() - began < 1.5
+
+    def tried() -> None:
+        assert run("fk", "three_dof", text, 0, 0).code == 2
+        assert run("info", robot).code == 4
+        assert run("fk", "three_dof", "--batch", "-", stdin=f"{text},0,0\n".encode()).code == 2
+
+    assert least(tried, 1.5) < 1.5
 
 
 def test_copies_of_a_branch_are_counted_before_they_are_made(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ROOT, THREE_DOF, Result, run
+from quick import least
 
 SNAPSHOT = ROOT / "tests/snapshots/cli_errors.txt"
 DOF = THREE_DOF
@@ -193,9 +194,9 @@ def snapshots() -> dict[str, str]:
 @pytest.mark.parametrize("name", CASES)
 def test_hostile(name: str, folder: Path) -> None:
     run("info", DOF)  # the imports are not the command line's time
-    began = time.perf_counter()
-    result = outcome(name, folder)
-    seconds = time.perf_counter() - began
+    results: list[Result] = []
+    seconds = least(lambda: results.append(outcome(name, folder)), 2, time.monotonic)
+    result = results[0]
     code = CASES[name][0]
     assert result.code == code, result.err
     assert "Traceback" not in result.err

@@ -31,7 +31,7 @@ def test_head_has_seen_enough(tmp_path: Path) -> None:
         assert p.stderr is not None
         assert p.stdout.readline().startswith(b"q1,q2,q3,x,y,z")
         p.stdout.close()
-        assert p.wait(30) == 0
+        assert p.wait(60) == 0
         assert p.stderr.read() == b""
 
 
@@ -73,7 +73,7 @@ def test_signals(number: int, code: int, tmp_path: Path) -> None:
         while not list(tmp_path.iterdir()):  # it has begun to write
             time.sleep(0.01)
         p.send_signal(number)
-        assert p.wait(10) == code
+        assert p.wait(60) == code
         assert p.stderr.read() == b""
         p.stdin.close()
     assert list(tmp_path.iterdir()) == []

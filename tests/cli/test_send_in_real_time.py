@@ -146,7 +146,7 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
 
 
 def test_stop_beside_a_suspended_sender() -> None:
-    seconds = []
+    seconds: list[float] = []
     while not seconds or (min(seconds) > 6 and len(seconds) < 5):  # a busy computer may be slow, once
         with PtyBoard() as board:
             sender = moving(board, speed=5)

@@ -100,7 +100,7 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
     with EmulatedBoard(elf=probe) as board:
         assert Path(board.port).is_symlink()
         for boots in (2, 3, 4):  # power-on was the first
-            with serial.Serial(board.port, 250000, timeout=5) as port:
+            with serial.Serial(board.port, 250000, timeout=60) as port:
                 board.wait(2 * MS)
                 assert ask(port, b"r") == b"02 %04x 0\n" % boots
                 assert ask(port, b"p\x64") == b"\n"
@@ -110,9 +110,9 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
         assert board.stats()["port"]["opened"] == 8
         board.control("reset-on-open off")
         board.wait(2 * MS)
-        with serial.Serial(board.port, 250000, timeout=5) as port:
+        with serial.Serial(board.port, 250000, timeout=60) as port:
             assert board.stats()["resets"] == 9
-            with serial.Serial(board.port, 250000, timeout=5):
+            with serial.Serial(board.port, 250000, timeout=60):
                 assert ask(port, b"p\x01") == b"\n"
             assert board.stats()["resets"] == 9
         where = Path(board.port)
@@ -120,7 +120,7 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
 
 
 def test_a_long_transfer_keeps_every_byte(probe: Path) -> None:
-    with EmulatedBoard(elf=probe) as board, serial.Serial(board.port, 250000, timeout=5) as port:
+    with EmulatedBoard(elf=probe) as board, serial.Serial(board.port, 250000, timeout=60) as port:
         board.wait(2 * MS)
         sent = bytes(range(5, 255)) * 20
         begin = time.monotonic()
@@ -142,7 +142,7 @@ def test_the_clock_follows_real_time_or_the_host(probe: Path) -> None:
         board.control("speed 0.25")
         assert 0.05 < rate(board) < 0.35
     with EmulatedBoard(elf=probe, speed="max", ahead_ms=2000) as board:
-        with serial.Serial(board.port, 250000, timeout=5) as port:
+        with serial.Serial(board.port, 250000, timeout=60) as port:
             board.wait(2 * MS)
             assert ask(port, b"r").startswith(b"02 ")
             waited = board.stats()["pace"]["waited_ms"]

@@ -10,10 +10,11 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
-from emulator import BoardError, build_simulator, compile_program
+from emulator import CLOCK_HZ, BoardError, build_simulator, compile_program
 from probing import MS, PROBE, ask, started, stepped
 
 
@@ -143,17 +144,26 @@ def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
     with process:
         assert process.stdout is not None
         assert f"--port {link}" in "".join(process.stdout.readline() for _ in range(4))
-        with serial.Serial(str(link), 250000, timeout=5) as port:
-            time.sleep(0.5)
-            assert ask(port, b"l") == b"1110\n"
         with socket.socket(socket.AF_UNIX) as client, client.makefile("rw") as lines:
             client.connect(str(control))
-            for sent, answer in (("pin A0 z", "true"), ("pin A0 2", "false")):
-                lines.write(sent + "\n")
+
+            def say(command: str) -> dict[str, Any]:
+                lines.write(command + "\n")
                 lines.flush()
-                assert ("ok" in json.loads(lines.readline())) is (answer == "true")
+                answer: dict[str, Any] = json.loads(lines.readline())
+                return answer
+
+            with serial.Serial(str(link), 250000, timeout=60) as port:
+                while not say("stats")["port"]["opened"]:
+                    time.sleep(0.01)
+                ready = say("cycles")["cycle"] + 5 * MS * CLOCK_HZ
+                while say("cycles")["cycle"] < ready:
+                    time.sleep(0.01)
+                assert ask(port, b"l") == b"1110\n"
+            for sent, good in (("pin A0 z", True), ("pin A0 2", False)):
+                assert ("ok" in say(sent)) is good
         process.send_signal(signal.SIGINT)
-        assert process.wait(5) == 0
+        assert process.wait(60) == 0
     assert json.loads(figures.read_text())["uart"]["received"] == 1
     assert list(folder.iterdir()) == []
     folder.rmdir()

@@ -2,7 +2,6 @@
 
 import json
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from pydantic import ValidationError
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError
 from hostile_robot_files import DH, MOTORS, SCREWS, SERVO, VALID, cases
+from quick import least
 
 ROOT = Path(__file__).parents[2]
 SNAPSHOT = Path(__file__).parents[1] / "snapshots" / "robot_file_errors.txt"
@@ -41,9 +41,9 @@ def _update() -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_hostile_file_is_refused_in_the_reviewed_words(name: str) -> None:
     robot_file.parse(DH)  # the model is built once in a process; that is not the file's time
-    began = time.perf_counter()
-    text = message(CASES[name])
-    seconds = time.perf_counter() - began
+    texts: list[str] = []
+    seconds = least(lambda: texts.append(message(CASES[name])), 2)
+    text = texts[0]
     assert text == snapshots()[f"[{name}]"]
     assert len(text.splitlines()) <= 21, "all problems, a line each, and how many more"
     assert all(len(line) <= 240 for line in text.splitlines())

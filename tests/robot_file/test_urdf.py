@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from armkin.model.build import build
 from armkin.robot_file import urdf
 from armkin.robot_file.writing import angles, number, text
 from command_line import ROOT, run
+from quick import least
 from urdf_chains import CHAINS, moving, pose
 from urdf_chains import text as as_urdf
 
@@ -165,13 +165,17 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
     raw, says = BAD[name]
-    began = time.perf_counter()
-    with pytest.raises((RobotFileError, UsageError)) as caught:
-        urdf.parse(raw, "arm.urdf")
-    assert time.perf_counter() - began < 2
-    assert says in str(caught.value)
-    assert str(caught.value).startswith("arm.urdf: ")
-    assert str(caught.value).count("\n") <= 1
+    texts = []
+
+    def tried() -> None:
+        with pytest.raises((RobotFileError, UsageError)) as caught:
+            urdf.parse(raw, "arm.urdf")
+        texts.append(str(caught.value))
+
+    assert least(tried, 2) < 2
+    assert says in texts[0]
+    assert texts[0].startswith("arm.urdf: ")
+    assert texts[0].count("\n") <= 1
 
 
 def test_the_arm_that_the_traps_spoil_is_one() -> None:

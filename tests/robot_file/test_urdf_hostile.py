@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import threading
-import time
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -14,6 +13,7 @@ import pytest
 
 import armkin
 from command_line import process, run
+from quick import least
 
 WORDS = [
     *("", "a: b # \"x\" 'y'", "a\u0085b", "a\u2028b", "a\tb", "\u00e4\u20ac\U0001f600", "x" * 5000, "{a: b}", "[1]"),
@@ -75,9 +75,9 @@ def test_it_ends_in_words_or_in_a_robot_file(name: str, tmp_path: Path) -> None:
     raw = CASES[name]
     path, made = tmp_path / "x.urdf", tmp_path / "x.yaml"
     path.write_bytes(raw if isinstance(raw, bytes) else raw.encode("utf-8", "surrogatepass"))
-    began = time.process_time()
-    done = run("import", path)
-    assert time.process_time() - began < 2.0
+    results = []
+    assert least(lambda: results.append(run("import", path)), 2.0) < 2.0
+    done = results[0]
     assert "internal error" not in done.err
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u202e]", done.err)
     if done.code == 0:

@@ -30,7 +30,9 @@ def chromium(*options: str) -> Iterator[Browser]:
         "no chromium: install the packages of README's apt-get line, or leave these tests out: -m 'not browser'"
     )
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, headless=True, args=[*_OPTIONS, *options])
+        browser = playwright.chromium.launch(
+            executable_path=path, headless=True, args=[*_OPTIONS, *options], timeout=120_000
+        )
         yield browser
         browser.close()
 
@@ -44,7 +46,7 @@ def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]
     context = browser.new_context(viewport=viewport, **settings)  # type: ignore[arg-type]
     page = context.new_page()
     page.add_init_script(str(script))
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(120_000)
     said: list[str] = []
     asked: list[str] = []
     page.on("console", lambda message: said.append(message.text))
@@ -78,7 +80,7 @@ def aim(page: Page, *target: float) -> None:
     settled(page)
 
 
-def until(page: Page, condition: str, argument: object = None, seconds: float = 15.0) -> None:
+def until(page: Page, condition: str, argument: object = None, seconds: float = 120.0) -> None:
     """Until an expression holds. (Playwright's own waiting evaluates text in the page, which its policy forbids.)"""
     end = time.monotonic() + seconds
     while not page.evaluate(f"argument => {condition}", argument):
@@ -90,6 +92,11 @@ def until(page: Page, condition: str, argument: object = None, seconds: float = 
         page.wait_for_timeout(20)
 
 
+def repainted(page: Page) -> None:
+    """Until what was asked to be drawn by now has been drawn."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 def settled(page: Page) -> None:
     """Until the page's answers have come: nothing is asked any more."""
     until(page, "document.documentElement.dataset.asking === 'no'")
@@ -97,4 +104,4 @@ def settled(page: Page) -> None:
 
 def idle(page: Page, after: str) -> None:
     """Until the board has ended what it was told."""
-    until(page, "document.querySelector('#arrived').textContent.includes(argument)", after, 20)
+    until(page, "document.querySelector('#arrived').textContent.includes(argument)", after)

@@ -94,12 +94,30 @@ def act(server: Server, name: str, fields: dict[str, Any] | None = None, tab: st
     return status, json.loads(data)
 
 
+def _heard(events: http.client.HTTPResponse, topic: str, until: Callable[[Any], bool]) -> Any:
+    """The next news of a topic in a stream of events that is as it shall be; AssertionError after a minute."""
+    current, end = "", time.monotonic() + 60
+    while time.monotonic() < end:
+        line = events.readline().decode().rstrip("\n")
+        if line.startswith("event: "):
+            current = line[7:]
+        elif line.startswith("data: ") and current == topic:
+            data = json.loads(line[6:])
+            if until(data):
+                return data
+    raise AssertionError(f"no such news of {topic} within a minute")
+
+
 class Page:
     """An open page without a browser: it listens, and acts."""
 
     def __init__(self, server: Server) -> None:
         self.server = server
-        status, self.opened = act(server, "open")
+        for _ in range(600):  # pages that have just been closed are open still, for a moment
+            status, self.opened = act(server, "open")
+            if status != 429:
+                break
+            time.sleep(0.1)
         assert status == 200, self.opened
         self.id = self.opened["tab"]
         self._connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=60)
@@ -112,15 +130,7 @@ class Page:
 
     def hear(self, topic: str, until: Callable[[Any], bool] = lambda data: True) -> Any:
         """The next news of a topic that is as it shall be."""
-        current = ""
-        while True:
-            line = self._events.readline().decode().rstrip("\n")
-            if line.startswith("event: "):
-                current = line[7:]
-            elif line.startswith("data: ") and current == topic:
-                data = json.loads(line[6:])
-                if until(data):
-                    return data
+        return _heard(self._events, topic, until)
 
     def idle(self) -> Any:
         """The board's state once it has nothing to do."""
@@ -157,16 +167,18 @@ class Elsewhere:
     def __init__(self, address: str) -> None:
         self.base, _, self.key = address.partition("/#")
         self.tab = ""
-        self.tab = self.act("open")["tab"]
+        self.opened = self.act("open")
+        self.tab = self.opened["tab"]
 
-    def listen(self) -> None:
-        """Hold control, as a page that is open does, once the board has answered."""
-        self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}")
-        for _ in range(1200):
-            if not self.act("open")["board"]["doing"]:
-                return
-            time.sleep(0.05)
-        raise AssertionError("the board does not answer")
+    def listen(self) -> Any:
+        """Hold control, as a page that is open does; the board's state once it has nothing to do."""
+        self.events = urllib.request.urlopen(f"{self.base}/events?tab={self.tab}", timeout=60)
+        state = self.opened["board"]
+        return self.hear(lambda state: not state["doing"]) if state["doing"] else state
+
+    def hear(self, until: Callable[[Any], bool]) -> Any:
+        """The next news of the board that is as it shall be."""
+        return _heard(self.events, "board", until)
 
     def act(self, name: str, **fields: Any) -> Any:
         headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}

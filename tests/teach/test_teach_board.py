@@ -13,6 +13,7 @@ from served import Page, served
 
 import armkin
 from armkin.model import units
+from armkin.teach.board_thread import Job
 from command_line import COUNTS, POSE, ROOT, run
 
 HOME = [0, 90, -90]
@@ -94,6 +95,20 @@ def test_a_jog_lasts_as_long_as_it_is_asked_for(sim: Page) -> None:
     began = sim.clock()
     sim.idle()
     assert sim.clock() - began < 0.5
+
+
+def test_a_jog_that_begins_before_its_request_is_answered_is_one(sim: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    board = sim.server.actions.board
+    assert board is not None
+    submit = board.thread.submit
+
+    def late(name: str, job: Job) -> None:
+        submit(name, job)
+        time.sleep(0.2)  # this thread has to wait for its turn
+
+    monkeypatch.setattr(board.thread, "submit", late)
+    assert sim.act("jog", joint=0, percent=100)[0] == 200
+    assert sim.idle()["pulses"][0] > 100
 
 
 def jogged(page: Page, percent: float, there: Callable[[float], bool]) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import COUNTS, aim, chromium, idle, opened, settled, until, value, values
+from browsing import COUNTS, aim, chromium, idle, opened, repainted, settled, until, value, values
 from matplotlib import image
 from playwright.sync_api import Browser, Page
 from served import served
@@ -98,7 +97,7 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         # The board: send by Enter, STOP by Esc, jog while the space bar is down.
         type_target()  # far from home, wherever the program was paused
         tab_to("#speed")
-        page.keyboard.type("10")
+        page.keyboard.type("3")
         page.evaluate("document.activeElement.blur()")
         tab_to("#send")
         page.keyboard.press("Enter")
@@ -107,7 +106,7 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         idle(page, "stopped")
         tab_to("#jog-up")
         page.keyboard.down(" ")
-        time.sleep(0.4)
+        until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
         page.keyboard.up(" ")
         idle(page, "jog: done")
         page.evaluate("document.activeElement.blur()")
@@ -118,13 +117,13 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
 def test_the_handle_is_dragged_and_the_arm_follows_it(page: Page) -> None:
     aim(page, 350, 0, 250)
     page.click("[data-view=front]")
-    page.wait_for_timeout(200)
+    repainted(page)
     x, y = map(float, (page.get_attribute("#canvas", "data-handle") or "").split())
     box = page.locator("#canvas").bounding_box()
     assert box is not None
     before = values(page, "#target input")
     page.mouse.move(box["x"] + x, box["y"] + y - 45)  # the arrow of z
-    page.wait_for_timeout(100)
+    repainted(page)
     page.mouse.down()
     for step in range(10):
         page.mouse.move(box["x"] + x, box["y"] + y - 45 - 4 * step)
@@ -212,7 +211,7 @@ def test_the_readme_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
         page.click("[data-view=space]")
         page.evaluate("document.activeElement.blur(); document.querySelector('#panels').scrollTop = 0")
         page.mouse.move(5, 500)
-        page.wait_for_timeout(500)
+        repainted(page)
         until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
         page.screenshot(path=now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
@@ -312,7 +311,7 @@ def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
         until(second, "document.querySelector('#name-0')")
         second.wait_for_timeout(300)
         assert second.inner_text("#trouble") == second.inner_text("#planned") == ""  # who watches asks for nothing
-        first.fill("#speed", "20")
+        first.fill("#speed", "5")
         until(second, "document.querySelector('#box-0').value === '10.1529'")
         first.click("#send")
         until(second, "document.querySelector('#standing').textContent.startsWith('send')")

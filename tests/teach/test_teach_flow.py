@@ -28,7 +28,8 @@ def carried_out(page: Page, button: str, what: str) -> None:
     """
     for _ in range(3):
         page.click(button)
-        until(page, "document.querySelector('#arrived').textContent || document.querySelector('#trouble').textContent")
+        said = "document.querySelector('#arrived').textContent.includes(argument)"
+        until(page, f"{said} || document.querySelector('#trouble').textContent", f"{what}: done")
         if "half a second" not in page.inner_text("#trouble"):
             break
     idle(page, f"{what}: done")
@@ -59,10 +60,10 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         assert "q1 10.15, q2 44.66, q3 -46.53" in page.inner_text("#position")
         # STOP on the way home: the position stays known.
         page.get_by_role("button", name="home", exact=True).click()
-        page.fill("#speed", "20")
+        page.fill("#speed", "5")
         page.click("#send")
         until(page, "document.querySelector('#standing').textContent.startsWith('send')")
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60
         while net(board)[1] < COUNTS[1] + 200:
             assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
             page.wait_for_timeout(20)
@@ -76,7 +77,10 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         page.select_option("#jog-joint", label="q1")
         page.hover("#jog-up")
         page.mouse.down()
-        time.sleep(0.6)
+        end = time.monotonic() + 60
+        while net(board)[0] <= before[0] + 50:
+            assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
+            page.wait_for_timeout(20)
         page.mouse.up()
         idle(page, "jog: done")
         after = net(board)

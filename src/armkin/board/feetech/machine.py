@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.model import Gripper
 
 PERIOD = 0.02  # [s] between positions
+LATE = 0.05  # [s] that one goes on at most: a program that had no time for longer does not cut across its path
 WATCH = 0.1  # [s] between readings of position and errors in motion
 LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
 SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
@@ -188,10 +189,10 @@ class ServoMachine(JobMachine):
                 self.port.read(PERIOD - (now - last))
                 continue
             stopping = stopping or self._stop()
+            passed, last = min(now - last, LATE), now
             if stopping:
-                pace = max(0.0, pace - (now - last) / ramp)
-            t = min(trajectory.duration, t + (now - last) * pace)
-            last = now
+                pace = max(0.0, pace - passed / ramp)
+            t = min(trajectory.duration, t + passed * pace)
             ahead = min(trajectory.duration, t + PERIOD * pace)
             self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
             tell(t)

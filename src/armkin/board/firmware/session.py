@@ -193,12 +193,13 @@ class Session:
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 self._same(reply.session)
                 self._window.check(reply)
+            shorter = reply.queued < self.queued
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 self.line.answered(reply.tag)
-            if self._window.acknowledge(reply):
+            if self._window.acknowledge(reply) or shorter:
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply

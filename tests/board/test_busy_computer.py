@@ -1,0 +1,89 @@
+"""A program that its computer gives no time for seconds: it was deaf then, and the arm goes on along its path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_feetech_machine import ARM, bus, machine
+
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.servo_bus import ServoBus
+from armkin.errors import LinkError
+from armkin.model import build as arms
+from command_line import COUNTS, POSE, ROOT
+from sim_wire import Wire
+
+PAUSE = 3.0  # [s]
+
+
+class Suspended(Wire):
+    """A port whose program stands still now and then, while the clock goes on and the board's time waits."""
+
+    every = 0.0  # [s] of the board's time between two pauses; 0: none
+    silent = False  # whether the board has stopped to answer
+    paused = 0.0  # [s] in all
+    _next = 0.0
+
+    def read(self, timeout: float) -> bytes:
+        data = super().read(timeout)
+        if self.every and self._now >= self._next:
+            self.paused += PAUSE
+            self._next = self._now + self.every
+        return b"" if self.silent else data
+
+    def now(self) -> float:
+        return super().now() + self.paused
+
+
+def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
+    arm = arms.load(ROOT / "robots/three_dof.yaml")
+    configuration = configure(arm)
+    port = Suspended(SimBoard(configuration.board))
+    one = Machine(port, arm, configuration)
+    one.prepare(assume=arm.home)
+    port.every = 0.3
+    one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])
+    assert port.paused > 5 * PAUSE
+    assert one.counts() == tuple(COUNTS)
+
+
+def test_a_board_that_is_gone_is_told_within_two_seconds() -> None:
+    arm = arms.load(ROOT / "robots/three_dof.yaml")
+    configuration = configure(arm)
+    port = Suspended(SimBoard(configuration.board))
+    one = Machine(port, arm, configuration)
+    one.prepare(assume=arm.home)
+    port.silent, began = True, port.now()
+    with pytest.raises(LinkError, match="does not answer any more"):
+        one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])
+    assert port.now() - began < 2.0
+
+
+class SuspendedBus(ServoBus):
+    """A bus whose program stands still once a motion; the servos go on."""
+
+    due = float("inf")
+
+    def read(self, timeout: float) -> bytes:
+        if self._now >= self.due:
+            self.due = float("inf")
+            for _ in range(round(PAUSE / self.step)):
+                self.advance(self.step)
+        return super().read(timeout)
+
+
+def test_servos_go_on_where_they_were() -> None:
+    port = SuspendedBus(bus().servos.values())
+    one = machine(port)
+    start, began = np.array(one.counts()), port.now()
+    plan = one.plan(one.counts(), np.array([2.0, -1.5, 1.0]))
+    port.due = port.now() + plan.duration / 2
+    one.run([plan])
+    assert port.now() - began > PAUSE
+    places = np.array([[at[k] for k in (1, 2, 3)] for _, at in port.log])
+    way = plan.end - start
+    share = ((places - start) @ way) / (way @ way)
+    assert np.abs(places - start - share[:, None] * way).max() < 25  # 2 degrees, as without a pause
+    assert np.abs(np.diff(places, axis=0)).max() / port.step < 1.6 * np.abs(ARM.motor_gain @ ARM.max_speed).max()
