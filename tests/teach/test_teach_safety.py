@@ -33,6 +33,13 @@ def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
         page.close()
 
 
+def told(page: Page) -> Any:
+    """The board's state once it has done what it was asked for."""
+    state = page.idle()
+    assert state["error"] == ""
+    return state
+
+
 def begin_move(page: Page, board: EmulatedBoard) -> None:
     """A move to the pose that has come a good way, and has 5 s to go."""
     if page.idle()["position"] != "known":
@@ -58,7 +65,7 @@ def test_a_lost_position_is_not_sent_from_and_home_is_assumed_with_consent(
     state = page.idle()
     assert (state["position"], state["pulses"]) == ("known", [0, 0, 0])
     page.act("send", q=POSE, speed=100)
-    assert page.idle()["pulses"] == COUNTS
+    assert told(page)["pulses"] == COUNTS
     assert net(board) == COUNTS
 
 
@@ -122,7 +129,7 @@ def test_a_watching_page_that_is_closed_holds_nothing(emulated: tuple[Page, Emul
     watcher = Page(page.server)
     begin_move(page, board)
     watcher.close()
-    assert page.idle()["pulses"] == COUNTS
+    assert told(page)["pulses"] == COUNTS
 
 
 def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
@@ -181,7 +188,7 @@ def test_switches_are_found_from_the_page(tmp_path: Path) -> None:
         assert (state["position"], state["error"]) == ("known", "")
         assert_found(state["pulses"], net(board))
         page.act("send", q=POSE, speed=100)
-        assert page.idle()["pulses"] == COUNTS
+        assert told(page)["pulses"] == COUNTS
         page.close()
 
 

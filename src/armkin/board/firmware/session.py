@@ -61,7 +61,7 @@ class Session:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
             if since < 0.3 or since > 1.8:
-                info = self._hello(0.06 if since < 0.3 else 0.15)
+                info = self._hello(0.06 if since < 0.3 else 0.15 if since < 3.0 else 0.4)
                 if info is not None:
                     return info
             else:
@@ -76,11 +76,11 @@ class Session:
 
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""
-        for _ in range(40):
-            info = self._hello(0.05)
+        for attempt in range(40):
+            info = self._hello(0.2 if attempt % 4 == 3 else 0.05)  # a busy computer's answers come late
             if info is not None:
                 return info
-        raise self._silent()
+        raise _silent(self.port)
 
     def _hello(self, timeout: float) -> Info | None:
         # the low half is the session's digest, and 0 means none
@@ -172,7 +172,7 @@ class Session:
         if self.heard >= now:
             self._silent_for = 0.0
         elif self._silent_for > _GIVE_UP:
-            raise self._silent()
+            raise _silent(self.port)
         if self._window:
             self._stalled()
 
@@ -223,16 +223,18 @@ class Session:
 
     def status(self, page: int = 0) -> Status:
         """Where the board stands, now; also after the session has ended."""
+        tags: set[int] = set()  # asked since this was called: an answer may come later than the next question
         for attempt in range(60):
             self.line.resent += attempt > 0
-            tag, end = self._ask(page), self.port.now() + 0.05
+            tags.add(self._ask(page))
+            end = self.port.now() + 0.05
             while self.port.now() < end:
                 self._status = None
                 self._hear(max(0.001, end - self.port.now()))
                 answer: Status | None = self._status
-                if answer is not None and answer.tag == tag and answer.page == page:
+                if answer is not None and answer.tag in tags and answer.page == page:
                     return answer
-        raise self._silent()
+        raise _silent(self.port)
 
     def hold(self) -> Status:
         """Stop the arm along its path; its status at rest."""
@@ -273,11 +275,12 @@ class Session:
             self.pump(ends=not self._window and self.queued < _ENDS)
             yield self.under_way + self.queued / 1000
 
-    def _silent(self) -> LinkError:
-        return LinkError(
-            f"the board on {self.port.name} does not answer any more: is the cable plugged in?\n"
-            "a moving arm has stopped on its path by itself; armkin status tells where it stands"
-        )
+
+def _silent(port: Port) -> LinkError:
+    return LinkError(
+        f"the board on {port.name} does not answer any more: is the cable plugged in?\n"
+        "a moving arm has stopped on its path by itself; armkin status tells where it stands"
+    )
 
 
 def _no_board(port: Port, heard: bytes, damaged: bool) -> str:
