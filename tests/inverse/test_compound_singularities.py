@@ -46,6 +46,8 @@ from armkin.inverse.recognise import solver
         ("iiwa7", [90, -45, 0, 180, 0, 0]),
         ("fanuc_crx10ia", [0, 0, -90, 180, -135, 90]),
         ("fanuc_crx10ia", [-90, 90, -90, 0, -90, 180]),
+        # a corner that its own self-motion passes, seen from a hair beside it
+        ("ur5e", [-90, -90, 180, -90, 0, -90]),
     ],
 )
 def test_compound_singularities(name: str, q: list[float]) -> None:

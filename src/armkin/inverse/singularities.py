@@ -159,7 +159,11 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < SOLUTION)
+        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < MOVING)
+        # (one a hair beside it, where it passes a corner, if the same joints move it)
+        row, column = np.nonzero(mine & (sigma[k] >= SOLUTION))
+        ask(k[row], column)
+        mine[row, column] = moves[k[row], column] & (which[k[row], column] == joints[row]).all(axis=1)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:
