@@ -263,6 +263,12 @@ def three_parallel(rng: Rng, first: int, meet: bool = True) -> Fields:
     return spatial(rng, "RRRRRR", w, q, **anywhere(rng))
 
 
+def three_meeting(rng: Rng, first: int) -> Fields:
+    """Axes first, first + 1, first + 2 through one point, between the others."""
+    point = rng.uniform(-300, 300, 3)
+    return spatial(rng, "RRRRRR", [None] * 6, [point if first <= i < first + 3 else None for i in range(6)])
+
+
 add("three parallel axes 2, 3, 4", "pose", lambda r: three_parallel(r, 1))
 add("three parallel axes 3, 4, 5", "pose", lambda r: three_parallel(r, 2))
 add("UR table", "pose", lambda r: dh(r, "RRRRRR", [90.0, 0.0, 0.0, 90.0, -90.0, 0.0], [0.0, _N, _N, 0.0, 0.0, 0.0]))
@@ -270,6 +276,10 @@ add("three parallel axes 2, 3, 4, none meet", "pose", lambda r: three_parallel(r
 add("three parallel axes 3, 4, 5, none meet", "pose", lambda r: three_parallel(r, 2, meet=False))
 add("three parallel axes 1, 2, 3", "pose", lambda r: three_parallel(r, 0, meet=False))
 add("three parallel axes 4, 5, 6", "pose", lambda r: three_parallel(r, 3, meet=False))
+add("three parallel axes 2, 3, 4, and 5, 6", "pose", lambda r: dh(
+    r, "RRRRRR", [_N, 0.0, 180.0, _N, 0.0, _N], [_N] * 6, **anywhere(r)))  # fmt: skip
+add("three axes that meet 2, 3, 4", "pose", lambda r: three_meeting(r, 1))
+add("three axes that meet 3, 4, 5", "pose", lambda r: three_meeting(r, 2))
 add("6R general", "pose", lambda r: dh(r, "RRRRRR", [_N] * 6, [_N] * 6, **anywhere(r)))
 add("6R modified DH", "pose", lambda r: dh(r, "RRRRRR", [_N] * 6, [_N] * 6, convention="modified", **anywhere(r)))
 for _k in range(6):

@@ -69,6 +69,22 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     assert doubt.mean() < {"random": 0.01, "sizes": 0.02}.get(kind, 0.7)
 
 
+def test_two_double_roots() -> None:
+    """A squared line that crosses the circle: both roots of second order, told as such, not one of fourth order."""
+    rng = np.random.default_rng(5)
+    x, y = rng.normal(size=(2, 4000)) * (rng.random((2, 4000)) < 0.7)
+    z = rng.uniform(-0.9, 0.9, 4000) * np.hypot(x, y) * (rng.random(4000) < 0.7)
+    x, y, z = (v[np.hypot(x, y) > 0.1] for v in (x, y, z))
+    e = np.array([z * z, 2 * x * z, 2 * y * z, x * x, 2 * x * y, y * y])
+    e *= 1 + 3e-16 * rng.integers(-1, 2, e.shape)
+    pair, told = trig_quadratic(list(e), 1.0)
+    middle, half = np.arctan2(y, x), np.arccos(-z / np.hypot(x, y))
+    q = np.arctan2(pair.s, pair.c).reshape(4, -1)
+    for wanted in (middle + half, middle - half):
+        assert np.abs(np.exp(1j * q) - np.exp(1j * wanted)).min(axis=0).max() < 1e-5
+    assert np.asarray(told.edge.any(axis=(0, 1, 2))).all()
+
+
 def test_a_conic_that_vanishes_on_the_circle_leaves_the_angle_free() -> None:
     """cos^2 + sin^2 - 1, in rounded multiples, beside one that is off by a little."""
     k = np.array([0.5, 1.0, 0.1, 7.3e-3, 0.7, 0.7])

@@ -32,7 +32,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
 
     Where a joint is free, the candidates are not all.
     """
-    arm, task, target, near = goals
+    arm, _, target, near = goals
     doubtful, q, valid, free = doubts
     left = free.copy()
     for start in range(0, len(doubtful), AT_ONCE):
@@ -52,27 +52,53 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             out.status[rows[new]] = np.where(found.double[new], Status.BOUNDARY, Status.EXACT)
             out.status[rows[new[moving[new]]]], out.free[rows[new]] = Status.SINGULAR, found.free[new]
 
+    open_ = np.flatnonzero(left)
+    first, other, loose, ends = _freed(goals, runner, doubts, open_[free[open_]])
+
     def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""
         some = open_[some]
-        first, loose = q[some], np.zeros(q[some].shape[:2], bool)
-        loosened = np.flatnonzero(free[some])
-        if not len(loosened):
-            return first, loose
-        rows = doubtful[some[loosened]]
-        goal, other = entries(task, target[rows]), np.full(first.shape, np.nan)
-        first[loosened], other[loosened] = (
-            as_rows(runner.candidates(goal, preferred(arm, near[rows] + shift))[: arm.n], len(rows))
+        if not loose[some].any():
+            return first[some], loose[some]
+        more = [other[some]]
+        if runner.geometry.ends:
+            more.append(q[some])  # it may be that the joint is not quite free
+        fixed = np.zeros((len(some), sum(part.shape[1] for part in more)), bool)
+        return np.concatenate([first[some], *more], axis=1), np.concatenate([loose[some], fixed], axis=1)
+
+    unsettled = None
+    if runner.geometry.ends:
+        unsettled = np.zeros(len(target), bool)
+        unsettled[doubtful[ends]], out.complete[doubtful[ends]] = True, False
+    return examined(goals, out, doubtful[open_], candidates, runner.others, unsettled)
+
+
+def _freed(
+    goals: Goals, runner: Recorded, doubts: Doubts, rows: NDArray[np.intp]
+) -> tuple[Array, Array, Bool, NDArray[np.intp]]:
+    """Candidates of the doubtful targets, those that leave a joint free with preferred values, as near `near`.
+
+    And the same with other values, nan where these change nothing; which candidates they change (K, B); and the targets
+    on which the joints that the geometry calls ends are free. rows: the targets that leave joints free.
+    """
+    arm, task, target, near = goals
+    first, loose = doubts.q.copy(), np.zeros(doubts.q.shape[:2], bool)
+    other, ends = np.full(first.shape, np.nan), [rows[:0]]
+    for start in range(0, len(rows), AT_ONCE):
+        part = rows[start : start + AT_ONCE]
+        whole = doubts.rows[part]
+        goal = entries(task, target[whole])
+        first[part], second = (
+            as_rows(runner.candidates(goal, preferred(arm, near[whole] + shift))[: arm.n], len(part))
             for shift in (0.0, 1.0)
         )
-        loose[loosened] = ~(np.abs(first[loosened] - other[loosened]).max(axis=2) < SAME)
-        if not loose.any():
-            return first, loose
-        other[~loose] = np.nan
-        return np.concatenate([first, other], axis=1), np.concatenate([loose, np.zeros_like(loose)], axis=1)
-
-    open_ = np.flatnonzero(left)
-    return examined(goals, out, doubtful[open_], candidates, runner.others)
+        apart = np.abs(first[part] - second)
+        changed = ~(apart.max(axis=2) < SAME)
+        loose[part] = changed
+        other[part] = np.where(changed[:, :, None], second, np.nan)
+        apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
+        ends.append(part[(apart > SAME).any(axis=(1, 2))])
+    return first, other, loose, np.concatenate(ends)
 
 
 def examined(

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.forward import fk
 from armkin.inverse.closed import spherical
-from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.closed.candidates import is_sound
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, AT_ZERO, EXACT
+from armkin.inverse.numeric.tolerances import AT_ZERO, EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import from_links
 from armkin.model.chain import Chain, is_parallel, reverse
@@ -107,16 +106,9 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
             axes = "1 and 2" if first else "4 and 5"
             why = f"5 joints for a pose of six: a virtual joint where axes {axes} meet must stay at zero; {inner.why}"
             geometry = Geometry("five joints", why, True, _of_five(inner.pairs, first), ordered=inner.ordered)
-            if _is_sound(arm, task, geometry):
+            if is_sound(arm, task, geometry):
                 return geometry
     return None
-
-
-def _is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
-    """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
-    q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
-    _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
-    return int((miss.min(axis=1) <= ACCEPTED**2).sum()) >= 15
 
 
 def _of_five(

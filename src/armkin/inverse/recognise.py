@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin.errors import RedundantArmError, UsageError
 from armkin.inverse import general, nearly_special, tool_axis
-from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
+from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.tasks.fitting import default_task, rank, task_for
 from armkin.inverse.tasks.task import Task
@@ -81,6 +81,7 @@ _CLASSES: tuple[Callable[[Arm, Task], Geometry | None], ...] = (
     three_joints.recognise,
     spherical.recognise,
     three_parallel.recognise,
+    anywhere.recognise,
     nearly_special.recognise,
     _tool_axis,
     general.recognise,

@@ -159,7 +159,8 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        mine = rest & moving[:, None] & (held < TURNED) & (sigma[k] < MOVING)
+        # (two postures of it, each off by as much as a double root)
+        mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < MOVING)
         # (one a hair beside it, where it passes a corner, if the same joints move it)
         row, column = np.nonzero(mine & (sigma[k] >= SOLUTION))
         ask(k[row], column)

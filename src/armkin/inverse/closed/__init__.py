@@ -3,6 +3,9 @@
 geometry.py        what a class provides
 subproblems.py     the equations of the closed forms
 candidates.py      a class's candidates with their residuals, from recorded code
+quadratics.py      quadratic expressions of a cosine and a sine
+wrist.py           three axes that meet
+three_link.py      three parallel axes
 crossings.py       where a self-motion of a class meets another one
 
 planar.py          all joints in the base's x-y plane, and SCARAs
@@ -10,4 +13,5 @@ elbow.py           joints 2 and 3 (and 4) parallel: positions, with pitch, with 
 three_joints.py    any three joints that place a point: the quartic
 spherical.py       three axes that meet in a point, at the wrist or at the shoulder
 three_parallel.py  three parallel axes: the UR arms
+anywhere.py        three axes that are parallel or meet, anywhere in the arm
 """

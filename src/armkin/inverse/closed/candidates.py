@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import LazyCode
+from armkin.forward import fk
 from armkin.inverse.closed import crossings
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
-from armkin.inverse.numeric.tolerances import HOPELESS, SEED
+from armkin.inverse.many_starts import many_starts
+from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -62,8 +64,8 @@ class Recorded:
         """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
 
         Where branches seem lost (N,): with other values for the joints that are free, and for targets moved a little,
-        which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where
-        the candidate is far from its target. near: (N, n).
+        which do not, and of some classes from many starts. Everywhere: of places where a self-motion meets another one.
+        nan where there is none, or where the candidate is far from its target. near: (N, n).
         """
         rng = np.random.default_rng(4)
         N, n = len(target), self.arm.n
@@ -87,8 +89,18 @@ class Recorded:
         on = np.where((miss < SEED**2)[:, :, None], q, np.nan)[:, : FREED * B].reshape(N, FREED, B, n)
         meeting = crossings.beside(self.arm, self.task, on, target)
         q[~lost] = np.nan
-        branch = np.concatenate([np.tile(np.arange(B), len(offsets)), np.arange(meeting.shape[1]) % B])
-        return np.concatenate([q, meeting], axis=1), branch
+        more = [q, meeting]
+        if self.geometry.ends and lost.any():
+            more.append(many_starts(self.arm, self.task, target, lost))
+        branch = np.concatenate([np.arange(part.shape[1]) % B for part in more])
+        return np.concatenate(more, axis=1), branch
+
+
+def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
+    """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
+    q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
+    _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
+    return int((miss.min(axis=1) <= ACCEPTED**2).sum()) >= 15
 
 
 def preferred(arm: Arm, near: Array) -> list[Pair]:

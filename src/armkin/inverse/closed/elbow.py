@@ -112,14 +112,15 @@ class TwoLink:
         self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), 1e-9)
 
     def solve(
-        self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None
-    ) -> tuple[Pair, Pair, Doubt]:
-        """Both elbows, on branch axis 1: pairs of joints 2 and 3, and doubt (N,); fore: m, if the target changes it."""
+        self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None,
+        axis: int = 1,
+    ) -> tuple[Pair, Pair, Doubt]:  # fmt: skip
+        """Both elbows, on that branch axis: pairs of joints 2 and 3, and doubt; fore: m, if the target changes it."""
         lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
         upper2, fore2, across2 = lx * lx + ly * ly, mx * mx + my * my, rx * rx + ry * ry
         # |r|^2 = |l + Rz(q3) m|^2, halved: the product of both lengths and the cosine of the angle between them
         ahead, beside, known = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
-        third, doubt3 = linear(ahead, beside, known, 1, self.scale**2, prefer3)
+        third, doubt3 = linear(ahead, beside, known, axis, self.scale**2, prefer3)
         third = third if self.sense > 0 else Pair(third.c, -third.s)
         ux, uy, _ = self.reach(third, fore)
         # |l + Rz(q3) m| is the same for both elbows: once for both the pair below is normalised

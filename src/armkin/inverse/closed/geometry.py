@@ -44,4 +44,5 @@ class Geometry:
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
     elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do
+    ends: tuple[int, ...] = ()  # of `pairs`: joints that, where they are free, may leave others few solutions or more
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

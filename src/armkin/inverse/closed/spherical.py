@@ -24,13 +24,10 @@ from armkin.inverse.closed.subproblems import (
     Pair,
     Prefer,
     distance2,
-    linear,
-    rotation_between,
-    signs,
-    spin,
 )
 from armkin.inverse.closed.three_joints import Position
-from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
+from armkin.inverse.closed.wrist import Wrist, meeting_point
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -71,16 +68,10 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
     """Where axes 4, 5 and 6 meet: seen after joint 3 and after joint 6, (3,) each, or None."""
-    if chain.prismatic[3:].any() or is_parallel(chain.link[4], 1e-6) or is_parallel(chain.link[5], 1e-6):
+    met = None if chain.prismatic[3:].any() else meeting_point(chain.link[4], chain.link[5], tolerance)
+    if met is None:
         return None
-    # axis 4 is the z axis, axis 5 the line t + s w: the foot of their common perpendicular on axis 4
-    t, w = chain.link[4][:3, 3], chain.link[4][:3, 2]
-    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])
-    at4 = np.array([0.0, 0.0, height])
-    at5 = (inverse(chain.link[4]) @ [*at4, 1.0])[:3]
-    at6 = (inverse(chain.link[5]) @ [*at5, 1.0])[:3]
-    if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:
-        return None
+    at4, at6 = met
     L3 = chain.link[3]
     return L3[:3, :3] @ at4 + L3[:3, 3], at6
 
@@ -113,16 +104,7 @@ class SphericalWrist:
         end = inverse(chain.link[6])
         self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # in the tool's frame
         self.end = pose.constant(end)
-        self.A = pose.constant(chain.link[4])
-        self.B = pose.constant(chain.link[5])
-        A, b = chain.link[4][:3, :3], chain.link[5][:3, 2]
-        # z . A Rz(q5) b = c5 (A20 b0 + A21 b1) + s5 (A21 b0 - A20 b1) + A22 b2
-        self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
-        self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
-        self.rest5 = float(A[2, 2] * b[2])
-        self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
-        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
-        self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
+        self.wrist = Wrist(chain.link[4], chain.link[5])
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
@@ -135,13 +117,10 @@ class SphericalWrist:
             x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
         else:
             miss, x, z = self._pushed(pairs, centre, columns)
-        miss = arrays.mul(1.0 / self.reach**2, miss)
-        if self.mirrored:
-            return self._mirrored(pairs, doubt, miss, x, z, prefer)
-        disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[4], disc, self.tangent)
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
-        return Candidates([*pairs, fourth, fifth, sixth], doubt | doubt5 | doubt4, miss + wrong)
+        turned, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
+        miss = arrays.mul(1.0 / self.reach**2, miss) + wrong
+        angles = turned.angles and [None, None, None, *turned.angles]
+        return Candidates([*pairs, *turned.pairs], doubt | doubt456, miss, angles)
 
     def _pushed(
         self, pairs: list[Pair], centre: list[Entry], columns: list[list[Entry]]
@@ -154,41 +133,3 @@ class SphericalWrist:
         there = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
         x, z = (pose.turn_back(P, v) for v in columns)
         return distance2(there, centre), x, z
-
-    def _around(
-        self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
-    ) -> tuple[Pair, Pair, Doubt, Entry]:
-        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
-
-        across: the square of z's part across joint 4, if the wrist can reach every z.
-        """
-        turn5 = pose.rotate(self.A, *fifth)
-        u = pose.turn(turn5, self.B[6:9])
-        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[3], across)
-        c4, s4 = fourth
-        # what is left is Rz(q6): its first column, which lies in the plane across joint 6
-        back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
-        c6, s6, off = pose.turn_back(self.B, back)
-        wrong = distance2(spin(c4, s4, u), z) + off * off
-        return fourth, Pair(c6, s6), doubt4, wrong
-
-    def _mirrored(
-        self, pairs: list[Pair], doubt: Doubt, miss: Entry, x: list[Entry], z: list[Entry], prefer: Prefer
-    ) -> Candidates:
-        """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
-        disc = z[0] * z[0] + z[1] * z[1]
-        fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, np.sqrt(disc)))
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
-        sign = signs(2)
-        flipped = 0.5 - 0.5 * sign
-        q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
-        angles = [
-            None,
-            None,
-            None,
-            q4 - flipped * np.copysign(np.pi, q4),
-            sign * np.arctan2(fifth.s, fifth.c),
-            q6 - flipped * np.copysign(np.pi, q6),
-        ]
-        doubt = doubt | (disc < SHARP) | doubt4
-        return Candidates([*pairs, fourth, fifth, sixth], doubt, miss + wrong, angles)

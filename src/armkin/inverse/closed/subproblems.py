@@ -19,7 +19,7 @@ import numpy as np
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse.numeric.tolerances import FREE, TANGENT, TOUCHING
+from armkin.inverse.numeric.tolerances import FREE, ONE_ROOT, TANGENT, TOUCHING
 
 
 class Pair(NamedTuple):
@@ -139,6 +139,14 @@ def linear(
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
     return _prefer(Pair(cos, sin), h2 < least, prefer), Doubt(edge | free, free)
+
+
+def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
+    """``a^2 + b^2 - c^2`` for `linear`, zero where rounding alone parts the two roots."""
+    h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
+    disc = h2 - c * c
+    out: Entry = np.where(np.abs(disc) < ONE_ROOT * h2, 0.0, disc)
+    return out
 
 
 def normalised(pair: Pair) -> Pair:
@@ -300,7 +308,7 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     c, s = arrays.cos_sin(np.arctan2(root, -q) / 3.0)
     most = size * c
     least = -0.5 * size * (c + np.sqrt(3.0) * s)
-    span = np.sqrt(h)
+    span = np.sqrt(h) + 1e-12  # at an end, where two roots are double, rounding must not choose the double one
     above = np.maximum(most + third - span, 0.0)
     below = np.maximum(-span - least - third, 0.0)
     # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse

@@ -22,6 +22,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
+from armkin.inverse.closed import quadratics
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
     Candidates,
@@ -31,12 +32,13 @@ from armkin.inverse.closed.subproblems import (
     half_tangent,
     linear,
     normalised,
+    one_root,
     quadratic,
     rotation_between,
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import EXACT, NEAR, ONE_ROOT
+from armkin.inverse.numeric.tolerances import EXACT, NEAR
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
@@ -142,7 +144,7 @@ class Position:
         fixed = np.zeros(6)
         for w, row, form in zip(weights, self.rows, self.forms, strict=True):
             fixed[:3] -= w * row[2] * self.Y[2]
-            fixed -= w * _six(form)
+            fixed -= w * quadratics.of_form(form)
         if not self.prismatic[2]:
             # |y|^2 is affine in (cos, sin) although its form is quadratic: cos^2 + sin^2 = 1
             fixed[[0, 3, 5]] += fixed[5] * np.array([1.0, -1.0, -1.0])
@@ -152,9 +154,11 @@ class Position:
 
     def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
-        across = (-_six(self.across)).tolist()
+        across = (-quadratics.of_form(self.across)).tolist()
         if not self.prismatic[2]:
-            third, doubt = _turn(_sum(across, *(_product(six, six) for six in g)), size, prefer[2])
+            third, doubt = quadratics.turn(
+                quadratics.total(across, *(quadratics.product(six, six) for six in g)), size, prefer[2]
+            )
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
@@ -192,11 +196,8 @@ class Position:
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             a, b, c = alone[1], alone[2], arrays.mul(-1.0, alone[0])
-            h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
-            disc = h2 - c * c
             # rounding parts a double root by 1e-8; where the tip is then on axis 2, joint 2 must be seen to be free
-            disc = np.where(np.abs(disc) < ONE_ROOT * h2, 0.0, disc)
-            third, doubt = linear(a, b, c, 0, size, prefer[2], disc)
+            third, doubt = linear(a, b, c, 0, size, prefer[2], one_root(a, b, c))
             third = normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
@@ -243,12 +244,12 @@ class Position:
             arrays.add(arrays.sub(h, a), arrays.mul(z1, d)) for h, a, d in zip(half, across[1], d2, strict=True)
         ]
         factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
-        six = _sum([*constant, curved, 0.0, 0.0], _product(d2, factor))
+        six = quadratics.total([*constant, curved, 0.0, 0.0], quadratics.product(d2, factor))
         if self.prismatic[2]:
             d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
             third = Pair(d, None)
         else:
-            third, doubt = _turn(six, size, prefer[2])
+            third, doubt = quadratics.turn(six, size, prefer[2])
         return third, Pair(_at(d2, third), None), doubt
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
@@ -262,16 +263,6 @@ class Position:
         return normalised(third), doubt
 
 
-def _turn(six: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Pair, Doubt]:
-    """Joint 3, revolute, from a quadratic equation of its cosine and sine.
-
-    Pairs of complex roots stay off the unit circle, no longer than 2: normalised they may be a real root once more.
-    """
-    pair, doubt = trig_quadratic(six, size * size, prefer)
-    shorter = 1.0 / np.maximum(1.0, 0.5 * np.sqrt(pair.c * pair.c + pair.s * pair.s))
-    return Pair(pair.c * shorter, pair.s * shorter), doubt
-
-
 def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
     """``k0 + k1 b1 + k2 b2``, b2 the sine or, of a prismatic joint, that power of d: by default there is no b2."""
     total = arrays.add(coefficients[0], arrays.mul(coefficients[1], third.c))
@@ -283,34 +274,6 @@ def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
 def _form(rows: Array) -> Array:
     """The quadratic form G (3, 3) with ``b^T G b = |rows b|^2``."""
     return np.asarray(rows.T @ rows)
-
-
-def _six(form: Array) -> Array:
-    """A symmetric 3 x 3 form in (1, b1, b2) as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
-    return np.array([form[0, 0], 2 * form[0, 1], 2 * form[0, 2], form[1, 1], 2 * form[1, 2], form[2, 2]])
-
-
-def _product(u: list[Entry], v: list[Entry]) -> list[Entry]:
-    """Product of two affine functions of (b1, b2), as six coefficients; what follows the first three is not read."""
-
-    def mixed(i: int, j: int) -> Entry:
-        return arrays.add(arrays.mul(u[i], v[j]), arrays.mul(u[j], v[i]))
-
-    return [
-        arrays.mul(u[0], v[0]),
-        mixed(0, 1),
-        mixed(0, 2),
-        arrays.mul(u[1], v[1]),
-        mixed(1, 2),
-        arrays.mul(u[2], v[2]),
-    ]
-
-
-def _sum(*terms: list[Entry]) -> list[Entry]:
-    total = terms[0]
-    for term in terms[1:]:
-        total = [arrays.add(a, b) for a, b in zip(total, term, strict=True)]
-    return total
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:

@@ -16,9 +16,9 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array
 from armkin.formula.pose import Pose
-from armkin.inverse.closed.elbow import TwoLink, together
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, linear, rotation_between, spin
+from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between
+from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
@@ -78,9 +78,8 @@ class ThreeParallel:
         self.height6, _ = _meeting(L5)
         self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), 1e-9)
         # common direction of the parallel axes, along joint 2's, seen from joint 5
-        self.sense3 = 1.0 if L2[2, 2] > 0 else -1.0
-        self.sense4 = self.sense3 * (1.0 if L3[2, 2] > 0 else -1.0)
-        m = self.sense4 * L4[2, :3]
+        self.three_link = ThreeLink(L2, L3)
+        m = self.three_link.sense4 * L4[2, :3]
         b = L5[:3, 2]
         # m . Rz(q5) b
         self.cos5, self.sin5 = float(m[0] * b[0] + m[1] * b[1]), float(m[1] * b[0] - m[0] * b[1])
@@ -94,11 +93,7 @@ class ThreeParallel:
         past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
         R23 = L2[:3, :3] @ L3[:3, :3]
         self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
-        self.height4 = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3])[2])
         self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
-        self.turned = [float(R23[0, 0]), float(R23[1, 0])]
-        fore = L2[:3, :3] @ L3[:3, 3]
-        self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
@@ -136,25 +131,16 @@ class ThreeParallel:
         X = pose.times(pose.rotate(X, c5, -s5), self.back4)
         p = pose.apply(self.to_joint2, _unrotate(c1, s1, X[9:12]))
         x = pose.turn(self.to_joint2, _unrotate(c1, s1, X[0:3]))
-        second, third, doubt23 = self.two_link.solve(p[0], p[1], prefer[1], prefer[2])
-        # x = Rz(q2 +- q3 +- q4) turned
-        tx, ty = self.turned
-        c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
-        c23, s23 = together(second, third, self.sense3)
-        fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
-        # its angle is what is left of the sum: one arctangent for both elbows
-        q2, q3 = (np.arctan2(pair.s, pair.c) for pair in (second, third))
-        left = arrays.wrapped(arrays.sub(np.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
-        angles = [None, q2, q3, arrays.mul(self.sense4, left), None, None]
+        pairs, angles, doubt23 = self.three_link.solve(p, x, prefer[1:4])
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
-        reached = spin(*second, self.two_link.reach(third))
+        across, height = self.three_link.miss(pairs, p)
         along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
-        aside = (p[2] - self.height4) ** 2 * scale + distance2(along, [0.0, 0.0, self.sense4])
-        miss = distance2(reached, p[:2]) * scale + aside
-        return Candidates([first, second, third, fourth, fifth, sixth], doubt, miss, angles)
+        aside = height * scale + distance2(along, [0.0, 0.0, self.three_link.sense4])
+        miss = across * scale + aside
+        return Candidates([first, *pairs, fifth, sixth], doubt, miss, [None, *angles, None, None])
 
 
 def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:

@@ -1,0 +1,238 @@
+"""Three neighbouring axes that are parallel or meet in a point, anywhere among six revolute joints.
+
+The joints of the three axes keep a direction and the height along it, or a point. The other three joints are
+neighbours, too, if the pose is walked through as one more link of the loop (Pieper, The Kinematics of Manipulators
+under Computer Control, 1968). With these called a, b and c,
+
+    (1)  Za La Zb Lb Zc d = e
+
+for the direction and the height along it, or for the point. Undo joint a of e and do joint c to d:
+``f = Za^-1 e`` and ``g = Zc d``. Joint b keeps the height along its axis of what it turns, and
+
+    (2)  (Ra z) . f - (Rb^T z) . g = known,    ta . f + (Rb^T tb) . g = known
+
+hold for both: the second is the height along the direction, or the distance of the point. Where the pose is not La,
+the factors of f are the arm's own: if they are independent, f follows from g, and its known length makes a quartic
+for joint c; if not, a combination of the two equations holds g alone. Joint b follows from (1), and what is left of
+the loop is a planar arm of three joints, or a wrist: 8 branches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Entry
+from armkin.formula.pose import Pose
+from armkin.inverse.closed import quadratics
+from armkin.inverse.closed.candidates import is_sound
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.subproblems import (
+    Candidates,
+    Doubt,
+    Pair,
+    Prefer,
+    linear,
+    normalised,
+    one_root,
+    rotation_between,
+    spin,
+)
+from armkin.inverse.closed.three_link import ThreeLink
+from armkin.inverse.closed.wrist import Wrist, meeting_point
+from armkin.inverse.numeric.tolerances import EXACT, NEAR
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+# squared length across joint b [1 or reaches] below which the joint may be free: of a double root of joint c, and of
+# one of fourth order, rounding leaves the root and the fourth root
+LOOSE, BLURRED = 1e-12, 1e-6
+
+
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Six revolute joints and a full pose, three neighbouring axes parallel or meeting in a point."""
+    if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
+        return None
+    for backward in (False, True):
+        own = Chain(arm.link, arm.prismatic)
+        chain = reverse(own) if backward else own
+        for first in (1, 3):
+            loop = _Loop.of(chain, first, tolerance, arm.reach)
+            if loop is None or loop.ends.close:
+                continue
+            axes = sorted(6 - i if backward else i + 1 for i in range(first, first + 3))
+            c = 6 - loop.joints[2] if backward else loop.joints[2] + 1
+            what = "are parallel" if loop.three_link else "meet in a point"
+            how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
+            why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {what}; {how}"
+            name = "three parallel axes" if loop.three_link else "three axes that meet"
+            solve = _backward(loop.solve) if backward else loop.solve
+            # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
+            ends = tuple(5 - j if backward else j for j in loop.joints)
+            geometry = Geometry(name, why, True, solve, ordered=not loop.ends.regular, ends=ends)
+            if is_sound(arm, task, geometry):
+                return geometry
+    return None
+
+
+def _backward(solve: Callable[[Pose, Prefer], Candidates]) -> Callable[[Pose, Prefer], Candidates]:
+    return lambda goal, prefer: solve(pose.inverse(goal), prefer[::-1]).reversed()
+
+
+class _Ends:
+    """Joints a, b and c of (1), La without the pose; lengths in units of the arm."""
+
+    def __init__(self, La: Array, points: bool, tolerance: float) -> None:
+        """points: d and e are points, else directions."""
+        self.La, self.points = pose.constant(La), points
+        self.rows = np.array([La[:3, :3] @ [0.0, 0.0, 1.0], La[:3, 3]])  # factors of f in (2)
+        self.A = self.rows[:, :2]
+        U, S, _ = np.linalg.svd(self.A)
+        off = float(S[1] / max(S[0], 1e-12))
+        self.regular, self.close = off > tolerance, tolerance < off <= NEAR
+        self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
+
+    def solve(
+        self, Lb: Pose, d: list[Entry], e: list[Entry], height: Entry, prefer: Prefer
+    ) -> tuple[list[Pair], Doubt]:
+        """The three joints on branch axes (b0, b1, 1, N), and doubt; height: what is known in (2) for directions."""
+        ta, tb = self.La[9:12], Lb[9:12]
+        factors = [[arrays.mul(-1.0, v) for v in (Lb[2], Lb[5], Lb[8])], pose.turn_back(Lb, tb)]  # of g
+        known: list[Entry] = [0.0, height]
+        if self.points:
+            length = arrays.sub(arrays.add(arrays.dot(e, e), arrays.dot(ta, ta)), arrays.dot(d, d))
+            known = [
+                arrays.add(tb[2], arrays.dot(self.La[6:9], ta)),
+                arrays.mul(0.5, arrays.sub(length, arrays.dot(tb, tb))),
+            ]
+        # (2) solved for its part in f across joint a, as coefficients of (1, cos qc, sin qc)
+        sides: list[list[Entry]] = []
+        for row, (gx, gy, gz), value in zip(self.rows.tolist(), factors, known, strict=True):
+            rest = arrays.sub(arrays.sub(value, arrays.mul(row[2], e[2])), arrays.mul(gz, d[2]))
+            cosine = arrays.add(arrays.mul(gx, d[0]), arrays.mul(gy, d[1]))
+            sine = arrays.sub(arrays.mul(gy, d[0]), arrays.mul(gx, d[1]))
+            sides.append([rest, arrays.mul(-1.0, cosine), arrays.mul(-1.0, sine)])
+        first, last, doubt = (self._quartic if self.regular else self._rank_one)(sides, e, prefer)
+        u = pose.turn(Lb, spin(*last, d))
+        v = spin(first.c, arrays.mul(-1.0, first.s), e)
+        if self.points:
+            u = arrays.combine(1.0, u, 1.0, tb)
+            v = arrays.combine(1.0, v, -1.0, ta)
+        v = pose.turn_back(self.La, v)
+        second, _ = rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
+        across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
+        free = (across < LOOSE) | (doubt.edge & (across < BLURRED))
+        if prefer[1] is not None and np.any(free):
+            second = Pair(np.where(free, prefer[1].c, second.c), np.where(free, prefer[1].s, second.s))
+        return [first, second, last], doubt | Doubt(free, free)
+
+    def _quartic(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        f = [_mixed(row, sides) for row in np.linalg.inv(self.A)]
+        across = arrays.add(arrays.mul(e[0], e[0]), arrays.mul(e[1], e[1]))
+        start: list[Entry] = [arrays.mul(-1.0, across), 0.0, 0.0, 0.0, 0.0, 0.0]
+        last, doubt = quadratics.turn(quadratics.total(start, *(quadratics.product(k, k) for k in f)), 1.0, prefer[2])
+        fx, fy = (_at(k, last) for k in f)
+        first, doubt_a = rotation_between(fx, fy, e[0], e[1], 1.0, prefer[0])
+        return first, last, doubt | doubt_a
+
+    def _rank_one(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        rest, cosine, sine = _mixed(self.alone, sides)
+        known = arrays.mul(-1.0, rest)
+        last, doubt = linear(cosine, sine, known, 0, 1.0, prefer[2], one_root(cosine, sine, known))
+        last = normalised(last)
+        fx, fy = (self.main @ self.A).tolist()
+        a = arrays.add(arrays.mul(fx, e[0]), arrays.mul(fy, e[1]))
+        b = arrays.sub(arrays.mul(fx, e[1]), arrays.mul(fy, e[0]))
+        first, doubt_a = linear(a, b, _at(_mixed(self.main, sides), last), 1, 1.0, prefer[0])
+        return normalised(first), last, doubt | doubt_a
+
+
+class _Loop:
+    """The loop of a chain and its pose, from the first of the three axes on."""
+
+    def __init__(self, chain: Chain, first: int, reach: float, points: tuple[Array, Array] | None, tolerance: float):
+        """first: the joint (0..5) of the first axis, 1 or 3; points: where they meet, seen before the first and after
+        the last of them [units of the reach], None of parallel axes; tolerance: as in `recognise`."""
+        self.unit = 1.0 / reach
+        link = _shrunk(chain.link, reach)
+        self.from_base, self.from_tool = pose.constant(inverse(link[0])), pose.constant(inverse(link[6]))
+        self.first = first
+        self.joints = [(first + k) % 6 for k in (3, 4, 5)]  # a, b and c
+        self.out = link[1] if first == 1 else link[3]  # the link after c
+        self.ends = _Ends(link[5] if first == 1 else link[1], points is not None, tolerance)
+        self.before, self.between = pose.constant(link[4]), pose.constant(link[2])  # a, and a and b: or the pose
+        two = link[first + 1], link[first + 2]
+        self.points = points
+        self.three_link = ThreeLink(*two) if points is None else None
+        self.wrist = Wrist(*two)
+
+    @classmethod
+    def of(cls, chain: Chain, first: int, tolerance: float, reach: float) -> _Loop | None:
+        """The loop, if the three axes from the first one on are parallel or meet; None if they do neither."""
+        one, other = chain.link[first + 1], chain.link[first + 2]
+        if is_parallel(one, tolerance) and is_parallel(other, tolerance):
+            return cls(chain, first, reach, None, tolerance)
+        met = meeting_point(one, other, tolerance * reach)
+        if met is None or first != 1:  # at an end they are a spherical wrist or shoulder
+            return None
+        return cls(chain, first, reach, (met[0] / reach, met[1] / reach), tolerance)
+
+    def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
+        """All joints for a pose, on branch axes (b0, b1, 2, N)."""
+        goal = [*goal[:9], *(arrays.mul(self.unit, v) for v in goal[9:])]
+        back = pose.inverse(pose.times(pose.times(self.from_base, goal), self.from_tool))
+        before, between = (self.before, back) if self.first == 1 else (back, self.between)
+        out, height = pose.constant(self.out), 0.0
+        if self.points is None:
+            assert self.three_link is not None
+            sense = self.three_link.sense4
+            d, e = out[6:9], [arrays.mul(sense, before[k]) for k in (2, 5, 8)]
+            height = arrays.mul(-1.0, self.three_link.height4 + arrays.dot(d, out[9:12]))
+            height = arrays.sub(height, arrays.mul(sense, before[11]))
+        else:
+            here, there = (point.tolist() for point in self.points)
+            d, e = pose.apply(out, here), pose.apply(pose.inverse(before), there)
+        ends, doubt = self.ends.solve(between, d, e, height, [prefer[j] for j in self.joints])
+        P = pose.times(pose.rotate(before, *ends[0]), self.ends.La)
+        P = pose.times(pose.rotate(P, *ends[1]), between)
+        P = pose.times(pose.rotate(P, *ends[2]), out)  # joint `first` seen from the frame after the last of the three
+        x, z = [P[0], P[3], P[6]], [P[2], P[5], P[8]]
+        rest = prefer[self.first : self.first + 3]
+        if self.three_link is None:
+            turned, doubt3, _ = self.wrist.solve(x, z, rest)
+            three, known = turned
+        else:
+            p = [arrays.mul(-1.0, v) for v in pose.turn_back(P, P[9:12])]
+            three, known, doubt3 = self.three_link.solve(p, x, rest, axis=2)
+        pairs: list[Pair] = [Pair(1.0, 0.0)] * 6
+        angles: list[Entry | None] = [None] * 6
+        for joint, pair in zip(self.joints, ends, strict=True):
+            pairs[joint] = pair
+        pairs[self.first : self.first + 3] = three
+        if known:
+            angles[self.first : self.first + 3] = known
+        return Candidates(pairs, doubt | doubt3, None, angles)
+
+
+def _shrunk(link: Array, reach: float) -> Array:
+    """Links with their lengths in units of the reach."""
+    out = np.array(link)
+    out[:, :3, 3] /= reach
+    return out
+
+
+def _mixed(weights: Array, sides: list[list[Entry]]) -> list[Entry]:
+    """A combination of two expressions affine in (cos, sin)."""
+    return arrays.combine(float(weights[0]), sides[0], float(weights[1]), sides[1])
+
+
+def _at(affine: list[Entry], pair: Pair) -> Entry:
+    """An affine expression of a joint's cosine and sine, at the joint."""
+    return arrays.add(affine[0], arrays.add(arrays.mul(affine[1], pair.c), arrays.mul(affine[2], pair.s)))

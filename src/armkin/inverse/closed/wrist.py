@@ -1,0 +1,95 @@
+"""Three axes that meet in a point: the joints that turn a tool (Siciliano et al., Robotics, 2.12.5)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Entry
+from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
+from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
+from armkin.model.chain import is_parallel
+from armkin.model.rotation import inverse
+
+
+def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
+    """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
+    if is_parallel(L4, 1e-6) or is_parallel(L5, 1e-6):
+        return None
+    # axis 4 is the z axis, axis 5 the line t + s w: the foot of their common perpendicular on axis 4
+    t, w = L4[:3, 3], L4[:3, 2]
+    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])
+    at4 = np.array([0.0, 0.0, height])
+    at5 = (inverse(L4) @ [*at4, 1.0])[:3]
+    at6 = (inverse(L5) @ [*at5, 1.0])[:3]
+    if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:
+        return None
+    return at4, at6
+
+
+class Turned(NamedTuple):
+    """Joints 4, 5 and 6: a pair each, and its angle where it is known without an inverse function."""
+
+    pairs: list[Pair]
+    angles: list[Entry | None]
+
+
+class Wrist:
+    """``Rz(q4) A Rz(q5) B Rz(q6)``, two ways for every orientation; A, B: the rotations of two links."""
+
+    def __init__(self, L4: Array, L5: Array) -> None:
+        """L4, L5: (4, 4) the links between the joints."""
+        self.A = pose.constant(L4)
+        self.B = pose.constant(L5)
+        A, b = L4[:3, :3], L5[:3, 2]
+        # z . A Rz(q5) b = c5 (A20 b0 + A21 b1) + s5 (A21 b0 - A20 b1) + A22 b2
+        self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
+        self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
+        self.rest5 = float(A[2, 2] * b[2])
+        self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
+        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
+
+    def solve(self, x: list[Entry], z: list[Entry], prefer: Prefer) -> tuple[Turned, Doubt, Entry]:
+        """The joints that turn the first and the last column to x and z, both ways on branch axis 2; doubt; and the
+        squared distance that they leave of these columns."""
+        if self.mirrored:
+            return self._mirrored(x, z, prefer)
+        disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, self.tangent)
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        return Turned([fourth, fifth, sixth], []), doubt5 | doubt4, wrong
+
+    def _around(
+        self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
+    ) -> tuple[Pair, Pair, Doubt, Entry]:
+        """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
+
+        across: the square of z's part across joint 4, if the wrist can reach every z.
+        """
+        turn5 = pose.rotate(self.A, *fifth)
+        u = pose.turn(turn5, self.B[6:9])
+        fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[0], across)
+        c4, s4 = fourth
+        # what is left is Rz(q6): its first column, which lies in the plane across joint 6
+        back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
+        c6, s6, off = pose.turn_back(self.B, back)
+        wrong = distance2(spin(c4, s4, u), z) + off * off
+        return fourth, Pair(c6, s6), doubt4, wrong
+
+    def _mirrored(self, x: list[Entry], z: list[Entry], prefer: Prefer) -> tuple[Turned, Doubt, Entry]:
+        """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
+        disc = z[0] * z[0] + z[1] * z[1]
+        fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, np.sqrt(disc)))
+        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        sign = signs(2)
+        flipped = 0.5 - 0.5 * sign
+        q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
+        angles = [
+            q4 - flipped * np.copysign(np.pi, q4),
+            sign * np.arctan2(fifth.s, fifth.c),
+            q6 - flipped * np.copysign(np.pi, q6),
+        ]
+        return Turned([fourth, fifth, sixth], angles), (disc < SHARP) | doubt4, wrong
