@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 # squared length across joint b [1 or reaches] below which the joint may be free: of a double root of joint c, and of
 # one of fourth order, rounding leaves the root and the fourth root
-LOOSE, BLURRED = 1e-12, 1e-6
+LOOSE, BLURRED = 1e-12, 1e-9
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
