@@ -45,6 +45,7 @@ from armkin.inverse.elimination.joint_order import Role, roles
 from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
+from armkin.inverse.elimination.roots import NO_PRODUCT
 from armkin.inverse.numeric.tolerances import ELIMINATED, EXAMINED, GRAZING, SEED
 from armkin.model.rotation import inverse
 
@@ -57,6 +58,7 @@ TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main p
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
 OWN = 1e-6  # [rad, scaled length] how far a root may be off the answer that it stands for
 REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
+ALONE = 1e-3  # distance from which on a root is no half of a double one
 GUESSES = 8  # postures close to answers that are kept of a pose
 SAMPLES = 11  # random poses on which roles are compared
 # log10 of a role's raw error: nothing better needed, good enough, unfit
@@ -302,7 +304,11 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     np.maximum.at(weakest, seed.pose[good], done.weakness[good])
     away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
     own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
-    strayed &= ~own
+    # A simple real root whose vector is no product stands for nothing: a solution's vector is a product, and a root on
+    # its own has no other vector.
+    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-2) & (shake == 0)
+    missed &= ~empty
+    strayed &= ~(own | empty)
     unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
@@ -317,7 +323,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
     # Two real roots that led to one answer: one of them stands for another.
-    real = answers.take(seed.tilt[good] == 0)
+    real = answers.take((seed.tilt[good] == 0) & ~empty[good])
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
     twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)

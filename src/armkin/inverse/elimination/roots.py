@@ -18,6 +18,8 @@ from armkin.inverse.numeric.tolerances import INFINITE
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
+NO_PRODUCT = 1e-3  # defect from which an eigenvector is surely that of no solution
+STEADY = 1e4  # entries up to which a pencil's simple roots and their vectors are known far better than that
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
 
 
@@ -26,6 +28,8 @@ class Seeds(NamedTuple):
 
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
     tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
+    defect: (M,) squared sine of the angle between the eigenvector and the product that a solution's is; 0 where slides
+    move.  gap: (M,) distance from the pose's nearest other root, as an angle, 0 where the pencil is not well scaled.
     """
 
     pose: Int
@@ -33,6 +37,8 @@ class Seeds(NamedTuple):
     hidden: Array
     tilt: Array
     rough: Bool
+    defect: Array
+    gap: Array
 
 
 def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
@@ -46,6 +52,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     G = nudged(np.linalg.solve, equations[:, :, :lead], rest)
     # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
     rough = (np.abs(G[:, :, :count]).max(axis=(1, 2)) > 1e6) | (np.abs(G[:, :, count]).max(axis=1) > 1e9)
+    steady = np.abs(G[:, :, :count]).max(axis=(1, 2)) < STEADY
     G = G[:, :, :count]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
@@ -57,15 +64,30 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     x = roots[pose, which].real
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
-    middle = _middle_joints(pencil, x, vectors.real[pose, :, which])
+    middle, defect = _middle_joints(pencil, x, vectors.real[pose, :, which])
     near = np.flatnonzero((np.abs(middle) < INFINITE).all(axis=0))
     if near.size < pose.size:
-        pose, which, middle = pose[near], which[near], middle[:, near]
+        pose, which, middle, defect = pose[near], which[near], middle[:, near], defect[near]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
-    return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough)
+    gap = np.zeros(pose.size)
+    some = np.flatnonzero((defect > NO_PRODUCT) & (tilt[pose, which] == 0) & steady[pose])
+    gap[some] = _gaps(roots[pose[some]], which[some])
+    return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough, defect, gap)
+
+
+def _gaps(roots: NDArray[np.complex128], which: Int) -> Array:
+    """Distance (M,) of one of each row's roots (M, size) from the others, on the sphere of complex numbers."""
+    if not which.size:
+        return np.empty(0)
+    size = 1 + np.abs(roots) ** 2
+    row = np.arange(which.size)
+    x = roots[row, which][:, None]
+    away = 2 * np.abs(roots - x) / np.sqrt(size * (1 + np.abs(x) ** 2))
+    away[row, which] = np.inf
+    return np.asarray(away.min(axis=1))
 
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
@@ -82,8 +104,8 @@ def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
     return (rows if pencil.mix is None else pencil.mix @ rows), recover
 
 
-def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
-    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size)."""
+def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
+    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size); and `Seeds.defect`."""
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
     x = x[:, None]
@@ -113,7 +135,14 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> Array:
     else:
         sign = np.where(three[:, 0] < 0, -1.0, 1.0)
         value[pencil.role.third] = np.arctan2(sign * three[:, 2], sign * three[:, 1])
-    return value
+    if pencil.prismatic[dialytic] or pencil.prismatic[third]:
+        return value, np.zeros(v.shape[0])
+    f, k = 0.5 * value[pencil.role.dialytic], value[pencil.role.third]
+    powers = np.stack([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)], axis=1)
+    inner = v[:, :, 0] + v[:, :, 1] * np.cos(k)[:, None] + v[:, :, 2] * np.sin(k)[:, None]
+    # a product's square is 2 x 2: of the powers, and of (1, cos, sin)
+    along = (inner * powers).sum(axis=1) ** 2 / (4.0 * np.maximum(size.sum(axis=(1, 2)), 1e-300))
+    return value, np.maximum(1.0 - along, 0.0)
 
 
 def _ratio(powers: Array) -> Array:
