@@ -20,7 +20,8 @@ measures it on random poses, and only roles that give their generating joints ba
 (v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
 rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
 roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none, or
-to one whose value of the hidden joint is not theirs.
+to one whose value of the hidden joint is not theirs; but not roots at a distance from all others whose vector is no
+product v: by (ii) they stand for nothing.
 Such a pose is solved again, with another offset and other hidden joints, then moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
 longer.  This goes on until a pass shows none of these, or nine are done; all passes' answers count.  A self-motion
@@ -306,7 +307,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
     # A simple real root whose vector is no product stands for nothing: a solution's vector is a product, and a root on
     # its own has no other vector.
-    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-2) & (shake == 0)
+    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-3) & (shake == 0)
     missed &= ~empty
     strayed &= ~(own | empty)
     unsettled[seed.pose[missed | unsure | strayed]] = True
