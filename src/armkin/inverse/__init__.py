@@ -22,12 +22,11 @@ closest.py          the nearest legal pose when there is no branch
 
 The classes, in the order in which they are asked:
 
-closed/             one geometry a file: planar, elbow, three_joints, spherical, three_parallel
+closed/             one geometry a file: planar, elbow, three_joints, spherical, three_parallel, anywhere
 nearly_special.py   all but one of these: its branches, corrected on the true arm
 tool_axis.py        five joints, the tool's position and z axis: a class for poses and a virtual joint
 general.py          every other arm of up to six joints
 elimination/        the numeric method behind it
-many_starts.py      a search, for targets that the elimination could not settle
 
 What serves them all:
 

@@ -24,7 +24,7 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.doubtful import examined
-from armkin.inverse.many_starts import many_starts
+from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status

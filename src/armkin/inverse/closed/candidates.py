@@ -16,7 +16,7 @@ from armkin.forward import fk
 from armkin.inverse.closed import crossings
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
-from armkin.inverse.many_starts import many_starts
+from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED
 from armkin.inverse.tasks.task import Task, moved
 
