@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -49,6 +50,23 @@ def run(*words: object, stdin: bytes = b"", cwd: Path = ROOT) -> Result:
         sys.stdin = before
         os.chdir(folder)
     return Result(code, out.getvalue(), err.getvalue())
+
+
+BUSY = ("no board answers", "does not answer any more", "too slow or too noisy", "half a second")
+
+
+def patiently(*words: object, run: Callable[..., Result] = run) -> Result:
+    """Run a command on a board in real time, again where the machine was too busy for it, five times at most.
+
+    That the arm then stands on its path and can be sent on is what the command says, and what this takes it at.
+    """
+    for _ in range(5):
+        done = run(*words)
+        if done.code == 0 or not any(said in done.err for said in BUSY):
+            break
+        if "position is known" in done.err:
+            words = tuple(word for word in words if word != "--assume-home")
+    return done
 
 
 def process(*words: object, **settings: Any) -> Result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
@@ -27,13 +28,15 @@ class Patient:
     """The time that passes for a board: the clock's, which waits for a host that has fallen silent.
 
     A busy machine may give the host no time for longer than the board waits for it. `patience`: [s] of the board's
-    time after which it waits; a host asks ten times a second. Infinite: it never waits.
+    time after which it waits, sooner if no silence was a third as long lately; a host asks ten times a second, and
+    much oftener while it fills a queue. Infinite: it never waits.
     """
 
     def __init__(self, patience: float = 0.12) -> None:
         self.patience = patience
         self._silent = 0.0  # [s] of the board's time since the host was heard
         self._last = self._heard = time.monotonic()
+        self._gaps = (patience, patience)  # [s] between words, lately
 
     def passed(self, *, heard: bool, there: bool = True) -> float:
         """Seconds since this was asked last, for a board; heard: the host was; there: it has the port open.
@@ -43,13 +46,16 @@ class Patient:
         now = time.monotonic()
         seconds, self._last = min(now - self._last, 0.02), now
         if heard or not there:
+            if now - self._heard > 0.002:  # else it belongs to what came before
+                self._gaps = (now - self._heard, self._gaps[0])
             self._silent, self._heard = 0.0, now
-        elif (
-            self._silent >= self.patience and now - self._heard < 20
-        ):  # whoever says nothing for 20 s does so on purpose
+        elif self._silent >= self._waits() and now - self._heard < 20:  # whoever says nothing for 20 s means it
             return 0.0
         self._silent += seconds
         return seconds
+
+    def _waits(self) -> float:
+        return self.patience if math.isinf(self.patience) else min(self.patience, max(0.02, 3 * min(self._gaps)))
 
 
 class Served:

@@ -16,10 +16,12 @@ static const int64_t MOST_CATCHING_UP = 20000000;
 
 /* Whoever is silent for so long is silent on purpose [ns]. */
 static const int64_t MOST_PATIENCE = 20000000000;
+static const int64_t LEAST_PATIENCE = 20000000;
+static const int64_t SAME_WORDS = 2000000;           /* what comes that soon belongs to what came before */
 
 static int64_t anchor_real;
 static uint64_t anchor_cycle, host_cycle;
-static int64_t host_real;                            /* when the host spoke last, ns */
+static int64_t host_real, gaps[2];                   /* when the host spoke last, and how long before the time before, ns */
 static int64_t slipped, waited, waiting_since;       /* ns; the last: 0 while not waiting */
 
 static int64_t now_ns(void) {
@@ -34,12 +36,27 @@ void pace_reset(void) {
 }
 
 void pace_host_spoke(void) {
+    int64_t now = now_ns(), gap = now - host_real;
     host_cycle = chip_now();
-    host_real = now_ns();
+    host_real = now;
+    if (gap > SAME_WORDS) {
+        gaps[1] = gaps[0];
+        gaps[0] = gap;
+    }
+}
+
+/* A host that fills a queue speaks every 10 ms: when it gets no time then, its queue may be dry long before the most
+ * that is waited for. Cycles. */
+static uint64_t patience(void) {
+    int64_t gap = 3 * (gaps[0] < gaps[1] ? gaps[0] : gaps[1]);
+    if (gap < LEAST_PATIENCE)
+        gap = LEAST_PATIENCE;
+    uint64_t cycles = (uint64_t)(gap / 1000) * (CLOCK_HZ / 1000000);
+    return cycles < pace_patience ? cycles : pace_patience;
 }
 
 static bool host_is_awaited(int64_t now) {
-    return pace_patience && pace_host_is_there && chip_now() >= host_cycle + pace_patience &&
+    return pace_patience && pace_host_is_there && chip_now() >= host_cycle + patience() &&
            now < host_real + MOST_PATIENCE;
 }
 

@@ -13,7 +13,7 @@ extern double pace_speed;                 /* simulated per real second; 0: as fa
 extern uint64_t pace_ahead;
 
 /* How long simulated time waits for a host that has the port open and is silent: it stands so many cycles after the
- * host's last byte; 0: it does not wait. A host that the computer gives no time is no silent host. */
+ * host's last byte, sooner if it was not silent for a third as long lately; 0: it does not wait. A host that the computer gives no time is no silent host. */
 extern uint64_t pace_patience;
 extern bool pace_host_is_there;           /* has the port open */
 

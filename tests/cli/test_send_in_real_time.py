@@ -20,7 +20,7 @@ import pytest
 from armkin.board.firmware.protocol import State
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
-from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, patiently, process, run
 from pty_board import PtyBoard
 from pty_port import Patient
 
@@ -59,7 +59,7 @@ def on_the_line(net: Sequence[int]) -> None:
 
 def finish(board: PtyBoard) -> None:
     """The next command plans from where the arm stands."""
-    done = process("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+    done = patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json", run=process)
     assert done.code == 0, done.err
     assert done.json["pulses"] == COUNTS
     assert board.net[:3] == COUNTS
