@@ -111,8 +111,9 @@ def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
 
 
 def test_waypoints_are_streamed_without_a_stop() -> None:
-    got = waypoints_on_pins.stream(60)
+    got = waypoints_on_pins.stream(60, patience=0.12)
     assert got.good, got
+    assert got.processor < got.seconds  # it keeps up, on a machine that has time for it
     assert got.waypoints == 60
     assert got.late_us <= 50
     assert got.segments_a_second <= 100

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import resource
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,7 @@ class Streamed:
     slowest: float  # [deg/s] all joints together, in any WINDOW but in the ramps
     seconds: float  # from the first step to the last
     segments_a_second: float
+    processor: float  # [s] of the command, its start included
 
     @property
     def good(self) -> bool:
@@ -68,7 +70,9 @@ def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Stream
         file = Path(folder) / "rows.csv"
         file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))
         words = ["send", THREE_DOF, "--batch", file, "--port", board.port, "--assume-home", "--json"]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = process(*words, *(["--blend", blend] if blend else []), timeout=60 + 3 * plan.duration)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         said: dict[str, Any] = done.json if done.code == 0 else {"waypoints": 0, "pulses": None}
         trace, axes = board.trace(), board.stats()["axes"]
     cycle, counts = counts_of(trace, [0, 0, 0])
@@ -91,4 +95,5 @@ def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Stream
         float(np.linalg.norm(there - here, axis=1).min()) / WINDOW,
         float(cycle[-1] - cycle[0]) / CLOCK,
         len(segments) / plan.duration,
+        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
     )
