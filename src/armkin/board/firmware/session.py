@@ -193,13 +193,13 @@ class Session:
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 self._same(reply.session)
                 self._window.check(reply)
-            shorter = reply.queued < self.queued
+            goes_on = reply.queued < self.queued or _moved(self.latest, reply)
             self.state, self.queued = State(reply.state), reply.queued
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 self.line.answered(reply.tag)
-            if self._window.acknowledge(reply) or shorter:
+            if self._window.acknowledge(reply) or goes_on:
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply
@@ -274,6 +274,11 @@ class Session:
                 return
             self.pump(ends=not self._window and self.queued < _ENDS)
             yield self.under_way + self.queued / 1000
+
+
+def _moved(before: Status | None, reply: Ack | Status) -> bool:
+    """Whether a status tells other counts than the one before."""
+    return isinstance(reply, Status) and before is not None and reply.page == 0 and reply.counts != before.counts
 
 
 def _silent(port: Port) -> LinkError:
