@@ -97,18 +97,27 @@ def wider(out: Batch, width: int) -> Batch:
     return wide
 
 
-def pack(part: Batch, count: NDArray[np.int64]) -> None:
+def pack(part: Batch, count: NDArray[np.integer]) -> None:
     """Move the branches of targets, count (N,) of them, to the front, nan behind."""
-    B = part.valid.shape[1]
-    rows = np.flatnonzero(count < B)
+    B, most = part.valid.shape[1], int(count.max(initial=0))
+    rows = np.flatnonzero(count < most)
     front = np.arange(B) < count[rows, None]
     # which of these branches goes where: behind the last one of all stands one that is missing
     source = np.full(front.size, front.size)
     source[np.flatnonzero(front)] = np.flatnonzero(part.valid[rows])
-    for array, missing in ((part.q, np.nan), (part.within, False), (part.branch, -1)):
+    arrays = (part.q, np.nan), (part.within, False), (part.branch, -1)
+    for array, missing in arrays:
         width = array.shape[2:]
         found = np.empty((front.size + 1, *width), array.dtype)
         array.take(rows, axis=0, out=found[:-1].reshape(len(rows), B, *width), mode="clip")
         found[-1] = missing
         array[rows] = found.take(source, axis=0).reshape(len(rows), B, *width)
+    if most < B:  # those of all others as slices
+        part.valid[rows] = np.arange(B) < most
+        there = np.flatnonzero(part.valid)
+        for array, missing in arrays:
+            width = array.shape[2:]
+            array[:, :most] = array.reshape(-1, *width).take(there, axis=0).reshape(-1, most, *width)
+            array[:, most:] = missing
+        part.valid[...] = np.arange(B) < most
     part.valid[rows] = front

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -73,7 +74,8 @@ def solve(
             found, workspace = _candidates(runner, code, goal, columns, close, workspace)
             there = None
             if examine:
-                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip)
+                first = goal[:, 0] if columns is None else columns[9]
+                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
             doubts += _keep(goals, runner.axes or (), out.part(some), found, start, close, there)
         return doubts
@@ -138,7 +140,7 @@ def _keep(
     if there is not None and len(there):
         doubtful = np.union1d(doubtful, near_itself.take(goals, part, there))
     if not full:
-        count = valid.sum(axis=0)
+        count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
     if not len(doubtful):
@@ -167,7 +169,13 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
         grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, valid.shape))
     part.valid[...] = True if valid.all() else valid.reshape(-1, N).T
     part.within[...] = part.valid if within is valid else within.reshape(-1, N).T
-    part.branch[...] = np.arange(part.branch.shape[1], dtype=np.int8)
+    part.branch[...] = _every_branch(part.branch.shape[1])[:N]
+
+
+@cache
+def _every_branch(B: int) -> NDArray[np.int8]:
+    """The indices of all branches, of as many targets as a chunk has: (N, B)."""
+    return np.tile(np.arange(B, dtype=np.int8), (arrays.CHUNK, 1))
 
 
 def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:

@@ -30,11 +30,15 @@ def room(arm: Arm) -> float:
     return 2.0 * SOLUTION * arm.reach
 
 
-def reached(arm: Arm, task: Task, target: Array, tip: Array) -> NDArray[np.intp]:
-    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`; tip: (3,) or (N, 3), its `position`."""
+def reached(arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None) -> NDArray[np.intp]:
+    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`.
+
+    tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands by itself.
+    """
     point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
     most = room(arm)
-    rows = np.flatnonzero(np.abs(point[:, 0] - tip[..., 0]) <= most)  # one coordinate tells nearly all others
+    x = point[:, 0] if first is None else first
+    rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= most)  # one coordinate tells nearly all others
     if len(rows):
         away = point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]
         rows = rows[(np.abs(away) <= most).all(axis=1)]

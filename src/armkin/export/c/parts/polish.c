@@ -34,15 +34,17 @@ typedef struct {
     double q[6], residual, guess, weakness, key;
 } arm_answer;
 
-/* Newton's method, damped by the residual (Levenberg, Marquardt) if `damped`: the best point met. */
+/* Newton's method, damped by the residual (Levenberg, Marquardt) if `damped`: the best point met. Undamped it takes three
+   steps more on a slow way to an answer. */
 static void arm_refine(const double *goal, int steps, int damped, arm_answer *out)
 {
+    const int most = damped ? steps : steps + 3;
     double q[6], inverse[36], last = 0;
     int i, j, k, step;
     for (i = 0; i < 6; i++)
         q[i] = out->q[i];
     out->residual = out->weakness = ARM_INFINITY;
-    for (step = 0; step <= steps; step++) {
+    for (step = 0; step <= most; step++) {
         double frame[12], joints[72], error[6], move[6], longest = 0;
         const double size = arm_missing(q, goal, frame, joints, error);
         if (step == 0)
@@ -94,7 +96,7 @@ static void arm_refine(const double *goal, int steps, int damped, arm_answer *ou
                         inverse[6 * i + j] = system[16 * i + 8 + j];
             }
         }
-        if (!(size > 1e-14) || step == steps)
+        if (!(size > 1e-14) || step == most || (step >= steps && !(size > 1e-10 && size < 1e-3)))
             return;
         last = size;
         for (i = 0; i < 6; i++) {
