@@ -117,7 +117,7 @@ def pack(part: Batch, count: NDArray[np.integer]) -> None:
         there = np.flatnonzero(part.valid)
         for array, missing in arrays:
             width = array.shape[2:]
-            array[:, :most] = array.reshape(-1, *width).take(there, axis=0).reshape(-1, most, *width)
+            array[:, :most] = array.reshape(-1, *width).take(there, axis=0).reshape(len(count), most, *width)
             array[:, most:] = missing
         part.valid[...] = np.arange(B) < most
     part.valid[rows] = front

@@ -140,7 +140,9 @@ def _rows(
     out.complete[...] = complete
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
-    pack(out, count)
+    for start in range(0, len(count), arrays.CHUNK):
+        rows = slice(start, start + arrays.CHUNK)
+        pack(out.part(rows), count[rows])
     goals = Goals(arm, task, target, near)
     if examine:
         doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
