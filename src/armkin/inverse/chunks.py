@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -169,13 +169,13 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
         grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, valid.shape))
     part.valid[...] = True if valid.all() else valid.reshape(-1, N).T
     part.within[...] = part.valid if within is valid else within.reshape(-1, N).T
-    part.branch[...] = _every_branch(part.branch.shape[1])[:N]
+    part.branch[...] = _every_branch(part.branch.shape[1], arrays.CHUNK)[:N]
 
 
-@cache
-def _every_branch(B: int) -> NDArray[np.int8]:
-    """The indices of all branches, of as many targets as a chunk has: (N, B)."""
-    return np.tile(np.arange(B, dtype=np.int8), (arrays.CHUNK, 1))
+@lru_cache(maxsize=8)
+def _every_branch(B: int, N: int) -> NDArray[np.int8]:
+    """The indices of all branches of N targets, (N, B): kept, as copying them is quicker than repeating a row."""
+    return np.tile(np.arange(B, dtype=np.int8), (N, 1))
 
 
 def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
