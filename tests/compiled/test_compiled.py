@@ -150,6 +150,18 @@ def test_workers_change_nothing() -> None:
         fast.ik(target, workers=0)
 
 
+def test_results_longer_than_caches_are_those_of_their_parts() -> None:
+    """They are written past the caches: 42,000 poses in eight columns are 16 MB."""
+    arm = armkin.load(ROBOTS / "puma560.yaml")
+    fast = armkin.compile(arm)
+    T = armkin.fk(arm, np.random.default_rng(9).uniform(-3, 3, (42_000, 6)))
+    whole, parts = fast.ik(T), [fast.ik(T[start : start + 21_000]) for start in (0, 21_000)]
+    for field in ("q", "valid", "within_limits", "branch", "status"):
+        B = min(getattr(part, field).shape[-1] for part in parts) if field != "status" else None
+        together = np.concatenate([getattr(part, field)[..., :B] for part in parts])
+        np.testing.assert_array_equal(getattr(whole, field)[..., :B], together)
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache folder, of a user who has compiled nothing."""

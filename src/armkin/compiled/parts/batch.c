@@ -1,6 +1,7 @@
 /* What becomes of a target: solved, left to Python (on an edge), left to Python until it has been read (no rotation to
    rounding, not finite, too large). */
 enum { ARM_DONE = 0, ARM_OPEN = 1, ARM_UNREAD = 2 };
+#define ARM_CACHES 16000000 /* bytes of joint values that caches may keep */
 
 /* Where the tool is at `near`, of count poses whose joint values stand `step` apart; nan where `near` is outside limits.
    wild: whether an angle is so large that Python has to say. */
@@ -44,6 +45,23 @@ static int arm_beside(const double *q, const double *near, const double *miss)
     return -1;
 }
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+/* A row of joint values written past the caches, where the results do not fit into them: else all of their memory is read
+   before it is written. */
+ARM_INLINE void arm_past_caches(double *to, const double *row)
+{
+    int k = 0;
+#ifdef __SSE2__
+    for (; k + 2 <= ARM_BRANCHES * ARM_JOINTS; k += 2)
+        _mm_stream_pd(to + k, _mm_loadu_pd(row + k));
+#endif
+    for (; k < ARM_BRANCHES * ARM_JOINTS; k++)
+        to[k] = row[k];
+}
+
 /* All branches of n targets, in the layout of `armkin.Solutions`; near_step: 0 if one `near` serves all, else the
    number of joints. read: whether the targets have been read. Returns how many are not done. */
 int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t near_step, int64_t read, double *out_q,
@@ -51,7 +69,8 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
 {
     double goal[ARM_GOAL * ARM_LANES], close[ARM_JOINTS * ARM_LANES];
     double q[ARM_BRANCHES * ARM_JOINTS * ARM_LANES], miss[ARM_BRANCHES * ARM_LANES];
-    double point[3 * ARM_POINTS];
+    double point[3 * ARM_POINTS], kept[ARM_BRANCHES * ARM_JOINTS];
+    const int far = n * (int64_t)sizeof kept > ARM_CACHES && (uintptr_t)out_q % 16 == 0 && sizeof kept % 16 == 0;
     int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES], wild[ARM_POINTS], at_near[ARM_LANES];
     int64_t start, left = 0;
     int i, j, b;
@@ -91,7 +110,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
             }
         for (i = 0; i < count; i++) {
             const int64_t at = start + i;
-            double *row = out_q + at * ARM_BRANCHES * ARM_JOINTS;
+            double *row = far ? kept : out_q + at * ARM_BRANCHES * ARM_JOINTS;
             uint8_t *is_valid = valid + at * ARM_BRANCHES, *is_within = within + at * ARM_BRANCHES;
             int8_t *index = branch + at * ARM_BRANCHES;
             int place = 0;
@@ -117,8 +136,14 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
                 is_valid[place] = is_within[place] = 0;
                 index[place] = -1;
             }
+            if (far)
+                arm_past_caches(out_q + at * ARM_BRANCHES * ARM_JOINTS, kept);
         }
     }
+#ifdef __SSE2__
+    if (far)
+        _mm_sfence(); /* before other threads read them */
+#endif
     return left;
 }
 
