@@ -281,3 +281,16 @@ def test_a_wrist_is_in_line_somewhere_on_a_self_motion_of_the_shoulder(seed: int
     joints = np.radians([q])
     verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
     assert verdict, verdict
+
+
+@pytest.mark.parametrize("q", [[-90, 90, 180, -90, 0, 90], [180, 90, 90, -90, -90, -90], [0, 90, 135, -90, -90, -90]])
+def test_a_self_motion_of_two_dimensions_that_meets_another(q: list[float]) -> None:
+    """Five axes through one point: joints 2 and 6, 3 and 5 move in pairs, and where joint 2 is at 90 joints 1, 3, 5."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(3152)), "pose")
+    task, _ = solver(arm, "pose")
+    joints = np.radians([q])
+    target = goal(task, screw, joints).array()
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, "pose", joints, target, near)
+        assert verdict, verdict
+        assert not verdict.solutions.complete[0]

@@ -18,6 +18,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse import circuits, clusters, fold_singularities, self_motions, valleys
 from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
     HAIR,
@@ -62,7 +63,7 @@ class Examined(NamedTuple):
 
 
 class _Settled(NamedTuple):
-    """The same, and whether a loose candidate came to nothing (K,)."""
+    """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each."""
 
     q: Array
     valid: Bool
@@ -70,6 +71,7 @@ class _Settled(NamedTuple):
     status: NDArray[np.int8]
     free: Bool
     open: Bool
+    surface: Bool
 
 
 def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettled: Bool | None = None) -> Examined:
@@ -82,7 +84,7 @@ def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettl
     that loses singular ones: more are asked for these and for what is singular.
     """
     found = _settle(goals, q, np.broadcast_to(label, q.shape[:2]), loose, SEED)
-    again = found.open | ~found.valid.any(axis=1)
+    again = found.open | found.surface | ~found.valid.any(axis=1)
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
         first, last = found.free.argmax(axis=1), goals.arm.n - 1 - found.free[:, ::-1].argmax(axis=1)
@@ -93,6 +95,9 @@ def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettl
         return Examined(*found[:5], np.zeros(len(q), bool))
     rows = np.flatnonzero(wider)
     others, labels = more(rows, again[rows])
+    if (surface := found.surface[rows]).any():  # another one may meet it along a line, or at a point
+        starts = many_starts(goals.arm, goals.task, goals.target[rows], surface)
+        others, labels = np.concatenate([others, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
     rows, others = rows[there], others[there]
     if not len(rows):
@@ -203,6 +208,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         status,
         free,
         np.asarray((loose & ~valid[:, 1:]).any(axis=1)),
+        self_motions.surfaces(arm, task, q, V, chosen & (nullity == 2) & curve.any(axis=2), target),
     )
 
 
