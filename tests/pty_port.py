@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+import select
 import threading
 import time
 import tty
 from collections.abc import Callable
 from typing import Protocol, Self
+
+from armkin.board.sim.clock import SimulatedTime
 
 
 class Simulated(Protocol):
@@ -87,7 +90,7 @@ class Served:
     def _serve(self) -> None:
         raise NotImplementedError
 
-    def _talk(self, board: Simulated, receive: Callable[[], bytes], send: Callable[[bytes], object]) -> None:
+    def _talk(self, board: Simulated, line: int, receive: Callable[[], bytes], send: Callable[[bytes], object]) -> None:
         """Let the board and a program talk, the board's seconds being real ones, until the program closes its end."""
         began = time.monotonic() - board.now()
         while not self._end.is_set():
@@ -100,11 +103,12 @@ class Served:
             with self.lock:
                 if heard:
                     board.write(heard)
-                said = board.read(max(0.0, time.monotonic() - began - board.now()))
+                late = max(0.0, time.monotonic() - began - board.now())
+                said = board.read(min(late, 0.02))  # what it is late by it makes up for, and listens all the same
             if said:
                 send(said)
-            elif not heard:
-                time.sleep(0.0005)
+            elif not heard and late < 0.02:
+                select.select([line], [], [], 0.004)
 
 
 class Pty(Served):
@@ -127,6 +131,10 @@ class PtyPort(Pty):
     def __init__(self, board: Simulated) -> None:
         super().__init__()
         self.board = board
+        if isinstance(board, SimulatedTime):
+            board.step = max(board.step, 0.004)  # a finer one takes a busy machine longer than the time that it is
 
     def _serve(self) -> None:
-        self._talk(self.board, lambda: os.read(self._master, 4096), lambda said: os.write(self._master, said))
+        self._talk(
+            self.board, self._master, lambda: os.read(self._master, 4096), lambda said: os.write(self._master, said)
+        )

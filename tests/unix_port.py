@@ -32,4 +32,4 @@ class UnixPort(Served):
                 continue
             with link:
                 link.setblocking(False)
-                self._talk(self.board, lambda link=link: link.recv(65_536), link.sendall)  # type: ignore[misc]
+                self._talk(self.board, link.fileno(), lambda link=link: link.recv(65_536), link.sendall)  # type: ignore[misc]

@@ -97,7 +97,7 @@ def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, c
     sender = moving(board)
     sender.send_signal(number)
     out, err = sender.communicate(timeout=60)
-    assert sender.returncode == code
+    assert sender.returncode == code, err
     assert out == b""
     assert b"stopped: the arm stands at" in err
     assert board.state == State.IDLE
@@ -125,7 +125,7 @@ def test_a_cut_line(board: PtyBoard) -> None:
     on_the_path(net)
     board.cut = False  # nothing resumes by itself
     _, err = sender.communicate(timeout=60)
-    assert sender.returncode == 5
+    assert sender.returncode == 5, err
     assert b"the arm stands at" in err or b"does not answer any more" in err
     assert board.net == net
     finish(board)
@@ -138,8 +138,8 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
     assert f"process {sender.pid}" in busy.err
     stop = process("stop", "--port", board.port)
     assert stop.code == 0, stop.err
-    sender.communicate(timeout=60)
-    assert sender.returncode == 143
+    _, err = sender.communicate(timeout=60)
+    assert sender.returncode == 143, err
     assert board.state == State.IDLE
     assert "the arm stands" in stop.err  # the board itself was asked
     finish(board)
@@ -157,8 +157,8 @@ def test_stop_beside_a_suspended_sender() -> None:
             seconds.append(time.monotonic() - began)
             assert stop.code == 0, stop.err
             assert "the arm stands" in stop.err
-            sender.communicate(timeout=60)
-            assert sender.returncode == 143
+            _, err = sender.communicate(timeout=60)
+            assert sender.returncode == 143, err
             board.time.patience = 0.12
             finish(board)
     assert min(seconds) < 6
