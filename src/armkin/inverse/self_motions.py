@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import fold_singularities, valleys
+from armkin.inverse import circuits, fold_singularities, valleys
 from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import BESIDE, HAIR, HIGH, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import BESIDE, HAIR, HIGH, SAME, SLOW, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -122,8 +122,11 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             held = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
             held &= (np.abs(apart) > TURNED).sum(axis=1) <= ALONG
             held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
-            if (newton.missing(arm, task, between, there) <= SOLUTION).any() or any(
-                _straight(arm, task, q[k, i], d, target[k]) for d in apart[held]
+            slow = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < SLOW
+            if (
+                (newton.missing(arm, task, between, there) <= SOLUTION).any()
+                or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])
+                or any(_round(arm, task, q[k, i], curve[k, i], d, target[k]) for d in apart[slow & ~held])
             ):
                 chosen[k, i] = False
             else:
@@ -142,6 +145,13 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool
     off = np.abs(newton.difference(arm, there, start)).max(axis=1)
     good = (size <= SOLUTION) & (off < 10 * TURNED)
     return bool(good.reshape(3, -1).all(axis=0).any())
+
+
+def _round(arm: Arm, task: Task, q: Array, curve: Bool, way: Array, target: Array) -> bool:
+    """Whether the self-motion of q (n,) goes round to q + way, which other joints than curve (n,) move slowly."""
+    joints = curve | (np.abs(way) > SAME)
+    there = (q + way * radian_or_reach(arm))[None, None]
+    return bool(circuits.on_one(arm, task, q[None], joints[None], there, np.ones((1, 1), bool), target[None]).all())
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:
@@ -164,7 +174,7 @@ def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool
         way = newton.difference(arm, q[j], q[i])
         if np.abs(way).max() < BESIDE:
             return False
-        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < TURNED:
+        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < SLOW:
             halfway.append(q[i] + 0.5 * _both_ways(arm, way) * unit)
     if not halfway:
         return True
