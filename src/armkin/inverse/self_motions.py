@@ -119,10 +119,10 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             between = q[k, i] + 0.5 * apart[close] * radian_or_reach(arm)
             there = np.repeat(target[k : k + 1], len(between), axis=0)
             # one kept may be where its own self-motion and this one meet
-            held = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < TURNED
-            held &= (np.abs(apart) > TURNED).sum(axis=1) <= ALONG
+            turned = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
+            held = (turned < TURNED) & ((np.abs(apart) > TURNED).sum(axis=1) <= ALONG)
             held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
-            slow = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0) < SLOW
+            slow = (turned > TURNED) & (turned < SLOW)
             if (
                 (newton.missing(arm, task, between, there) <= SOLUTION).any()
                 or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])

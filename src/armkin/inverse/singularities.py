@@ -166,9 +166,11 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
         mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < MOVING)
-        # (one a hair beside it, where it passes a corner, if the same joints move it)
-        row, column = np.nonzero(mine & (sigma[k] >= SOLUTION))
+        # (one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it)
+        beside = mine & (sigma[k] >= SOLUTION)
+        row, column = np.nonzero(beside & (nullity[k] > 1))
         ask(k[row], column)
+        mine &= ~beside
         mine[row, column] = moves[k[row], column] & (which[k[row], column] == joints[row]).all(axis=1)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
