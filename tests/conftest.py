@@ -20,7 +20,7 @@ settings.load_profile("same")
 # Since 6.130 it also tries numbers that stand in whatever modules are imported by then: with several workers, other
 # ones in every run, as it was left to how fast each of them was.
 _providers: Any = sys.modules.get("hypothesis.internal.conjecture.providers")
-if hasattr(_providers, "_get_local_constants"):
+if hasattr(_providers, "_get_local_constants") and hasattr(_providers, "_local_constants"):
     _providers._get_local_constants = lambda: _providers._local_constants
 
 if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
