@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 
-from bench_ik import ROBOTS, peer_job, random_joints, targets
+from bench_ik import ROBOTS, best_time, peer_job, random_joints, targets
 from exported import agreement
 
 import armkin
@@ -40,26 +40,6 @@ ROWS = [
     ("jaco_j2n6s300", "ssik", 0.1),
     ("moveo", None, 0.05),
 ]
-
-LEAST = 0.5  # seconds that each job runs in all
-
-
-def best_time(
-    *jobs: Callable[[], object], repeat: int = 5, clock: Callable[[], float] = time.process_time
-) -> list[float]:
-    """Shortest time [s] of each job, the jobs taken in turn: as often as asked for, and for half a second each.
-
-    On a shared machine a job of 4 ms meets no quiet moment in five runs.
-    """
-    best, spent, rounds = [np.inf] * len(jobs), [0.0] * len(jobs), 0
-    while rounds < repeat or (repeat > 1 and min(spent) < LEAST and max(spent) < 4 * LEAST):
-        for i, job in enumerate(jobs):
-            start = clock()
-            job()
-            took = clock() - start
-            best[i], spent[i] = min(best[i], took), spent[i] + took
-        rounds += 1
-    return best
 
 
 def speed(poses: int, only: str | None) -> None:
