@@ -49,6 +49,9 @@ from armkin.inverse.recognise import solver
         ("iiwa7", [90, -45, 0, 180, 0, 0]),
         ("fanuc_crx10ia", [0, 0, -90, 180, -135, 90]),
         ("fanuc_crx10ia", [-90, 90, -90, 0, -90, 180]),
+        # and of these, corners that stand for no more than they are
+        ("fanuc_crx10ia", [0, -90, -90, 180, 90, 90]),
+        ("fanuc_crx10ia", [90, 180, -90, -90, 180, -90]),
         # axes 1 and 4 all but in one line: along the self-motion joints 5 and 6 move, but hardly
         ("ar4", [-92.3614960864, -12.1627815347, -77.8216738881, 64.4795069076, -81.4669898141, -144.7874410383]),
         # a corner that its own self-motion passes, seen from a hair beside it

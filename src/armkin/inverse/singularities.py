@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 SURE = 1e-14  # residuals below this are equal
+ON = 1e-14  # smallest singular value of a posture on a self-motion, not beside it
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
@@ -166,9 +167,10 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
         mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < MOVING)
-        # (one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it)
+        # (one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it: seen
+        # from the curve alone, for self-motions of double roots are known to a hair everywhere)
         beside = mine & (sigma[k] >= SOLUTION)
-        row, column = np.nonzero(beside & (nullity[k] > 1))
+        row, column = np.nonzero(beside & (nullity[k] > 1) & (sigma[k, b] < ON)[:, None])
         ask(k[row], column)
         mine &= ~beside
         mine[row, column] = moves[k[row], column] & (which[k[row], column] == joints[row]).all(axis=1)
