@@ -37,12 +37,18 @@ class Suspended(Wire):
         return super().now() + self.paused
 
 
-def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
+def prepared() -> tuple[Suspended, Machine]:
+    """A board that knows its arm at home, and the program that speaks with it."""
     arm = arms.load(ROOT / "robots/three_dof.yaml")
     configuration = configure(arm)
     port = Suspended(SimBoard(configuration.board))
     one = Machine(port, arm, configuration)
     one.prepare(assume=arm.home)
+    return port, one
+
+
+def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
+    port, one = prepared()
     port.every = 0.3
     one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])
     assert port.paused > 5 * PAUSE
@@ -50,11 +56,7 @@ def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None
 
 
 def test_a_board_that_is_gone_is_told_within_two_seconds() -> None:
-    arm = arms.load(ROOT / "robots/three_dof.yaml")
-    configuration = configure(arm)
-    port = Suspended(SimBoard(configuration.board))
-    one = Machine(port, arm, configuration)
-    one.prepare(assume=arm.home)
+    port, one = prepared()
     port.silent, began = True, port.now()
     with pytest.raises(LinkError, match="does not answer any more"):
         one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])

@@ -19,6 +19,7 @@ from armkin.inverse.closed import spherical
 from armkin.inverse.closed.candidates import is_sound
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2
+from armkin.inverse.closed.wrist import foot
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import AT_ZERO, EXACT
@@ -138,9 +139,7 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     L = chain.link[4]
     if chain.prismatic[3:].any() or is_parallel(L, 1e-6):
         return None
-    t, w = L[:3, 3], L[:3, 2]
-    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])  # on axis 4, of the common perpendicular's foot
-    there = (inverse(L) @ [0.0, 0.0, height, 1.0])[:3]
+    there = (inverse(L) @ [*foot(L), 1.0])[:3]
     if np.hypot(*there[:2]) > tolerance:
         return None
     axis = np.eye(4)

@@ -18,7 +18,7 @@ from armkin.inverse import circuits, fold_singularities, valleys
 from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import BESIDE, HAIR, HIGH, SAME, SLOW, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import BESIDE, DRIFT, HAIR, HIGH, SAME, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -122,7 +122,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             turned = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
             held = (turned < TURNED) & ((np.abs(apart) > TURNED).sum(axis=1) <= ALONG)
             held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
-            slow = (turned > TURNED) & (turned < SLOW)
+            slow = (turned > TURNED) & (turned < DRIFT)
             if (
                 (newton.missing(arm, task, between, there) <= SOLUTION).any()
                 or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])
@@ -174,7 +174,7 @@ def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool
         way = newton.difference(arm, q[j], q[i])
         if np.abs(way).max() < BESIDE:
             return False
-        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < SLOW:
+        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < DRIFT:
             halfway.append(q[i] + 0.5 * _both_ways(arm, way) * unit)
     if not halfway:
         return True

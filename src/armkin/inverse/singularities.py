@@ -96,7 +96,8 @@ def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettl
         return Examined(*found[:5], np.zeros(len(q), bool))
     rows = np.flatnonzero(wider)
     others, labels = more(rows, again[rows])
-    if (surface := found.surface[rows]).any():  # another one may meet it along a line, or at a point
+    surface = found.surface[rows]  # another self-motion may meet it along a line, or at a point
+    if unsettled is None and surface.any():  # else `more` has searched from there already
         starts = many_starts(goals.arm, goals.task, goals.target[rows], surface)
         others, labels = np.concatenate([others, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
@@ -166,13 +167,13 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
-        mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < MOVING)
-        # (one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it: seen
-        # from the curve alone, for self-motions of double roots are known to a hair everywhere)
-        beside = mine & (sigma[k] >= SOLUTION)
-        row, column = np.nonzero(beside & (nullity[k] > 1) & (sigma[k, b] < ON)[:, None])
+        close = rest & moving[:, None] & (held < 3 * TURNED)
+        mine = close & (sigma[k] < SOLUTION)
+        # and one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it:
+        # seen from the curve alone, for self-motions of double roots are known to a hair everywhere
+        corner = close & ~mine & (sigma[k] < MOVING) & (nullity[k] > 1) & (sigma[k, b] < ON)[:, None]
+        row, column = np.nonzero(corner)
         ask(k[row], column)
-        mine &= ~beside
         mine[row, column] = moves[k[row], column] & (which[k[row], column] == joints[row]).all(axis=1)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]

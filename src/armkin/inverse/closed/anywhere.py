@@ -206,8 +206,7 @@ class _Loop:
         x, z = [P[0], P[3], P[6]], [P[2], P[5], P[8]]
         rest = prefer[self.first : self.first + 3]
         if self.three_link is None:
-            turned, doubt3, _ = self.wrist.solve(x, z, rest)
-            three, known = turned
+            three, known, doubt3, _ = self.wrist.solve(x, z, rest)
         else:
             p = [arrays.mul(-1.0, v) for v in pose.turn_back(P, P[9:12])]
             three, known, doubt3 = self.three_link.solve(p, x, rest, axis=2)

@@ -117,10 +117,10 @@ class SphericalWrist:
             x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
         else:
             miss, x, z = self._pushed(pairs, centre, columns)
-        turned, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
+        turned, known, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
         miss = arrays.mul(1.0 / self.reach**2, miss) + wrong
-        angles = turned.angles and [None, None, None, *turned.angles]
-        return Candidates([*pairs, *turned.pairs], doubt | doubt456, miss, angles)
+        angles = known and [None, None, None, *known]
+        return Candidates([*pairs, *turned], doubt | doubt456, miss, angles)
 
     def _pushed(
         self, pairs: list[Pair], centre: list[Entry], columns: list[list[Entry]]

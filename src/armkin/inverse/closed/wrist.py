@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from armkin.formula import arrays, pose
@@ -14,26 +12,23 @@ from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse
 
 
+def foot(L: Array) -> Array:
+    """The foot, on the axis before a link, of its common perpendicular with the axis behind, not parallel: (3,)."""
+    # the axis before is the z axis, the one behind the line t + s w
+    t, w = L[:3, 3], L[:3, 2]
+    return np.array([0.0, 0.0, t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])])
+
+
 def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
     """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
     if is_parallel(L4, 1e-6) or is_parallel(L5, 1e-6):
         return None
-    # axis 4 is the z axis, axis 5 the line t + s w: the foot of their common perpendicular on axis 4
-    t, w = L4[:3, 3], L4[:3, 2]
-    height = t[2] - w[2] * (t[:2] @ w[:2]) / (w[:2] @ w[:2])
-    at4 = np.array([0.0, 0.0, height])
+    at4 = foot(L4)
     at5 = (inverse(L4) @ [*at4, 1.0])[:3]
     at6 = (inverse(L5) @ [*at5, 1.0])[:3]
     if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:
         return None
     return at4, at6
-
-
-class Turned(NamedTuple):
-    """Joints 4, 5 and 6: a pair each, and its angle where it is known without an inverse function."""
-
-    pairs: list[Pair]
-    angles: list[Entry | None]
 
 
 class Wrist:
@@ -52,15 +47,17 @@ class Wrist:
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
         self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
 
-    def solve(self, x: list[Entry], z: list[Entry], prefer: Prefer) -> tuple[Turned, Doubt, Entry]:
-        """The joints that turn the first and the last column to x and z, both ways on branch axis 2; doubt; and the
-        squared distance that they leave of these columns."""
+    def solve(
+        self, x: list[Entry], z: list[Entry], prefer: Prefer
+    ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
+        """The joints that turn the first and the last column to x and z, both ways on branch axis 2; their angles where
+        no inverse function is needed; doubt; and the squared distance that they leave of these columns."""
         if self.mirrored:
             return self._mirrored(x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, self.tangent)
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
-        return Turned([fourth, fifth, sixth], []), doubt5 | doubt4, wrong
+        return [fourth, fifth, sixth], [], doubt5 | doubt4, wrong
 
     def _around(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
@@ -79,7 +76,9 @@ class Wrist:
         wrong = distance2(spin(c4, s4, u), z) + off * off
         return fourth, Pair(c6, s6), doubt4, wrong
 
-    def _mirrored(self, x: list[Entry], z: list[Entry], prefer: Prefer) -> tuple[Turned, Doubt, Entry]:
+    def _mirrored(
+        self, x: list[Entry], z: list[Entry], prefer: Prefer
+    ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]
         fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, np.sqrt(disc)))
@@ -87,9 +86,9 @@ class Wrist:
         sign = signs(2)
         flipped = 0.5 - 0.5 * sign
         q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
-        angles = [
+        angles: list[Entry | None] = [
             q4 - flipped * np.copysign(np.pi, q4),
             sign * np.arctan2(fifth.s, fifth.c),
             q6 - flipped * np.copysign(np.pi, q6),
         ]
-        return Turned([fourth, fifth, sixth], angles), (disc < SHARP) | doubt4, wrong
+        return [fourth, fifth, sixth], angles, (disc < SHARP) | doubt4, wrong
