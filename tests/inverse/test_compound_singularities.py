@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import truth
 from geometries import case, right_angles
-from oracle import goal
+from oracle import goal, weakness
 from test_every_branch import shipped
 
 import armkin
@@ -262,6 +262,23 @@ def test_points_in_a_curved_valley_are_one_branch(name: str | int, q: list[float
         verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array(), near)
         assert verdict, verdict
         assert verdict.solutions.valid.sum() == count
+
+
+@pytest.mark.parametrize("q", [[0, 0, -90, -90, 180, -90], [-135, 180, -90, -45, 0, 45], [-90, -90, -90, 0, 90, 180]])
+def test_self_motions_that_meet_are_listed_once_each_and_none_by_its_corner(q: list[float]) -> None:
+    """Two of joints 1 and 4 and two of joints 2 and 5, which cross four times: their corners were listed instead."""
+    arm, screw = shipped("fanuc_crx10ia")
+    task, _ = solver(arm, "pose")
+    joints = np.radians([q])
+    at = goal(task, screw, joints)
+    for near in (None, joints):
+        verdict = truth.judge(arm, screw, "pose", joints, at.array(), near)
+        assert verdict, verdict
+        found = verdict.solutions.q[0][verdict.solutions.valid[0]]
+        across = np.abs(np.cos(found[:, 0])) < 1e-12  # joint 1 at 90 or -90: joints 2 and 5 move
+        assert sorted(np.sin(found[across, 0]).round(9)) == [-1, 1]
+        assert sorted(np.cos(found[~across, 1]).round(9)) == [-1, 1]  # joint 2 at 180 or 0: joints 1 and 4
+        assert weakness(screw, at.take([0] * 4), found).max() < 1e-15
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ a self-motion that is listed already is dropped: `armkin.inverse.singularities` 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import circuits, fold_singularities, valleys
 from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
+from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import BESIDE, DRIFT, HAIR, HIGH, SAME, SOLUTION, TURNED, WEAK
@@ -193,7 +193,7 @@ def isolated(at: Folds) -> Bool:
     return np.asarray((np.abs(at.bend) > BENT) | (grows & (at.second > STEEP)))
 
 
-def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
 
@@ -201,7 +201,7 @@ def _follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array
 def _stays(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Int, Array]:
     """Which postures (M, n), a step (M,) away along push (M, n) and pulled back, are still away; and their growth."""
     unit = radian_or_reach(arm)
-    there, size = _follow(arm, task, q + step[:, None] * push * unit, target)
+    there, size = follow(arm, task, q + step[:, None] * push * unit, target)
     size -= newton.missing(arm, task, q, target)
     far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
     some = np.flatnonzero(far & (size <= GROWTH * step))
@@ -297,8 +297,7 @@ def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Ar
     """Whether postures (M, n) can move along any direction that they lose, pulled back by steps of least norm."""
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
-    pushes = list(_null_directions(arm.n, V, nullity))
-    who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
+    who, push = null_directions(arm.n, V, nullity)
     # Most candidates fall back at once. Where several directions are lost, a short step is drawn back into the corner.
     several = nullity[who] > 1
     first = np.where(several, 10 * STEP, STEP)
@@ -315,7 +314,7 @@ def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Ar
     # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
     ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
     start = q[who] + ways * push * unit
-    there, size = _follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8))
+    there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8))
     away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
     short, long = _slow(grown) & _apart(away, push)
@@ -336,45 +335,8 @@ def surfaces(arm: Arm, task: Task, q: Array, V: Array, asked: Bool, target: Arra
     k, b = np.nonzero(asked)
     if len(k):
         push = (V[k, b, arm.n - 1] + 0.7 * V[k, b, arm.n - 2]) * 10 * STEP
-        there, size = _follow(arm, task, q[k, b] + push * radian_or_reach(arm), target[k])
+        there, size = follow(arm, task, q[k, b] + push * radian_or_reach(arm), target[k])
         nullity = newton.null_space(arm, task, there, target[k])[2]
         away = np.abs(newton.difference(arm, there, q[k, b])).max(axis=1)
         out[k[(size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP)]] = True
     return out
-
-
-def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
-    """Which branches to push, and where: (m,) indices and (m, n) directions.
-
-    In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
-    is pushed as far as the null space lets it, pairs of joints that do without the others are, and in a plane
-    of them every joint is held.
-    """
-    for index in range(int(nullity.max())):
-        who = np.flatnonzero(nullity > index)
-        yield who, V[who, n - 1 - index]
-    plane = np.flatnonzero(nullity == 2)
-    for joint in range(n if len(plane) else 0):
-        u, v = V[plane, n - 1], V[plane, n - 2]
-        hold = v[:, joint, None] * u - u[:, joint, None] * v
-        size = np.linalg.norm(hold, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield plane[some], hold[some] / size[some, None]
-    many = np.flatnonzero(nullity > 1)
-    in_null = np.arange(n) >= n - nullity[many][:, None]
-    rest = np.eye(n) - np.einsum("mij,mi,mik->mjk", V[many], in_null, V[many])  # projection out of the null space
-    for i, j in itertools.combinations(range(n) if len(many) else (), 2):
-        # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
-        a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
-        some = (a * b - c * c < 1e-10) & (a + b > 1e-3) & (np.abs(c) > 1e-3)
-        if some.any():
-            push = np.zeros((int(some.sum()), n))
-            push[:, i], push[:, j] = b[some], -c[some]
-            yield many[some], push / np.linalg.norm(push, axis=1, keepdims=True)
-    for joint in range(n if len(many) else 0):
-        push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
-        size = np.linalg.norm(push, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield many[some], push[some] / size[some, None]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, clusters, fold_singularities, self_motions, valleys
+from armkin.inverse import circuits, clusters, corners, fold_singularities, self_motions, valleys
 from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 SURE = 1e-14  # residuals below this are equal
-ON = 1e-14  # smallest singular value of a posture on a self-motion, not beside it
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
@@ -127,6 +126,8 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     arm, task, target, near = goals
     K, _, n = q.shape
     q, label, size = _onto(goals, q, label, seed)
+    missed = loose & (size[:, 1:] > SOLUTION)
+    q, label, size = corners.ways_out(goals, q, label, size, OWN)
     valid = size <= SOLUTION
     M = q.shape[1]
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
@@ -167,14 +168,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         # its points are not equal, and the exact ones are listed
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
-        close = rest & moving[:, None] & (held < 3 * TURNED)
-        mine = close & (sigma[k] < SOLUTION)
-        # and one a hair beside it, where it passes a corner and two directions are lost, if the same joints move it:
-        # seen from the curve alone, for self-motions of double roots are known to a hair everywhere
-        corner = close & ~mine & (sigma[k] < MOVING) & (nullity[k] > 1) & (sigma[k, b] < ON)[:, None]
-        row, column = np.nonzero(corner)
-        ask(k[row], column)
-        mine[row, column] = moves[k[row], column] & (which[k[row], column] == joints[row]).all(axis=1)
+        mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < SOLUTION)
         one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:
@@ -212,7 +206,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         np.where(there, np.take_along_axis(label, order, axis=1), OWN),
         status,
         free,
-        np.asarray((loose & ~valid[:, 1:]).any(axis=1)),
+        np.asarray(missed.any(axis=1)),
         self_motions.surfaces(arm, task, q, V, chosen & (nullity == 2) & curve.any(axis=2), target),
     )
 

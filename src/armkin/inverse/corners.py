@@ -1,0 +1,76 @@
+"""Corners: postures in which several self-motions meet, replaced by a posture of each of these.
+
+Two or more directions are lost in a corner, and a root there is known to a hair only: of the self-motions that it
+lies on, all and none. A long step away on each of them one direction is lost, and the posture is right to rounding.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.inverse.batch import Goals
+from armkin.inverse.null_directions import null_directions
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.self_motions import STEP, follow
+from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+ALIKE = 1e-4  # [rad, reaches] roots in one corner are no further apart
+BOW = 0.1  # of its length: a curve is no farther off its chord
+
+Int = NDArray[np.int64]
+
+
+def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tuple[Array, Int, Array]:
+    """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those in corners.
+
+    The first of a target, `near`, stays where it is. Others in corners that no self-motion leaves stay, too: roots of
+    high order, and surfaces. none: the label of what is no candidate.
+    """
+    arm, task, target, _ = goals
+    k, b = np.nonzero(size[:, 1:] <= SOLUTION)
+    b += 1
+    _, V, nullity = newton.null_space(arm, task, q[k, b], target[k])
+    some = np.flatnonzero(nullity > 1)
+    if not len(some):
+        return q, label, size
+    k, b = k[some], b[some]
+    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ALIKE)
+    _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
+    at, row = q[k[first], b[first]], k[first]
+    who, there = _steps_out(arm, task, at, V[some[first]], nullity[some[first]], target[row])
+    left = np.isin(same.reshape(-1), who)
+    size[k[left], b[left]] = np.inf
+    order = np.argsort(row[who], kind="stable")
+    who, there = who[order], there[order]
+    row, whose = row[who], label[k[first], b[first]][who]
+    place = np.arange(len(row)) - np.searchsorted(row, row)
+    shape = len(q), int(place.max(initial=-1)) + 1
+    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, none), np.full(shape, np.inf)
+    more[row, place], labels[row, place] = there, whose
+    sizes[row, place] = newton.missing(arm, task, there, target[row])
+    return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1)
+
+
+def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Int, Array]:
+    """Postures (m, n) on self-motions that leave corners (M, n), a long step off, and whose: (m,)."""
+    who, push = null_directions(arm.n, V, nullity)
+    unit = radian_or_reach(arm)
+    there, size = follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
+    way = newton.difference(arm, there, q[who])
+    some = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) > 3 * STEP))
+    some = some[newton.null_space(arm, task, there[some], target[who[some]])[2] == 1]
+    # the way there is a self-motion's, too: half way it is beside the chord by no more than a curve is
+    start = q[who[some]] + 0.5 * way[some] * unit
+    between, size = follow(arm, task, start, target[who[some]])
+    beside = np.abs(newton.difference(arm, between, start)).max(axis=1)
+    some = some[(size <= SOLUTION) & (beside < BOW * np.abs(way[some]).max(axis=1))]
+    return who[some], there[some]
