@@ -16,7 +16,7 @@ from armkin.inverse.batch import Goals
 from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SOLUTION
-from armkin.inverse.self_motions import STEP, follow
+from armkin.inverse.self_motions import STEP, follow, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -33,7 +33,7 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those in corners.
 
     The first of a target, `near`, stays where it is. Others in corners that no self-motion leaves stay, too: roots of
-    high order, and surfaces. none: the label of what is no candidate.
+    high order, and postures of surfaces. none: the label of what is no candidate.
     """
     arm, task, target, _ = goals
     k, b = np.nonzero(size[:, 1:] <= SOLUTION)
@@ -62,7 +62,11 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
 
 def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Int, Array]:
     """Postures (m, n) on self-motions that leave corners (M, n), a long step off, and whose: (m,)."""
-    who, push = null_directions(arm.n, V, nullity)
+    rows = np.flatnonzero(~on_surface(arm, task, q, V, target))
+    if not len(rows):
+        return rows, np.zeros((0, arm.n))
+    who, push = null_directions(arm.n, V[rows], nullity[rows])
+    who = rows[who]
     unit = radian_or_reach(arm)
     there, size = follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
     way = newton.difference(arm, there, q[who])

@@ -326,17 +326,13 @@ def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Ar
     return moving, joints
 
 
-def surfaces(arm: Arm, task: Task, q: Array, V: Array, asked: Bool, target: Array) -> Bool:
-    """Targets (K,) with a self-motion of two dimensions: a long step off, by both ways at once, two are lost still.
+def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
+    """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
 
-    q: (K, M, n), V: (K, M, n, n) right singular vectors, asked: (K, M) postures that lose two directions.
+    Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors.
     """
-    out = np.zeros(len(q), bool)
-    k, b = np.nonzero(asked)
-    if len(k):
-        push = (V[k, b, arm.n - 1] + 0.7 * V[k, b, arm.n - 2]) * 10 * STEP
-        there, size = follow(arm, task, q[k, b] + push * radian_or_reach(arm), target[k])
-        nullity = newton.null_space(arm, task, there, target[k])[2]
-        away = np.abs(newton.difference(arm, there, q[k, b])).max(axis=1)
-        out[k[(size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP)]] = True
-    return out
+    push = (V[:, arm.n - 1] + 0.7 * V[:, arm.n - 2]) * 10 * STEP
+    there, size = follow(arm, task, q + push * radian_or_reach(arm), target)
+    nullity = newton.null_space(arm, task, there, target)[2]
+    away = np.abs(newton.difference(arm, there, q)).max(axis=1)
+    return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))

@@ -200,6 +200,9 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
     status[double] = Status.BOUNDARY
     status[singular] = Status.SINGULAR
+    surface, (k, b) = np.zeros(K, bool), np.nonzero(chosen & (nullity == 2) & curve.any(axis=2))
+    if len(k):
+        surface[k[self_motions.on_surface(arm, task, q[k, b], V[k, b], target[k])]] = True
     return _Settled(
         out,
         there,
@@ -207,7 +210,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         status,
         free,
         np.asarray(missed.any(axis=1)),
-        self_motions.surfaces(arm, task, q, V, chosen & (nullity == 2) & curve.any(axis=2), target),
+        surface,
     )
 
 
