@@ -274,3 +274,30 @@ def test_a_posture_that_solves_its_target_is_listed_to_the_bit(robot: str) -> No
             np.testing.assert_array_equal(slow.q[slow.best], q[k])
             all_near_one = fast.ik(target, near=q[k])
             np.testing.assert_array_equal(all_near_one.q[k, all_near_one.best[k]], q[k])
+
+
+@pytest.mark.parametrize("robot", ["three_dof", "puma560", "jaco_j2n6s300"])
+def test_results_keep_their_own_targets(robot: str) -> None:
+    """A loop that writes the next targets into the same array changes nothing that has been answered."""
+    arm = armkin.load(robot)
+    fast = armkin.compile(arm)
+    target, near = questions(arm, "random", 3), np.random.default_rng(2).uniform(-1, 1, (3, arm.n))
+    for goal, close in ((target, near), (target[0], near[0]), (target, near[0])):
+        asked, beside = goal.copy(), close.copy()
+        found = fast.ik(asked, near=beside)
+        best = found.best
+        asked[...], beside[...] = 0.0, 2.0
+        np.testing.assert_array_equal(found.target, goal)
+        np.testing.assert_array_equal(found.near, np.broadcast_to(close, found.near.shape))
+        np.testing.assert_array_equal(found.best, best)
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, 2.0, "2", None, float("nan")])
+def test_workers_are_a_whole_number_for_one_target_too(workers: object) -> None:
+    arm = armkin.load("three_dof")
+    fast = armkin.compile(arm)
+    target = np.array([390.0, 80.0, 300.0])
+    for solve in (armkin.ik, lambda _, goal, workers: fast.ik(goal, workers=workers)):
+        for goal in (target, np.tile(target, (40_000, 1))):
+            with pytest.raises(armkin.UsageError, match="thread"):
+                solve(arm, goal, workers=workers)  # type: ignore[arg-type]

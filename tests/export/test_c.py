@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -10,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import agreement
+from exported import agreement, library
 
 import armkin
 from armkin.export.c.program import identifier, program
 from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.task import targets_of
 from armkin.model.build import build
 from armkin.robot_file import parse
 from command_line import run as run_armkin
@@ -123,6 +125,51 @@ def test_the_command_writes_three_files(tmp_path: Path) -> None:
     assert done.code == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.c", "arm.h", "arm_test.c"]
     assert "typedef float three_dof_real;" in (tmp_path / "arm.h").read_text()
+
+
+@pytest.mark.parametrize("name", ["arm_ik", "arm_real", "an arm", "Größe", "int", "@stem@"])
+def test_the_source_may_have_any_name(name: str, tmp_path: Path) -> None:
+    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / f"{name}.c")
+    assert done.code == 0
+    run("gcc", *WARNINGS, f"{name}.c", f"{name}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+
+
+def test_words_of_a_robot_file_stay_within_their_comment(tmp_path: Path) -> None:
+    arm = replace(armkin.load("three_dof"), name="a */ b /* ???/ @real@", path="arm_ik/x*/y.yaml")
+    assert built(tmp_path, replace(arm, joint_names=("*/ int x = ;", "/*/*", "q3"))) == "8 postures, 0 failed\n"
+    assert "from arm_ik/x* /y.yaml" in (tmp_path / "arm.h").read_text()
+
+
+@pytest.mark.parametrize("name", ["arm.c", "arm.h", "arm_test.c"])
+def test_a_file_that_cannot_be_written_leaves_the_others_as_they_were(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / "arm.c")
+    assert done.code == 1
+    assert f"{name}: cannot write: Is a directory" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_header_that_cannot_be_included_is_refused(tmp_path: Path) -> None:
+    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / 'a"b.c')
+    assert done.code == 2
+    assert "#include cannot name a header with a quote" in done.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("robot", ["puma560", "jaco_j2n6s300", "labvolt_5150", "three_dof"])
+def test_a_target_that_is_not_finite_is_none(robot: str, tmp_path: Path) -> None:
+    arm = armkin.load(robot)
+    code, prefix = library(arm, tmp_path), identifier(arm.name)
+    task, _ = solver(arm, None)
+    target = targets_of(task, armkin.fk(arm, arm.home[None]), arm.home[None]).ravel()
+    edge, found, near = ctypes.c_int(), ctypes.create_string_buffer(65536), arm.home.ctypes.data_as(ctypes.c_void_p)
+    for place in (3, 7, 11, 0, 5) if len(target) == 16 else range(len(target)):
+        for wrong in (np.nan, np.inf, -np.inf, 1e200, 1e16):
+            asked = target.copy()
+            asked[place] = wrong
+            said = code[f"{prefix}_ik"](asked.ctypes.data_as(ctypes.c_void_p), near, found, ctypes.byref(edge))
+            assert said == -1, (place, wrong)
 
 
 @pytest.mark.parametrize(

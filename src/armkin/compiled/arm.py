@@ -25,7 +25,7 @@ from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
-from armkin.inverse.workers import shared
+from armkin.inverse.workers import checked, shared
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -78,6 +78,8 @@ class CompiledArm:
         self, targets: ArrayLike, task: str | None = None, near: ArrayLike | None = None, *, workers: int = 1
     ) -> Solutions:
         """All branches, as `armkin.ik`; workers: threads that share a large batch."""
+        if workers != 1:
+            checked(workers)
         return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers)
 
     def _of(self, task: str | None) -> _CompiledTask:
@@ -170,6 +172,8 @@ class _CompiledTask:
             out.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
             out.branch[...] = follow(self.arm, self.task, out.q, target)
+        target = target.copy() if np.may_share_memory(target, given) else target  # the caller's arrays may change
+        close = close.copy()
         q = out.q
         B = q.shape[1]
         return Solutions(

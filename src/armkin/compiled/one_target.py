@@ -98,7 +98,7 @@ class Single:
         out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
         out.__dict__.update(
             same,
-            target=target,
+            target=target.copy(),  # the caller's array may change
             near=close,
             q=found[q].reshape(shape),
             valid=flags[valid],

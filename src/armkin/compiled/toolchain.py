@@ -1,8 +1,9 @@
 """The system's C compiler, and the folder of what it has built.
 
 What is built is kept in the user's cache folder, by content: the name is the sha256 of the source, the
-compiler, its flags and the processor. A library is loaded only from a folder and a file that belong to this
-user and that nobody else can write; where that folder cannot be had, every process builds its own.
+compiler, its flags and the processor, and that of the library itself, so that a torn file is never loaded. A
+library is loaded only from a folder and a file that belong to this user and that nobody else can write; where
+that folder cannot be had, every process builds its own.
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ import ctypes
 import hashlib
 import os
 import platform
+import shlex
 import shutil
 import stat
 import subprocess
 import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from armkin.errors import MissingExtraError
+from armkin.errors import FileError, MissingExtraError
 
 # No fast-math: sums keep their order, infinities and what is not a number keep their meaning. That errno is not
 # set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
@@ -26,16 +29,15 @@ FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "
 FLAGS += ["-shared", "-fPIC"]
 
 
-@cache
-def compiler() -> str:
-    """The compiler's path: that of $CC, or the first of cc, gcc, clang.
+def compiler() -> list[str]:
+    """The compiler's path, and its options: those of $CC, or the first of cc, gcc, clang.
 
     Raises MissingExtraError if there is none.
     """
     wanted = os.environ.get("CC", "").strip()
-    for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
-        if (path := shutil.which(name)) is not None:
-            return path
+    for words in [_words(wanted)] if wanted else [["cc"], ["gcc"], ["clang"]]:
+        if (path := shutil.which(words[0])) is not None:
+            return [path, *words[1:]]
     if wanted:
         raise MissingExtraError(f"CC names the C compiler '{wanted}', which is not there; unset CC, or install it")
     raise MissingExtraError(
@@ -44,45 +46,82 @@ def compiler() -> str:
     )
 
 
+def _words(wanted: str) -> list[str]:
+    """$CC as make reads it, such as ``ccache gcc``; a path with spaces in it stays one word."""
+    if shutil.which(wanted) is not None:
+        return [wanted]
+    try:
+        return shlex.split(wanted) or [wanted]
+    except ValueError:  # a quote without its other half
+        return [wanted]
+
+
 def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """A C file as a loaded library: from the cache, or built now.
 
     content: what the library must hold as `arm_content`; level: of optimisation. Raises MissingExtraError
-    without a compiler, or if it fails.
+    without a compiler, or if it fails; FileError where there is no place to build.
     """
-    command = [compiler(), f"-O{level}", *FLAGS]
+    command = [*compiler(), f"-O{level}", *FLAGS]
     key = "\0".join([source, *command, _version(command[0]), _processor()])
-    name = f"{hashlib.sha256(key.encode()).hexdigest()}.so"
+    name = hashlib.sha256(key.encode()).hexdigest()
     folder = _folder()
-    if folder is not None:
-        kept = folder / name
-        found = _trusted(kept, content)
-        if found is not None:
-            return found
-        _build(command, source, kept)
-        found = _trusted(kept, content)
-        if found is not None:
-            return found
-    with tempfile.TemporaryDirectory(prefix="armkin-") as own:
-        _build(command, source, Path(own) / name)
-        return ctypes.CDLL(os.path.join(own, name))
+    if folder is not None and (found := _kept(folder, name, content)) is not None:
+        return found
+    try:
+        with tempfile.TemporaryDirectory(prefix="armkin-") as own:
+            built = _build(command, source, Path(own))
+            if folder is not None:
+                _keep(built, folder, name)
+                if (found := _kept(folder, name, content)) is not None:
+                    return found
+            return ctypes.CDLL(str(built))
+    except OSError as error:  # a full disk, a folder from which nothing may be run
+        raise FileError(
+            f"no place to build the arm's code: {error}; TMPDIR may name a folder with room whose programs may run"
+        ) from None
 
 
-def _build(command: list[str], source: str, library: Path) -> None:
-    """Compile beside the library and give it its name when it is whole."""
-    with tempfile.TemporaryDirectory(prefix=".build-", dir=library.parent) as folder:
-        path = Path(folder)
-        (path / "arm.c").write_text(source, encoding="utf-8")
-        words = [*command, "arm.c", "-o", "arm.so", "-lm"]
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
-        if done.returncode:
-            said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
-            raise MissingExtraError(
-                f"the C compiler {command[0]} failed: {said}\n"
-                "it needs the C library's headers (Debian, Ubuntu: apt install gcc libc6-dev)"
-            )
-        os.chmod(path / "arm.so", 0o700)
-        os.replace(path / "arm.so", library)
+def _build(command: list[str], source: str, folder: Path) -> Path:
+    """Compile in a folder of one's own; returns the library."""
+    (folder / "arm.c").write_text(source, encoding="utf-8")
+    done = _run([*command, "arm.c", "-o", "arm.so", "-lm"], folder)
+    library = folder / "arm.so"
+    if done.returncode or not library.is_file():
+        lines = done.stderr.splitlines()
+        said = next((line for line in lines if "error" in line), done.stderr.strip()[:200])
+        raise MissingExtraError(
+            f"the C compiler {command[0]} failed: {said or 'it wrote no library'}\n"
+            "it needs the C library's headers (Debian, Ubuntu: apt install gcc libc6-dev)"
+        )
+    return library
+
+
+def _run(words: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the compiler. Raises MissingExtraError if it is no program."""
+    try:
+        return subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise MissingExtraError(f"the C compiler {words[0]} cannot be run: {error.strerror or error}") from None
+
+
+def _keep(built: Path, folder: Path, name: str) -> None:
+    """Put a library into the cache, whole; a full disk keeps nothing."""
+    held = built.read_bytes()
+    with suppress(OSError):
+        handle, temporary = tempfile.mkstemp(prefix=".build-", dir=folder)
+        try:
+            with open(handle, "wb") as file:
+                file.write(held)
+            os.chmod(temporary, 0o700)
+            os.replace(temporary, folder / f"{name}-{_digest(held)}.so")
+        except BaseException:
+            os.unlink(temporary)
+            raise
+
+
+def _digest(held: bytes) -> str:
+    return hashlib.sha256(held).hexdigest()[:32]
 
 
 def _folder() -> Path | None:
@@ -91,7 +130,9 @@ def _folder() -> Path | None:
     base = Path(home) if os.path.isabs(home) else Path.home() / ".cache"
     folder = base / "armkin" / "compiled"
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for path in (folder.parent, folder):  # one by one: `parents` would leave those above to the umask
+            path.mkdir(mode=0o700, exist_ok=True)
         # who can write a folder above can put another in its place
         own = all(_is_ours(path, path == folder) for path in (folder, folder.parent, base))
     except (OSError, RuntimeError):  # no home, a file in the way, a full or read-only disk
@@ -106,21 +147,25 @@ def _is_ours(path: Path, alone: bool = True) -> bool:
     return owner and not stat.S_ISLNK(status.st_mode) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _trusted(library: Path, content: str) -> ctypes.CDLL | None:
+def _kept(folder: Path, name: str, content: str) -> ctypes.CDLL | None:
     """A library of the cache, if it may be loaded and is what it should be."""
-    try:
-        if not _is_ours(library):
-            return None
-        found = ctypes.CDLL(str(library))
-        held = (ctypes.c_char * (len(content) + 1)).in_dll(found, "arm_content").value
-    except (OSError, ValueError):
-        return None
-    return found if held == content.encode() else None
+    for library in folder.glob(f"{name}-*.so"):
+        try:
+            # read before it is loaded: the loader of a torn file ends the process
+            if not _is_ours(library) or library.stem != f"{name}-{_digest(library.read_bytes())}":
+                continue
+            found = ctypes.CDLL(str(library))
+            held = (ctypes.c_char * (len(content) + 1)).in_dll(found, "arm_content").value
+        except (OSError, ValueError):
+            continue
+        if held == content.encode():
+            return found
+    return None
 
 
 @cache
 def _version(path: str) -> str:
-    return subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
+    return _run([path, "--version"]).stdout
 
 
 @cache

@@ -62,6 +62,8 @@ def ik(
     >>> s.names[s.branch[s.best]], np.rad2deg(s.q[s.best]).round(4).tolist()
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
+    if workers != 1:
+        checked(workers)
     values = arrays.real(targets, "targets")
     if examine and values.ndim <= 2 and (alone := one_target.solve(arm, values, task, near)) is not None:
         return alone
@@ -80,13 +82,11 @@ def ik(
     each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count, target, rounding = chunks.solve(
-            arm, definition, geometry, given, each, one, examine, checked(workers)
-        )
+        out, count, target, rounding = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
     else:
         target, _, rounding = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
-        out, count = _rows(arm, definition, geometry, target, each, examine, checked(workers))
+        out, count = _rows(arm, definition, geometry, target, each, examine, workers)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Integral
 from typing import TypeVar
 
 from armkin.errors import UsageError
@@ -29,7 +30,9 @@ def shared(part: Callable[[slice], Result], count: int, workers: int, least: int
 
 
 def checked(workers: int) -> int:
-    """The number of threads asked for. Raises UsageError for less than one."""
+    """The number of threads asked for. Raises UsageError for less than one, and for what is no whole number."""
+    if not isinstance(workers, Integral):
+        raise UsageError(f"workers: {workers!r}; a whole number of threads is needed")
     if workers < 1:
         raise UsageError(f"workers: {workers}; at least 1 thread is needed")
     return workers

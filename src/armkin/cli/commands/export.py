@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -93,6 +94,8 @@ def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     if out is None or Path(out).suffix != ".c":
         raise UsageError("--c writes a source, its header and a test program: name the source, for example -o arm.c")
     path = Path(out)
+    if any(letter in path.name for letter in '"\\\n'):
+        raise UsageError(f"{path.name}: #include cannot name a header with a quote or a backslash in its name")
     try:
         texts = program(arm, path.name, task, single)
     except UsageError as error:
@@ -103,9 +106,8 @@ def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
         if error.fields.get("precision") != "double":
             raise
         raise UsageError(error.message, advice="leave --float away", **error.fields) from None
-    for name, text in ((path.with_suffix(".h"), texts.header), (path.with_name(f"{path.stem}_test.c"), texts.test)):
-        with output.destination(str(name)) as write:
-            write(text)
-    with output.destination(out) as write:
-        write(texts.source)
-    output.note(f"wrote {path}, {path.with_suffix('.h').name} and {path.stem}_test.c")
+    header, test = path.with_suffix(".h"), path.with_name(f"{path.stem}_test.c")
+    with ExitStack() as files:  # all three, or none: one that cannot be written leaves the others as they were
+        for name, text in ((test, texts.test), (header, texts.header), (path, texts.source)):
+            files.enter_context(output.destination(str(name)))(text)
+    output.note(f"wrote {path}, {header.name} and {test.name}")

@@ -48,25 +48,27 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     geometry = _plain(turned, task, named)
     solve, branches = candidates(turned, task, geometry, single)
     names = branch_names(turned, task, geometry, branches)
-    stem = Path(file).stem
     prefix = identifier(arm.name)
-    fields = {
+    units = ["mm" if slides else "rad" for slides in arm.prismatic]
+    joints = ", ".join(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, units, strict=True))
+    words = {  # what people have named, as they have: a source may be called arm_ik.c
         "about": _about(arm, task, geometry, single),
+        "stem": Path(file).stem,
+        "joints_are": in_comment(joints),
+    }
+    fields = {
         "guard": f"ARMKIN_{prefix.upper()}_H",
-        "stem": stem,
         "real": "float" if single else "double",
         "joints": str(arm.n),
         "branches": str(branches),
         "target": str(target_size(task)),
         "goal": str(kernel.goal_size(task)),
         "target_is": _target_is(task),
-        "joints_are": ", ".join(
-            f"{name} [{'mm' if slides else 'rad'}]" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)
-        ),
         "names": ",\n    ".join(f'"{name}"' for name in names),
         "lower": _numbers(turned.lower, single),
         "upper": _numbers(turned.upper, single),
         **_ratios(arm, single),
+        **{name: f"@{name}@" for name in words},
         "slides": ", ".join(str(int(p)) for p in arm.prismatic),
     }
     parts = [
@@ -82,7 +84,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part("source_tail"),
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, geometry is named))
-    return Program(*(_named(filled(text, fields), prefix) for text in texts))
+    return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
 
 
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
@@ -187,15 +189,22 @@ def _numbers(values: Array, single: bool) -> str:
 
 
 def _about(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
-    said = geometry.why.replace("*/", "* /")
-    name, path = (text.replace("*/", "* /").replace("\n", " ") for text in (arm.name, arm.path))
     lines = [
-        f"{name}: kinematics in C99, {'single' if single else 'double'} precision. Generated, do not edit.",
-        f"By armkin {__version__} from {path or 'an arm made in Python'}, sha256 {arm.sha256 or 'unknown'}.",
-        f"Task {task.name}; {geometry.name}: {said}.",
+        f"{arm.name}: kinematics in C99, {'single' if single else 'double'} precision. Generated, do not edit.",
+        f"By armkin {__version__} from {arm.path or 'an arm made in Python'}, sha256 {arm.sha256 or 'unknown'}.",
+        f"Task {task.name}; {geometry.name}: {geometry.why}.",
         "Lengths in mm, angles in rad. No allocation, no global state; needs libm alone.",
     ]
-    return "\n   ".join(lines)
+    return "\n   ".join(map(in_comment, lines))
+
+
+def in_comment(text: str) -> str:
+    """A line as a comment of C may hold it: none begins or ends in it, and no trigraph stands there.
+
+    >>> in_comment("reach 2*/3")
+    'reach 2* /3'
+    """
+    return " ".join(re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", lambda found: f"{found[0]} ", text).split())
 
 
 def _target_is(task: Task) -> str:

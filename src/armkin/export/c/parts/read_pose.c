@@ -1,9 +1,13 @@
-/* The columns x, y, z and the position of a target; its rotation is made orthonormal. 0: it is none. */
+/* The columns x, y, z and the position of a target; its rotation is made orthonormal. 0: it is none, or not
+   finite. */
 static int arm_read(const arm_real *target, arm_real *goal)
 {
     int i, j, round;
     for (i = 0; i < 12; i++)
         goal[i] = target[4 * (i % 3) + i / 3];
+    for (i = 9; i < 12; i++)
+        if (!(ARM_ABS(goal[i]) <= ARM_LARGEST))
+            return 0;
     for (round = 0; round < 3; round++) { /* R (3 - R^T R) / 2, which squares the distance from a rotation */
         arm_real s[3][3], R[9];
         for (i = 0; i < 3; i++)

@@ -1,0 +1,104 @@
+"""What is built is found again and never loaded torn; a compiler that cannot build says so in a line."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import armkin
+from armkin.compiled import toolchain
+
+SOURCE = 'const char arm_content[] = "abc"; int answer(void); int answer(void) { return 42; }'
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache folder, of a user who has compiled nothing."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "armkin" / "compiled"
+
+
+def answer(*words: str) -> subprocess.CompletedProcess[str]:
+    """What a process of its own finds: a library that is torn may end it."""
+    code = f"from armkin.compiled.toolchain import load; print(load({SOURCE!r}, 'abc').answer())"
+    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("size", [5000, 12288])
+def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
+    """The system's loader ends the process at the first page that is missing."""
+    toolchain.load(SOURCE, "abc")
+    [kept] = cache.glob("*.so")
+    assert kept.stat().st_size > size
+    os.truncate(kept, size)
+    done = answer()
+    assert (done.returncode, done.stdout) == (0, "42\n")
+
+
+def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
+    toolchain.load(SOURCE, "abc")
+    [kept] = cache.glob("*.so")
+    held = kept.read_bytes()
+    place = held.index((42).to_bytes(4, "little"))
+    kept.write_bytes(held[:place] + b"\x2b" + held[place + 1 :])
+    assert answer().stdout == "42\n"
+    assert [path.read_bytes() for path in cache.glob("*.so")] == [held]
+
+
+def test_the_cache_is_used_under_a_umask_of_groups(cache: Path) -> None:
+    """002 is what Fedora gives its users, whose folders are then open to their group."""
+    before = os.umask(0o002)
+    try:
+        toolchain.load(SOURCE, "abc")
+    finally:
+        os.umask(before)
+    [kept] = cache.glob("*.so")
+    assert {stat.S_IMODE(path.stat().st_mode) for path in (*kept.parents[:3], kept)} == {0o700}
+    built = kept.stat().st_mtime_ns
+    toolchain.load(SOURCE, "abc")
+    assert kept.stat().st_mtime_ns == built
+
+
+def test_the_compiler_may_have_options(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "cc -DHALF=21")
+    assert toolchain.load(SOURCE.replace("42", "2 * HALF"), "abc").answer() == 42
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("#!/bin/sh\nexit 0\n", "failed: it wrote no library"),
+        ("#!/bin/sh\necho 'arm.c: error: no room' >&2\nexit 1\n", "failed: arm.c: error: no room"),
+        ("no program", "cannot be run: Exec format error"),
+    ],
+)
+def test_a_compiler_that_builds_nothing_is_named(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
+) -> None:
+    path = tmp_path / "my cc"
+    path.write_text(script)
+    path.chmod(0o700)
+    monkeypatch.setenv("CC", str(path))
+    with pytest.raises(armkin.ArmkinError, match=said):
+        toolchain.load(SOURCE, "abc")
+    assert not list(cache.glob("*"))
+
+
+def test_a_cache_that_takes_nothing_more_is_done_without(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(source: str, target: str | Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert not list(cache.glob("*"))
+
+
+def test_no_place_to_build_is_said(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
+    with pytest.raises(armkin.FileError, match=r"no place to build the arm's code: .*TMPDIR"):
+        toolchain.load(SOURCE, "abc")
