@@ -137,6 +137,21 @@ def test_singular_pencils_of_right_angled_arms(
         assert verdict, verdict
 
 
+@pytest.mark.parametrize("q", [[-45, 180, -135], [10, 180, 20], [30, 180, 45], [20, 180, -30]])
+def test_poses_of_three_joints_of_which_two_are_in_one_line(q: list[float]) -> None:
+    """Axes 1 and 3 coincide: ten postures of their self-motion were isolated branches, and the answer complete."""
+    right = {"alpha": 90, "a": 100, "d": 0, "theta": 0}
+    rows = [right, right, {"alpha": 0, "a": 100, "d": 0, "theta": 0}]
+    arm, *_ = case({"convention": "standard", "joints": [{"dh": row} for row in rows]}, "pose")
+    s = armkin.ik(arm, armkin.fk(arm, np.radians(q)), "pose")
+    assert s.status == Status.SINGULAR
+    assert s.free.tolist() == [True, False, True]
+    assert s.valid.sum() == 1
+    turned = np.degrees(s.q[0])
+    assert abs(abs(turned[1]) - 180) < 1e-6
+    assert abs(np.sin(np.radians(turned[0] + turned[2] - q[0] - q[2]) / 2)) < 1e-8
+
+
 def test_a_pose_that_only_a_moved_target_settled_is_not_complete() -> None:
     arm, screw, *_ = case(right_angles(np.random.default_rng(80)), "pose")
     task, _ = solver(arm, "pose")

@@ -56,7 +56,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     prepared = method.prepare(link, prismatic)
 
     def rows(T: Array) -> Rows:
-        q, _, settled, shaken, guesses = method.solve(prepared, T)
+        q, doubt, settled, shaken, guesses = method.solve(prepared, T)
         n = arm.n
         with np.errstate(invalid="ignore"):
             hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
@@ -70,7 +70,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
         return Rows(
             np.take_along_axis(own, order[:, :, None], axis=1),
-            (hit.sum(axis=1) > count) | shaken,
+            (hit.sum(axis=1) > count) | (doubt & hit.any(axis=1)) | shaken,
             settled & prepared.complete & ~shaken,
             shaken,
             guesses[:, :, :n],
