@@ -26,13 +26,38 @@ class Agreement:
     largest_fk: float
 
 
-def library(arm: armkin.Arm, folder: Path, *options: str) -> ctypes.CDLL:
-    """The generated source as a shared library, its public names without the robot's prefix in front."""
-    (folder / "arm.c").write_text(program(arm, "arm.c").source)
-    (folder / "arm.h").write_text(program(arm, "arm.c").header)
+def library(arm: armkin.Arm, folder: Path, *options: str, single: bool = False) -> ctypes.CDLL:
+    """The generated source as a shared library."""
+    texts = program(arm, "arm.c", single=single)
+    (folder / "arm.c").write_text(texts.source)
+    (folder / "arm.h").write_text(texts.header)
     words = ["gcc", "-std=c99", "-O2", *options, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
     subprocess.run(words, cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "arm.so"))
+
+
+class Exported:
+    """The functions of an exported arm, for one target at a time."""
+
+    def __init__(self, arm: armkin.Arm, folder: Path, single: bool = False) -> None:
+        self.arm, self.real = arm, np.dtype(np.float32 if single else np.float64)
+        code, prefix = library(arm, folder, single=single), identifier(arm.name)
+        number = ctypes.c_float if single else ctypes.c_double
+
+        class Solution(ctypes.Structure):
+            _fields_ = (("q", number * arm.n), ("branch", ctypes.c_int), ("within", ctypes.c_int), ("residual", number))
+
+        self._found, self._edge = (Solution * 64)(), ctypes.c_int()
+        self._ik, self._best = (code[f"{prefix}_{name}"] for name in ("ik", "best"))
+
+    def ik(self, target: np.ndarray, near: np.ndarray) -> tuple[int, bool, np.ndarray, int]:
+        """How many branches, or -1; whether the target is at an edge; their joint values (count, n); the best one."""
+        goal, close = (np.ascontiguousarray(values, self.real) for values in (target, near))
+        pointers = [ctypes.c_void_p(values.ctypes.data) for values in (goal, close)]
+        count = self._ik(*pointers, self._found, ctypes.byref(self._edge))
+        q = np.array([self._found[b].q[:] for b in range(max(count, 0))], self.real).reshape(-1, self.arm.n)
+        best = self._best(self._found, count, pointers[1])
+        return count, bool(self._edge.value), q, best
 
 
 def postures(arm: armkin.Arm, count: int) -> np.ndarray:

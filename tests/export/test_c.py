@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import agreement, library
+from exported import Exported, agreement, postures
 
 import armkin
 from armkin.export.c.program import identifier, program
@@ -160,16 +159,61 @@ def test_a_header_that_cannot_be_included_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("robot", ["puma560", "jaco_j2n6s300", "labvolt_5150", "three_dof"])
 def test_a_target_that_is_not_finite_is_none(robot: str, tmp_path: Path) -> None:
     arm = armkin.load(robot)
-    code, prefix = library(arm, tmp_path), identifier(arm.name)
-    task, _ = solver(arm, None)
+    code, (task, _) = Exported(arm, tmp_path), solver(arm, None)
     target = targets_of(task, armkin.fk(arm, arm.home[None]), arm.home[None]).ravel()
-    edge, found, near = ctypes.c_int(), ctypes.create_string_buffer(65536), arm.home.ctypes.data_as(ctypes.c_void_p)
     for place in (3, 7, 11, 0, 5) if len(target) == 16 else range(len(target)):
         for wrong in (np.nan, np.inf, -np.inf, 1e200, 1e16):
             asked = target.copy()
             asked[place] = wrong
-            said = code[f"{prefix}_ik"](asked.ctypes.data_as(ctypes.c_void_p), near, found, ctypes.byref(edge))
-            assert said == -1, (place, wrong)
+            assert code.ik(asked, arm.home)[0] == -1, (place, wrong)
+
+
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize(
+    "robot", ["ur5e", "puma560", "wx250s", "labvolt_5150", "stanford", "three_dof", "jaco_j2n6s300"]
+)
+def test_an_arm_that_stands_at_its_target_stays(robot: str, single: bool, tmp_path: Path) -> None:
+    """Also at compound singularities, and where the exact answer to a rounded target is elsewhere."""
+    arm = armkin.load(robot)
+    if single and robot in GENERAL:
+        return
+    code, (task, geometry), rng = Exported(arm, tmp_path, single), solver(arm, None), np.random.default_rng(8)
+    count = 500 if geometry.pairs is not None else 40
+    q = postures(arm, count)
+    q = np.where(rng.random(q.shape) < 0.6, np.pi / 4 * rng.integers(-4, 5, q.shape), q)
+    q[: count // 2, -2] = 10.0 ** rng.uniform(-9, -2, count // 2)  # beside the wrist's singularity
+    q = np.clip(np.where(arm.prismatic, postures(arm, count), q), arm.lower, arm.upper)
+    q = q.astype(np.float32).astype(float) if single else q
+    for near, target in zip(q, targets_of(task, armkin.fk(arm, q), q), strict=True):
+        if not single and task.orientation == "full":
+            target[:3, 3] = np.round(target[:3, 3], 7)
+        found, _, branches, best = code.ik(target, near)
+        assert found > 0
+        np.testing.assert_array_equal(branches[best], near.astype(branches.dtype))
+
+
+def test_a_calibrated_arm_that_stands_at_its_target_stays(tmp_path: Path) -> None:
+    """Both of three_dof's elbows are in line; `near` is of commanded values."""
+    arm = replace(armkin.load("three_dof"), ratio=np.array([1.01, 0.99, 1.002]))
+    code = Exported(arm, tmp_path)
+    for near in ([0.3, 0.5, 0.0], [0.3, 1.2, -1.0], [-1.0, 1.5, 1e-9]):
+        _, _, branches, best = code.ik(armkin.fk(arm, near)[:3, 3], np.array(near))
+        np.testing.assert_array_equal(branches[best], near)
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
+def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tmp_path: Path) -> None:
+    """Joint 5 at zero: joints 2, 3, 4 and 6 turn about parallel axes; few values of joint 6 leave the rest in reach."""
+    arm = armkin.load(robot)
+    code, (task, _) = Exported(arm, tmp_path), solver(arm, None)
+    q = postures(arm, 400)
+    q[:, 2:4] *= 0.2  # all but stretched
+    q[:, 4] = 0.0
+    for target in targets_of(task, armkin.fk(arm, q), q):
+        count, edge, branches, _ = code.ik(target, arm.home)
+        assert edge
+        assert count > 0
+        np.testing.assert_allclose(armkin.fk(arm, branches), np.broadcast_to(target, (count, 4, 4)), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.formula.c_code import number
 from armkin.inverse import general
 from armkin.inverse.branches.names import branch_names
+from armkin.inverse.numeric.tolerances import HAIR
 from armkin.inverse.recognise import solver
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.arm import actual
@@ -25,9 +26,26 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 # What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
-# rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
-_DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 1e-6, "LARGEST": LARGEST}
-_SINGLE = {"ACCEPTED": 1e-10, "SOLUTION": 1e-9, "NEARBY": 1e-6, "SAME": 1e-3, "ROTATION": 1e-3, "LARGEST": 1e9}
+# rad); answers closer than this are one; those
+# closer than a hair may be; a matrix this far from orthonormal is no rotation.
+_DOUBLE = {
+    "ACCEPTED": 1e-24,
+    "SOLUTION": 1e-18,
+    "NEARBY": 1e-12,
+    "SAME": 1e-6,
+    "HAIR": HAIR,
+    "ROTATION": 1e-6,
+    "LARGEST": LARGEST,
+}
+_SINGLE = {
+    "ACCEPTED": 1e-10,
+    "SOLUTION": 1e-9,
+    "NEARBY": 1e-6,
+    "SAME": 1e-3,
+    "HAIR": HAIR,
+    "ROTATION": 1e-3,
+    "LARGEST": 1e9,
+}
 
 
 class Program(NamedTuple):
@@ -65,6 +83,13 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "goal": str(kernel.goal_size(task)),
         "target_is": _target_is(task),
         "names": ",\n    ".join(f'"{name}"' for name in names),
+        "position": str(task.position),
+        "first": "9" if task.orientation == "full" else "0",
+        "reach": number(arm.reach, single),
+        "orientation": _orientation(arm, task, single),
+        "elsewhere": part("elsewhere").replace("@reach@", number(arm.reach, single))
+        if geometry.pairs is not None
+        else "",
         "lower": _numbers(turned.lower, single),
         "upper": _numbers(turned.upper, single),
         **_ratios(arm, single),
@@ -131,7 +156,7 @@ def has_form(geometry: Geometry) -> bool:
 
 def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
-    values = _SINGLE if single else _DOUBLE
+    values = {**(_SINGLE if single else _DOUBLE), "HAIR": HAIR}
     lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 
@@ -182,6 +207,28 @@ def _ratios(arm: Arm, single: bool) -> dict[str, str]:
         }}
 """,
     }
+
+
+def _orientation(arm: Arm, task: Task, single: bool) -> str:
+    """Lines that add to `sum` what joint values q miss beside the position."""
+    lines = []
+    if task.orientation == "full":  # half the Frobenius norm, which is the angle
+        lines = [
+            "for (i = 0; i < 9; i++) {",
+            "    off = T[4 * (i % 3) + i / 3] - goal[i];",
+            "    sum += off * off / 2;",
+            "}",
+        ]
+    if task.orientation == "axis":
+        lines = ["for (i = 0; i < 3; i++) {", "    off = T[4 * i + 2] - goal[3 + i];", "    sum += off * off;", "}"]
+    for k, (row, offset) in enumerate(zip(task.sums, task.offsets, strict=True), task.position):
+        terms = [f"{number(float(v), single)} * q[{j}]" for j, v in enumerate(row * arm.ratio) if v]
+        lines += [
+            f"off = {' + '.join([*terms, number(float(offset), single)])} - goal[{k}];",
+            "off -= ARM_TURN * ARM_RINT(off / ARM_TURN);",
+            "sum += off * off;",
+        ]
+    return "".join(f"    {line}\n" for line in lines)
 
 
 def _numbers(values: Array, single: bool) -> str:

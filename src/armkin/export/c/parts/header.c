@@ -27,9 +27,13 @@ void arm_fk(const arm_real *q, arm_real *pose);
 void arm_jacobian(const arm_real *q, arm_real *jacobian);
 
 /* All branches that reach a target, at most ARM_BRANCHES. target: @target_is@.
-   near: joint values to stay close to. edge: set to 1 for a target at a singular posture or on the boundary of what
-   a branch reaches: joints that are free there take their values from near, branches that merge there are one.
-   Returns how many were found, -1 if the target is none (not finite, no rotation). */
+   near: joint values to stay close to, finite; where they are within limits and solve the target themselves, they are one
+   of the branches. found: room for ARM_BRANCHES.
+   edge: set to 1 for a target at a singular posture or on the boundary of what a branch reaches, else to 0. At an edge
+   joints that are free take their values from near, where that reaches; branches that merge are one. What is listed is
+   true, but others may be missing: none found at an edge does not say that the target is out of reach.
+   Returns how many were found, -1 if the target is none (not finite, no rotation). No function here keeps anything
+   between calls: threads and interrupts may share them. No pointer may be null. */
 int arm_ik(const arm_real *target, const arm_real *near, arm_solution *found, int *edge);
 
 /* Index of the branch within limits that moves the joints least from near, or -1. */
