@@ -18,9 +18,12 @@ def built(seed: int) -> Case:
     return case(right_angles(np.random.default_rng(seed)), "pose")
 
 
-@pytest.mark.parametrize("seed", [151, 169, 188])
+@pytest.mark.parametrize("seed", [151, 169, 188, 5006])
 def test_random_poses_of_right_angled_arms_are_complete(seed: int) -> None:
-    """Of arm 169 a real root that no branch has comes with nine in ten poses."""
+    """Of arm 169 a real root that no branch has comes with nine in ten poses.
+
+    Of arm 5006 a complex pair that is real to 1e-4 with one in thirty.
+    """
     arm, screw, task = built(seed)
     assert armkin.method(arm, task)[0] == "general elimination"
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (300, 6))
@@ -28,7 +31,7 @@ def test_random_poses_of_right_angled_arms_are_complete(seed: int) -> None:
     verdict = truth.judge(arm, screw, task, q, target)
     truth.ask_oracle(arm, screw, verdict, target, np.arange(12), 250, 3)
     assert verdict, str(verdict)
-    assert verdict.solutions.complete.mean() >= 0.975
+    assert verdict.solutions.complete.mean() >= 0.99
 
 
 @pytest.mark.parametrize("name", [169, 188, 1000, "6R general", "6R modified DH", "RRRPRR general"])

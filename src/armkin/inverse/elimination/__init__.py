@@ -7,6 +7,7 @@ line_features.py   the numbers of a line on which rigid motions are matrices
 end_joints.py      removes the two end joints, and gives them back
 pencil.py          the eigenvalue problem of the middle joints
 roots.py           its roots as joint values
+equal_roots.py     a root that two solutions share, as these two
 polish.py          Newton and Levenberg-Marquardt on the chain
 merge.py           equal answers made one, rows packed by pose
 three_prismatic.py three prismatic joints: a closed form instead

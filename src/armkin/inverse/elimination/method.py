@@ -21,7 +21,8 @@ measures it on random poses, and only roles that give their generating joints ba
 rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
 roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none, or
 to one whose value of the hidden joint is not theirs; but not roots at a distance from all others whose vector is no
-product v: by (ii) they stand for nothing.
+product v: by (ii) they stand for nothing.  Nor double ones with one vector, nor complex pairs off the real line by
+more than rounding: `roots`.  A double root that two solutions share gives both, `equal_roots`.
 Such a pose is solved again, with another offset and other hidden joints, then moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
 longer.  This goes on until a pass shows none of these, or nine are done; all passes' answers count.  A self-motion
@@ -280,7 +281,7 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bo
 def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
     """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
     careful, shake = number > 0, SHAKES[number]
-    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful])
+    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful], part=careful)
     target = goal[seed.pose]
     if careful:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
@@ -295,8 +296,11 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     maybe = seed.tilt < pair
     near = (done.residual < 1e-5) & (seed.tilt < max(pair, 1e-3)) if careful else done.residual < 1e-3
     missed = ~good & ((seed.tilt < 1e-4) | near)
-    touch = good & (seed.tilt > 0) & (seed.tilt < 1e-4)
-    unsure = good & (seed.tilt > 0) & maybe
+    # A simple root, or a double one with one vector, whose vector is no product stands for nothing: a solution's vector
+    # is a product, and such a root has no other vector.
+    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-3) & (shake == 0)
+    touch = good & ~empty & (seed.tilt > 0) & (seed.tilt < 1e-4)
+    unsure = good & (seed.tilt > 0) & maybe & ~empty
     # A real root that was far from the answer it led to may have stood for another one.
     strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
     # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
@@ -305,9 +309,6 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     np.maximum.at(weakest, seed.pose[good], done.weakness[good])
     away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
     own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
-    # A simple real root whose vector is no product stands for nothing: a solution's vector is a product, and a root on
-    # its own has no other vector.
-    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-3) & (shake == 0)
     missed &= ~empty
     strayed &= ~(own | empty)
     unsettled[seed.pose[missed | unsure | strayed]] = True
@@ -316,7 +317,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     # and if the two answers are not the same.
     answers = _answers(closed, seed.pose, done, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
-    stands = good & maybe
+    stands = good & maybe & ~empty
     pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > 1e-5 + 10 * shake
     order = np.lexsort((hidden, pose))
     close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)

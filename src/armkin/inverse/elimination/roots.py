@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination import line_features
+from armkin.inverse.elimination import equal_roots, line_features
 from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
@@ -20,6 +20,9 @@ from armkin.model.rotation import inverse
 Int = NDArray[np.int64]
 NO_PRODUCT = 1e-5  # defect from which a vector is surely that of no solution; those of some 36 arms had 1.3e-7 at most
 STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors are known far better than that
+TWINS = 1e-4  # distance of two roots that may be one double root: rounding parts them by its own root
+ONE = 1e3  # sine of the angle between their vectors over that distance, up to which they have one vector
+PAIR = 1e-10  # that sine times the distance: above it the two are not real, below rounding may have parted them
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
 
 
@@ -29,7 +32,8 @@ class Seeds(NamedTuple):
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
     tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
     defect: (M,) squared sine of the angle between the eigenvector and the product that a solution's is; 0 where slides
-    move.  gap: (M,) distance from the pose's nearest other root, as an angle, 0 where the pencil is not well scaled.
+    move.  gap: (M,) distance from the pose's nearest other root but for a twin (see `_gaps`), as an angle; 0 where the
+    pencil is not well scaled.
     """
 
     pose: Int
@@ -41,8 +45,11 @@ class Seeds(NamedTuple):
     gap: Array
 
 
-def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
-    """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``."""
+def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
+    """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``.
+
+    part: whether double roots are taken apart that two solutions share.
+    """
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
     lead = pencil.W.shape[0]
@@ -61,32 +68,82 @@ def seeds(pencil: Pencil, X: Array, tolerance: float) -> Seeds:
     roots, vectors = np.linalg.eig(companion)
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
     pose, which = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
-    x = roots[pose, which].real
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
-    middle, defect = _middle_joints(pencil, x, vectors.real[pose, :, which])
+    candidates = _Candidates(pose, which, roots[pose, which].real, tilt[pose, which], vectors.real[pose, :, which])
+    if part and not pencil.prismatic[2:5].any():
+        candidates = _parted(pencil, candidates, vectors)
+    pose, which, x, slant, u = candidates
+    middle, defect = _middle_joints(pencil, x, u)
     near = np.flatnonzero((np.abs(middle) < INFINITE).all(axis=0))
     if near.size < pose.size:
-        pose, which, middle, defect = pose[near], which[near], middle[:, near], defect[near]
+        pose, which, slant, middle, defect = pose[near], which[near], slant[near], middle[:, near], defect[near]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.zeros(pose.size)
-    some = np.flatnonzero((defect > NO_PRODUCT) & (tilt[pose, which] == 0) & steady[pose])
-    gap[some] = _gaps(roots[pose[some]], which[some])
-    return Seeds(pose, q, middle[pencil.role.hidden], tilt[pose, which], rough, defect, gap)
+    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWINS) & steady[pose])
+    gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
+    return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
 
-def _gaps(roots: NDArray[np.complex128], which: Int) -> Array:
-    """Distance (M,) of one of each row's roots (M, size) from the others, on the sphere of complex numbers."""
+class _Candidates(NamedTuple):
+    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size)."""
+
+    pose: Int
+    which: Int
+    x: Array
+    tilt: Array
+    u: Array
+
+
+def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
+    """The same, a double root that two solutions share with the vectors of these: see `equal_roots`."""
+    count = len(seen.pose)
+    # rounding made a complex pair of some
+    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < equal_roots.EQUAL))
+    pose, which, x, tilt, u = (np.concatenate([part, part[twin]]) for part in seen)
+    u[count:] = vectors.imag[seen.pose[twin], :, seen.which[twin]]
+    a, b = equal_roots.pairs(pose, x)
+    first = u[a] / np.linalg.norm(u[a], axis=1, keepdims=True)
+    second = u[b] - first * (first * u[b]).sum(axis=1, keepdims=True)
+    size = np.linalg.norm(second, axis=1)
+    some = np.flatnonzero(size > equal_roots.APART * np.linalg.norm(u[b], axis=1))
+    a, b, first, second = a[some], b[some], first[some], second[some] / size[some, None]
+    good = np.zeros(len(a), dtype=np.bool_)
+    if len(a):
+        weights, good = equal_roots.products(_vector(pencil, x[a], first), _vector(pencil, x[a], second))
+        both = weights[good] @ np.stack([first[good], second[good]], axis=1)
+        u[a[good]], u[b[good]] = both[:, 0], both[:, 1]
+        tilt[a[good]] = tilt[b[good]] = 0.0
+    kept = np.arange(len(pose)) < count
+    kept[a[good]] = kept[b[good]] = True
+    order = np.flatnonzero(kept)
+    order = order[np.argsort(pose[order], kind="stable")]
+    return _Candidates(pose[order], which[order], x[order], tilt[order], u[order])
+
+
+def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which: Int) -> Array:
+    """Distance (M,) of one of each row's roots (M, size) from the others, on the sphere of complex numbers.
+
+    Not from its twin, the other half of a double root that has one vector (M, size, size): rounding parts the two. Nor
+    from that of a complex pair whose vectors point elsewhere: it is farther off the real line than rounding takes it.
+    """
     if not which.size:
         return np.empty(0)
     size = 1 + np.abs(roots) ** 2
     row = np.arange(which.size)
-    x = roots[row, which][:, None]
+    x, v = roots[row, which][:, None], vectors[row, :, which]
     away = 2 * np.abs(roots - x) / np.sqrt(size * (1 + np.abs(x) ** 2))
     away[row, which] = np.inf
+    twin = away.argmin(axis=1)
+    apart = away[row, twin]
+    other = vectors[row, :, twin]
+    sine = np.linalg.norm(other - v * (v.conj() * other).sum(axis=1, keepdims=True), axis=1)
+    double = (apart < TWINS) & (sine < ONE * apart)
+    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > PAIR)
+    away[row, twin] = np.where(double | pair, np.inf, apart)
     return np.asarray(away.min(axis=1))
 
 
@@ -104,8 +161,8 @@ def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
     return (rows if pencil.mix is None else pencil.mix @ rows), recover
 
 
-def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
-    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size); and `Seeds.defect`."""
+def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
+    """The twelve products v (M, 4, 3) that the roots x (M,) and the pencil's eigenvectors (M, size) stand for."""
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
     x = x[:, None]
@@ -115,7 +172,12 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     if r:
         square = x * x + 1
         v += ((a1 * x + a2) / square) @ pencil.K_re.T - ((a1 - a2 * x) / square) @ pencil.K_im.T
-    v = v.reshape(-1, 4, 3)
+    return v.reshape(-1, 4, 3)
+
+
+def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
+    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size); and `Seeds.defect`."""
+    v = _vector(pencil, x, u)
     row = np.arange(v.shape[0])
     size = v * v
     four = v[row, :, size.sum(axis=1).argmax(axis=1)]
@@ -123,9 +185,9 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
     value = np.empty((3, v.shape[0]))
     if pencil.prismatic[hidden]:
-        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x[:, 0]) < 1e-100, 1e-100, x[:, 0])
+        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < 1e-100, 1e-100, x)
     else:
-        value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x[:, 0])
+        value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x)
     if pencil.prismatic[dialytic]:
         value[pencil.role.dialytic] = _ratio(four)
     else:
