@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.batch import Goals
 from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
 from armkin.inverse.self_motions import STEP, follow, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -46,7 +46,8 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ALIKE)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     at, row = q[k[first], b[first]], k[first]
-    who, there = _steps_out(arm, task, at, V[some[first]], nullity[some[first]], target[row])
+    most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])
+    who, there = _steps_out(arm, task, at, V[some[first]], nullity[some[first]], target[row], most)
     left = np.isin(same.reshape(-1), who)
     size[k[left], b[left]] = np.inf
     order = np.argsort(row[who], kind="stable")
@@ -60,8 +61,11 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1)
 
 
-def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Int, Array]:
-    """Postures (m, n) on self-motions that leave corners (M, n), a long step off, and whose: (m,)."""
+def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array, most: Array) -> tuple[Int, Array]:
+    """Postures (m, n) on self-motions that leave corners (M, n), a long step off, and whose: (m,).
+
+    most: (M,) residual of what counts as on one: points of a valley beside a self-motion of double roots have more.
+    """
     rows = np.flatnonzero(~on_surface(arm, task, q, V, target))
     if not len(rows):
         return rows, np.zeros((0, arm.n))
@@ -70,7 +74,7 @@ def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: A
     unit = radian_or_reach(arm)
     there, size = follow(arm, task, q[who] + 10 * STEP * push * unit, target[who])
     way = newton.difference(arm, there, q[who])
-    some = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) > 3 * STEP))
+    some = np.flatnonzero((size <= most[who]) & (np.abs(way).max(axis=1) > 3 * STEP))
     some = some[newton.null_space(arm, task, there[some], target[who[some]])[2] == 1]
     # the way there is a self-motion's, too: half way it is beside the chord by no more than a curve is
     start = q[who[some]] + 0.5 * way[some] * unit
