@@ -137,6 +137,28 @@ def test_singular_pencils_of_right_angled_arms(
         assert verdict, verdict
 
 
+@pytest.mark.parametrize(
+    ("q", "count"),
+    [
+        # joint 1 hardly moves: at the value that `near` has for it, two of the four self-motions have no posture
+        ([75, 20, 40, 30, 80], 4),
+        ([-60, 65, 5, 20, -15], 4),
+        # beside this posture it moves by 1e-4 rad, and another of the same self-motion was listed
+        ([0, 75, -80, 95, -80], 1),
+    ],
+)
+def test_a_tool_that_points_straight_down_by_its_axis(q: list[float], count: int) -> None:
+    """An SO-101 turns about a vertical tool: what is listed does not depend on where it stands."""
+    arm, _ = shipped("so101")
+    joints = np.radians(q)
+    T = armkin.fk(arm, joints)
+    for near in (None, joints):
+        s = armkin.ik(arm, [*T[:3, 3], 0, 0, -1], "xyz_axis", near=near)
+        assert s.status == Status.SINGULAR
+        assert s.valid.sum() == count
+        assert not s.complete
+
+
 @pytest.mark.parametrize("q", [[-45, 180, -135], [10, 180, 20], [30, 180, 45], [20, 180, -30]])
 def test_poses_of_three_joints_of_which_two_are_in_one_line(q: list[float]) -> None:
     """Axes 1 and 3 coincide: ten postures of their self-motion were isolated branches, and the answer complete."""

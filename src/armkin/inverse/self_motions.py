@@ -121,12 +121,14 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             # one kept may be where its own self-motion and this one meet
             turned = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
             held = (turned < TURNED) & ((np.abs(apart) > TURNED).sum(axis=1) <= ALONG)
+            # a joint may move too slowly at one of the two alone to be called free there
+            theirs = np.where(curve[k, kept], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
+            slow = ~held & (np.maximum(turned, theirs) > TURNED) & (np.maximum(turned, theirs) < DRIFT)
             held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
-            slow = (turned > TURNED) & (turned < DRIFT)
             if (
                 (newton.missing(arm, task, between, there) <= SOLUTION).any()
                 or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])
-                or any(_round(arm, task, q[k, i], curve[k, i], d, target[k]) for d in apart[slow & ~held])
+                or any(_round(arm, task, q[k, i], curve[k, i], d, target[k]) for d in apart[slow])
             ):
                 chosen[k, i] = False
             else:

@@ -37,7 +37,8 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
             found = solve(pose_of(goal), [*prefer, virtual])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
-        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered)
+        ends = tuple(j for j in inner.ends if j < 5)
+        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered, ends=ends)
     solve_rows = inner.rows
     assert solve_rows is not None
 
