@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
-from armkin.inverse import chunks, near_itself, one_target
+from armkin.inverse import chunks, legal_postures, near_itself, one_target
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -87,6 +87,12 @@ def ik(
         target, _, rounding = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
+    if examine:
+        out = legal_postures.listed(
+            Goals(arm, definition, target, each),
+            out,
+            lambda goal, close: ik(arm, goal, definition.name, near=close),
+        )
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
