@@ -41,7 +41,12 @@ def into_limits(goals: Goals, q: Array, valid: Bool, free: Bool) -> Array:
     # the branch's own joints: others may move on other self-motions of the target; where two meet, neither is followed
     own = (way > SLOW * way.max(axis=1, keepdims=True)) & free[k[some]]
     stuck = (limits.outside(arm, rows[some, b]) & ~own).any(axis=1)
-    able = (sigma < WEAK) & (lost == 1) & ~stuck & (own.sum(axis=1) > 1)
+    # exact answers beside a self-motion may be several: moved, one of them would be another within limits
+    apart = np.abs(newton.difference(arm, q[k[some]], q[k[some], b][:, None]))
+    with np.errstate(invalid="ignore"):
+        beside = np.where(own[:, None], 0.0, apart).max(axis=2) < 3 * TURNED
+    twin = (beside & (valid[k] & legal)[some]).any(axis=1)
+    able = (sigma < WEAK) & (lost == 1) & ~stuck & ~twin & (own.sum(axis=1) > 1)
     some, b, own = some[able], b[able], own[able]
     if not len(some):
         return q
