@@ -309,6 +309,9 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     np.maximum.at(weakest, seed.pose[good], done.weakness[good])
     away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
     own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    # unless several solutions share the middle joints: these are one root
+    some = np.flatnonzero(strayed & own)
+    own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
     missed &= ~empty
     strayed &= ~(own | empty)
     unsettled[seed.pose[missed | unsure | strayed]] = True

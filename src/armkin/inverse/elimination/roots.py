@@ -23,6 +23,7 @@ STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors ar
 TWINS = 1e-4  # distance of two roots that may be one double root: rounding parts them by its own root
 ONE = 1e3  # sine of the angle between their vectors over that distance, up to which they have one vector
 PAIR = 1e-10  # that sine times the distance: above it the two are not real, below rounding may have parted them
+FOLLOWS = 1e-3  # [rad, scaled length] end joints that follow from the middle ones are not farther off than that
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
 
 
@@ -86,6 +87,21 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWINS) & steady[pose])
     gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
+
+
+def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
+    """Whether the end joints of solutions q (M, 6) of pose links X (M, 4, 4) follow from their middle joints: (M,).
+
+    Where they do not, solutions that differ in the end joints alone have one vector and count as one root.
+    """
+    Y = inverse(X) if pencil.role.backward else X
+    sign = -1.0 if pencil.role.backward else 1.0
+    part = sign * q[:, list(pencil.role.order)].T  # a, b, m1, m2, m3, e
+    _, recover = eliminate(pencil.ends, Y)
+    a, b, e = _other_joints(pencil, part[2:5], Y, np.arange(len(q)), recover)
+    away = np.stack([a, b, e]) - part[[0, 1, 5]]
+    turning = ~pencil.prismatic[[0, 1, 5]][:, None]
+    return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < FOLLOWS).all(axis=0))
 
 
 class _Candidates(NamedTuple):
