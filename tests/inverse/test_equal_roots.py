@@ -85,7 +85,7 @@ def test_round_postures_that_share_a_joint_are_complete() -> None:
 
 
 def test_solutions_that_differ_in_the_end_joints_alone_are_one_root_and_not_forgotten() -> None:
-    """Eight branches of an arm of right angles, four with joint 2 at 0 and four at 180, pairs with joints 2, 3 and 4 alike.
+    """Eight branches of an arm of right angles, four with joint 2 at 0, four at 180, pairs with joints 2 to 4 alike.
 
     Two double roots gave four of these, and no more were said to be there: six listed, complete true.
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracle import goal, missing
@@ -9,6 +11,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
+from armkin.inverse.numeric.newton import missing as missed
 
 CASES = [
     # joint 4 is outside its limits where joint 1 is closest to home, and not where it is turned
@@ -41,3 +44,40 @@ def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: li
     other = np.array([*other[:3, 3], *other[:3, 2]]) if task is not None else other
     batch = armkin.ik(arm, np.array([other, target]), task)
     np.testing.assert_array_equal(batch.q[1][batch.valid[1]], s.q[s.valid])
+
+
+def narrowed(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]:
+    """An arm with a wrist whose joints have so many degrees each, around random middles; joint 5 passes zero."""
+    arm, rng = armkin.load(robot), np.random.default_rng(4)
+    middle = rng.uniform(-1, 1, arm.n)
+    middle[4] = 0.0
+    half = np.radians(width) / 2
+    return replace(arm, lower=middle - half, upper=middle + half), rng
+
+
+@pytest.mark.parametrize("width", [40, 150])
+@pytest.mark.parametrize("robot", ["irb120", "puma560", "wx250s"])
+def test_what_stands_within_limits_is_not_said_to_be_outside(robot: str, width: float) -> None:
+    """A quarter of these were: listed was where joint 4 or joint 6 is as in `near`, and the other one was outside."""
+    arm, rng = narrowed(robot, width)
+    q, near = rng.uniform(arm.lower, arm.upper, (2, 120, arm.n))
+    q[:, 4] = 0.0
+    target = armkin.fk(arm, q)
+    found = armkin.ik(arm, target, near=near)
+    assert (found.status == armkin.Status.SINGULAR).all()
+    assert (found.best >= 0).all()
+    best = found.q[np.arange(len(q)), found.best]
+    assert ((best >= arm.lower) & (best <= arm.upper)).all()
+    assert missed(arm, found.task, best, target).max() < 1e-9
+    for k in range(5):
+        one = armkin.ik(arm, target[k], near=near[k])
+        np.testing.assert_allclose(one.q[one.best], best[k], atol=1e-12)
+
+
+def test_near_outside_limits_gives_way_to_a_posture_within() -> None:
+    """Joint 4 at -180 degrees is beyond its -160; with joint 6 turned back it need not stand there."""
+    arm = armkin.load("irb120")
+    near = np.radians([45.0, 90.0, 0.0, -180.0, 0.0, 45.0])
+    found = armkin.ik(arm, armkin.fk(arm, near), near=near)
+    assert found.within_limits.any()
+    np.testing.assert_allclose(armkin.fk(arm, found.q[found.best]), armkin.fk(arm, near), atol=1e-6)

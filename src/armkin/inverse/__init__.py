@@ -15,7 +15,6 @@ fold_singularities.py  postures at which two roots meet, told from self-motions
 clusters.py         what rounding makes of one root of third or fourth order
 valleys.py          whether two roots are points of one curved valley
 self_motions.py     whether joints can move while the target is kept, and what lies on one self-motion
-self_motion_limits.py  postures of self-motions that keep the joint limits
 null_directions.py  the directions that a posture loses
 corners.py          postures in which self-motions meet, replaced by one of each
 circuits.py         the connected pieces of a self-motion of three joints or more

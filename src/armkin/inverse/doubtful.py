@@ -13,7 +13,6 @@ from armkin.inverse import regular_targets, singularities
 from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
 from armkin.inverse.numeric.tolerances import SAME
-from armkin.inverse.self_motion_limits import into_limits
 from armkin.inverse.solutions import Status
 
 AT_ONCE = 256  # targets examined together
@@ -49,7 +48,6 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             order = np.argsort(~found.branch[new], axis=1, kind="stable")
             kept = np.take_along_axis(found.q[new], order[:, :, None], axis=1)
             there = np.take_along_axis(found.branch[new], order, axis=1)
-            kept = into_limits(goals.of(rows[new]), kept, there, found.free[new])
             write(arm, out, rows[new], kept, there, order, near[rows[new]])
             out.status[rows[new]] = np.where(found.double[new], Status.BOUNDARY, Status.EXACT)
             out.status[rows[new[moving[new]]]], out.free[rows[new]] = Status.SINGULAR, found.free[new]
@@ -129,11 +127,10 @@ def examined(
 
         label = np.arange(q.shape[1]) % max(columns, 1)
         seen = singularities.examine(some, q, label, loose, more, None if unsettled is None else unsettled[rows])
-        moved = into_limits(some, seen.q, seen.valid, seen.free)
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)
-        write(goals.arm, out, rows, moved, seen.valid, named(seen.label, seen.valid), some.near)
+        write(goals.arm, out, rows, seen.q, seen.valid, named(seen.label, seen.valid), some.near)
         out.status[rows], out.free[rows] = seen.status, seen.free
         out.complete[rows] &= ~seen.again
     return out
