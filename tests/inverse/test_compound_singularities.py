@@ -159,6 +159,28 @@ def test_a_tool_that_points_straight_down_by_its_axis(q: list[float], count: int
         assert not s.complete
 
 
+def test_a_tool_along_parallel_axes_by_its_axis() -> None:
+    """An SO-100: joints 2, 3 and 4 move by themselves on either side; one side was lost, and complete true."""
+    arm, _ = shipped("so100")
+    joints = np.radians([120, 0, -150, -60, 0])
+    T = armkin.fk(arm, joints)
+    for near in (None, joints):
+        s = armkin.ik(arm, [*T[:3, 3], *T[:3, 2]], "xyz_axis", near=near)
+        assert sorted(np.degrees(s.q[s.valid][:, 0]).round(6)) == [-60, 120]
+        assert s.free.tolist() == [False, True, True, True, False]
+
+
+@pytest.mark.parametrize("q", [[180, 180, 180, 180, -90, 0], [0, 180, 0, 0, 90, 90]])
+def test_what_is_one_with_a_branch_takes_its_own_likes_along(q: list[float]) -> None:
+    """A root of third order, found 18 times: a neighbour in its valley was one with some of these, and the others one
+    more branch, 1e-7 rad away."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(130)), "pose")
+    task, _ = solver(arm, "pose")
+    joints = np.radians([q])
+    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    assert verdict, verdict
+
+
 @pytest.mark.parametrize("q", [[-45, 180, -135], [10, 180, 20], [30, 180, 45], [20, 180, -30]])
 def test_poses_of_three_joints_of_which_two_are_in_one_line(q: list[float]) -> None:
     """Axes 1 and 3 coincide: ten postures of their self-motion were isolated branches, and the answer complete."""

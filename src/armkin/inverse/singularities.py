@@ -244,9 +244,8 @@ def _joined(
 
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
     """
-    radius = SAME + np.minimum(1e-13 / np.maximum(np.minimum(sigma[k], sigma[k, b][:, None]), 1e-300), 3e-4)
     with np.errstate(invalid="ignore"):
-        same = away < radius
+        same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
         row, column = np.nonzero(~same & (away < HAIR))
     if len(row):
         start = q[k[row], b[row]]
@@ -255,5 +254,17 @@ def _joined(
         one, other = (k[row], b[row]), (k[row], column)
         longer = size[other] * sigma[one] > size[one] * sigma[other]
         miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
-        same[row, column] = valleys.joined(arm, task, start, way, miss, weakest, target[k[row]])
+        further = valleys.joined(arm, task, start, way, miss, weakest, target[k[row]])
+        same[row, column] = further
+        for i in np.unique(row[further]):  # and those that rounding alone parts from these
+            there, some = q[k[i]], np.flatnonzero(same[i])
+            with np.errstate(invalid="ignore"):
+                apart = newton.wrapped_distance(arm, there[:, None], there[some])
+                close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
+            same[i] |= close.any(axis=1)
     return np.asarray(same)
+
+
+def _radius(sigma: Array) -> Array:
+    """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
+    return SAME + np.minimum(1e-13 / np.maximum(sigma, 1e-300), 3e-4)

@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula import pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry, Rows
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.closed.subproblems import Candidates, Prefer
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import from_links
 
@@ -33,8 +33,8 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         solve = inner.pairs
 
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
-            virtual = None if prefer[0] is None else Pair(1.0, 0.0)
-            found = solve(pose_of(goal), [*prefer, virtual])
+            # where the virtual joint is free, other values of the others' are other values of its own
+            found = solve(pose_of(goal), [*prefer, prefer[4]])
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
         ends = tuple(j for j in inner.ends if j < 5)
