@@ -15,11 +15,12 @@ from armkin.inverse.batch import Batch, Goals, wider
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closest import closest
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
 from armkin.inverse.solutions import Solutions, Status
+from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
-OFF = 1e-5  # [rad, reaches] how far outside limits a double root may be that stands for one on them
+OFF = 1e-7  # [rad, reaches] how far outside limits a double root may be that stands for one on them
 
 
 def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions]) -> Batch:
@@ -28,14 +29,21 @@ def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions])
     goals, out: N targets and their branches; again: the solver, for a target and another `near`.
     """
     arm, task, target, near = goals
-    edge = (out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR)
-    for k in np.flatnonzero(edge & ~out.within.any(axis=1)):
+    edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
+    for k in edge[~out.within[edge].any(axis=1)]:
         q = out.q[k, out.valid[k]]
         beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
         if not ((beyond < OFF) | out.free[k]).all(axis=1).any():
             continue  # a joint that is held is outside
         legal = closest(arm, target[k], task.name, near=near[k]).q
-        if newton.missing(arm, task, legal[None], target[k : k + 1])[0] > SOLUTION:
+        exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
+        if not limits.outside(arm, exact[0]).any():  # the correction may take a double root beyond its limit
+            legal = exact[0]
+        goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
+        miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
+        # of a self-motion as exact as what was listed; with a margin, for `again` has to take it as a branch
+        hair = (beyond < OFF).all(axis=1).any()
+        if miss > (0.9 * SOLUTION if hair else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
             continue
         found = again(target[k], legal)
         if found.best < 0:
