@@ -21,6 +21,7 @@ from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
 OFF = 1e-7  # [rad, reaches] how far outside limits a double root may be that stands for one on them
+MOVES = 1e-12  # smallest singular value of a posture on a self-motion, not in a valley
 
 
 def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions]) -> Batch:
@@ -33,8 +34,11 @@ def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions])
     for k in edge[~out.within[edge].any(axis=1)]:
         q = out.q[k, out.valid[k]]
         beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-        if not ((beyond < OFF) | out.free[k]).all(axis=1).any():
-            continue  # a joint that is held is outside
+        hair = (beyond < OFF).all(axis=1)
+        sigma, *_ = newton.null_space(arm, task, q, np.repeat(target[k : k + 1], len(q), axis=0))
+        # a joint that is held is outside; or it is a valley, whose points are not as exact as the branches
+        if not (hair | ((beyond < OFF) | out.free[k]).all(axis=1) & (sigma < MOVES)).any():
+            continue
         legal = closest(arm, target[k], task.name, near=near[k]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
         if not limits.outside(arm, exact[0]).any():  # the correction may take a double root beyond its limit
@@ -42,8 +46,7 @@ def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions])
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for `again` has to take it as a branch
-        hair = (beyond < OFF).all(axis=1).any()
-        if miss > (0.9 * SOLUTION if hair else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
+        if miss > (0.9 * SOLUTION if hair.any() else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
             continue
         found = again(target[k], legal)
         if found.best < 0:
