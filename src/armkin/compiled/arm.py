@@ -25,7 +25,7 @@ from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
-from armkin.inverse.workers import checked, shared
+from armkin.inverse.workers import check, shared
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class CompiledArm:
     ) -> Solutions:
         """All branches, as `armkin.ik`; workers: threads that share a large batch."""
         if workers != 1:
-            checked(workers)
+            check(workers)
         return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers)
 
     def _of(self, task: str | None) -> _CompiledTask:

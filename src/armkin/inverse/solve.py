@@ -30,7 +30,7 @@ from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, around, distance, read_targets, shaped
-from armkin.inverse.workers import checked, shared
+from armkin.inverse.workers import check, shared
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def ik(
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
     if workers != 1:
-        checked(workers)
+        check(workers)
     values = arrays.real(targets, "targets")
     if examine and values.ndim <= 2 and (alone := one_target.solve(arm, values, task, near)) is not None:
         return alone

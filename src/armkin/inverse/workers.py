@@ -17,7 +17,7 @@ def shared(part: Callable[[slice], Result], count: int, workers: int, least: int
     least: rows that are worth a thread; step: of which shares are multiples. One worker gets all rows at once.
     Raises UsageError for less than one worker.
     """
-    checked(workers)
+    check(workers)
     share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
     share += -share % step
     rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
@@ -29,10 +29,9 @@ def shared(part: Callable[[slice], Result], count: int, workers: int, least: int
         return list(pool.map(part, rows))
 
 
-def checked(workers: int) -> int:
-    """The number of threads asked for. Raises UsageError for less than one, and for what is no whole number."""
+def check(workers: int) -> None:
+    """Raises UsageError for a number of threads below one, and for what is no whole number."""
     if not isinstance(workers, Integral):
         raise UsageError(f"workers: {workers!r}; a whole number of threads is needed")
     if workers < 1:
         raise UsageError(f"workers: {workers}; at least 1 thread is needed")
-    return workers

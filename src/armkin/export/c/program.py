@@ -26,26 +26,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 # What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
-# rad); answers closer than this are one; those
-# closer than a hair may be; a matrix this far from orthonormal is no rotation.
-_DOUBLE = {
-    "ACCEPTED": 1e-24,
-    "SOLUTION": 1e-18,
-    "NEARBY": 1e-12,
-    "SAME": 1e-6,
-    "HAIR": HAIR,
-    "ROTATION": 1e-6,
-    "LARGEST": LARGEST,
-}
-_SINGLE = {
-    "ACCEPTED": 1e-10,
-    "SOLUTION": 1e-9,
-    "NEARBY": 1e-6,
-    "SAME": 1e-3,
-    "HAIR": HAIR,
-    "ROTATION": 1e-3,
-    "LARGEST": 1e9,
-}
+# rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
+_DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 1e-6, "LARGEST": LARGEST}
+_SINGLE = {"ACCEPTED": 1e-10, "SOLUTION": 1e-9, "NEARBY": 1e-6, "SAME": 1e-3, "ROTATION": 1e-3, "LARGEST": 1e9}
 
 
 class Program(NamedTuple):
@@ -156,7 +139,7 @@ def has_form(geometry: Geometry) -> bool:
 
 def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
-    values = {**(_SINGLE if single else _DOUBLE), "HAIR": HAIR}
+    values = {**(_SINGLE if single else _DOUBLE), "HAIR": HAIR}  # answers closer than a hair may be one
     lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 
