@@ -99,6 +99,29 @@ def test_ctrl_c_while_modules_are_imported_is_silent() -> None:
         assert process.returncode in (0, 130)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+@pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
+@pytest.mark.parametrize("where", ["class Half: late = Late()", "weakref.ref(Late(), Late.send)"])
+def test_a_signal_while_a_class_is_made_in_an_import(where: str, number: str, code: int, tmp_path: Path) -> None:
+    """Python 3.11 makes a RuntimeError of it there, and drops what a weak reference's callback raises."""
+    (tmp_path / "numpy.py").write_text(f"""
+import os, signal, sys, weakref
+class Late:
+    def __set_name__(self, owner, name): self.send()
+    def send(self): os.kill(os.getpid(), signal.{number})
+{where}
+sys.path.remove({str(tmp_path)!r}); del sys.modules["numpy"]
+import numpy
+""")
+    command = [*ARMKIN, "fk", str(ROOT / "robots/three_dof.yaml"), "--batch", "-"]  # waits for rows
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, env=environment, stdin=pipe, stderr=pipe) as process:
+        assert process.wait(timeout=60) == code
+        assert process.stderr is not None
+        assert process.stderr.read() == b""
+
+
 def test_the_command_line_imports_next_to_nothing_before_it_takes_signals() -> None:
     program = "import sys; before = set(sys.modules); import armkin.cli; print(*sorted(set(sys.modules) - before))"
     program = f"import sys; sys.path.insert(0, {str(ROOT / 'src')!r}); {program}"

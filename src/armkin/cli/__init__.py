@@ -14,6 +14,7 @@ inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or 
 rows.py            many of them in chunks; csv_rows.py: from CSV; batch.py: their answers
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
 default_port.py    the port; board_link.py: an open machine, signals
+signals.py         Ctrl-C and its like while modules are imported
 
 What is printed:
 
@@ -32,6 +33,8 @@ import io
 import os
 import sys
 
+from armkin.cli.signals import interrupted
+
 TYPE_CHECKING = False  # importing typing takes long enough for a Ctrl-C, which `main` takes care of
 
 if TYPE_CHECKING:
@@ -49,6 +52,10 @@ def main() -> NoReturn:
 
 
 def _run() -> int:
+    import signal
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's background job ignores it
+        signal.signal(signal.SIGINT, interrupted)
     # Start-up makes many objects and hardly any garbage: look for it seldom.
     gc.set_threshold(100_000, 50, 100)
     # Threads take longer to start than matrices of this size could gain by them.

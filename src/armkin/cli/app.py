@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from keyword import iskeyword
+from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -16,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
+from armkin.cli.signals import put_off
 
 _INTERRUPTED = 130
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -164,8 +166,10 @@ def _ending() -> list[int]:
     return [number for number in known if number is not None and signal.getsignal(number) != signal.SIG_IGN]
 
 
-def _terminate(signum: int, frame: object) -> None:
+def _terminate(signum: int, frame: FrameType | None) -> None:
     """SIGTERM and SIGHUP end the command as Ctrl-C does, through its ``finally``s, with their own exit codes."""
+    if put_off(signum, frame):
+        return
     for number in _ending():
         signal.signal(number, signal.SIG_IGN)  # once is enough
     sys.exit(128 + signum)

@@ -1,0 +1,45 @@
+"""Signals raise no exception in an import, nor in pydantic: both make other errors of it, or swallow it.
+
+A class half made wraps it in a RuntimeError (Python 3.11), a validator half built in a SchemaError, and a weak
+reference's callback drops it.
+"""
+
+from __future__ import annotations
+
+import _thread
+import sys
+import time
+
+TYPE_CHECKING = False  # as in the package: this is imported before signals are taken
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+_AGAIN_S = 0.001
+_NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # one module goes by its first two names
+
+
+def interrupted(number: int, frame: FrameType | None) -> None:
+    """The handler of Ctrl-C; while modules are imported or robot files checked, it waits."""
+    if not put_off(number, frame):
+        raise KeyboardInterrupt
+
+
+def put_off(number: int, frame: FrameType | None) -> bool:
+    """Whether `frame` is where no exception may be raised; the signal comes again then."""
+    while frame is not None and not str(frame.f_globals.get("__name__")).startswith(_NOT_IN):
+        frame = frame.f_back
+    if frame is None:
+        return False
+    _thread.start_new_thread(_again, (number, _thread.get_ident()))
+    return True
+
+
+def _again(number: int, main: int) -> None:
+    import signal
+
+    time.sleep(_AGAIN_S)
+    if sys.platform == "win32":
+        _thread.interrupt_main(number)
+    else:
+        signal.pthread_kill(main, number)  # a read that waits by then must end as well
