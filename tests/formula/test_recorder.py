@@ -95,7 +95,7 @@ def check(expression: Expression, operations: dict[str, Callable[..., Any]], tol
     whole = np.broadcast_to(np.asarray(batch, dtype=float), expected.shape)
     np.testing.assert_allclose(whole, expected, rtol=tolerance, atol=tolerance)
     for i in range(len(inputs[0])):
-        [single] = formula.single([float(x[i]) for x in inputs])
+        [single] = formula.one_by_one([[float(x[i]) for x in inputs]])
         rows = np.broadcast_to(expected, np.broadcast_shapes(expected.shape, (len(inputs[0]),)))
         here = rows[..., i]
         np.testing.assert_allclose(np.broadcast_to(single[..., 0], here.shape), here, rtol=tolerance, atol=tolerance)

@@ -131,9 +131,11 @@ def _choose(arm: Arm, branches: int) -> str:
             loops.append(copied)
             continue
         # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
-        turned = _every(f"{at} += ARM_TURN * ARM_RINT(({close} - {at}) / ARM_TURN);")
+        turned = _every(f"{at} += ARM_TURN * ARM_FLOOR(({close} + (ARM_PI + ARM_SLACK) - {at}) / ARM_TURN);")
+        positive = _every(f"{at} = {at} < ARM_SLACK - ARM_PI ? {at} + ARM_TURN : {at};")
         wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
-        loops.append(f"wide = {wide};\nif (wide == 0) {{\n{copied}\n}} else if (wide == 1) {{\n{turned}\n}}")
+        choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
+        loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
     return f"""{_part("wide")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,

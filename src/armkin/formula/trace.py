@@ -77,14 +77,13 @@ class StraightLineCode:
             self._run_single = python_code.write(self._recording)
         return self._run_single
 
-    def single(self, inputs: Sequence[float]) -> list[Array]:
-        """The formula's outputs for one pose, as arrays (*branch axes, 1)."""
-        from armkin.formula.recording import axes_of
-
-        values = self.numbers()(*inputs)
+    def one_by_one(self, inputs: Sequence[Sequence[float]]) -> list[Array]:
+        """The formula's outputs for N poses in plain Python, (N, inputs), as arrays (*branch axes, N)."""
+        numbers = self.numbers()
+        outputs = zip(*(numbers(*one) for one in inputs), strict=True)
         return [
-            np.array(v).reshape(*axes_of(x), 1) if isinstance(v, tuple) else np.array([v])
-            for x, v in zip(self._recording.outputs, values, strict=True)
+            np.moveaxis(np.array(values).reshape(len(inputs), *axes), 0, -1)
+            for axes, values in zip(self.axes(), outputs, strict=True)
         ]
 
 

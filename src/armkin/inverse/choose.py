@@ -22,6 +22,7 @@ from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
 from armkin.inverse.closest import Closest
 from armkin.inverse.closest import closest as nearest_pose
+from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.model import limits, units
@@ -142,7 +143,7 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
         near = units.joints_in(request.arm, request.near_out)
         branches = sorted(
             (_nearer(request.arm, branch, near, held) for branch in answer.branches),
-            key=lambda branch: (not branch.within_limits, branch.motion),
+            key=_rank,
         )
         names = tuple(dict.fromkeys(branch.name for branch in branches))
         wanted = set(names)
@@ -285,7 +286,7 @@ class _Found:
     def thin_out(self) -> None:
         """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
         nearest: dict[tuple[str, bool], tuple[Branch, bool]] = {}
-        for item in sorted(self.branches, key=_rank):
+        for item in sorted(self.branches, key=lambda item: _rank(item[0])):
             nearest.setdefault((item[0].name, item[0].within_limits), item)
         # A branch's q is a row of the array of all targets, which shall go.
         self.branches = [(branch._replace(q=branch.q.copy()), named) for branch, named in nearest.values()]
@@ -294,7 +295,7 @@ class _Found:
         """One answer of all: the best status, the branches sorted."""
         assert self.best is not None
         first = self.best[1]
-        both = sorted(self.branches, key=_rank)
+        both = sorted(self.branches, key=lambda item: _rank(item[0]))
         best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
         refused = None
         if request.branch is not None and best is None:
@@ -314,8 +315,8 @@ class _Found:
         )
 
 
-def _rank(item: tuple[Branch, bool]) -> tuple[bool, float]:
-    return not item[0].within_limits, item[0].motion
+def _rank(branch: Branch) -> tuple[bool, float]:
+    return not branch.within_limits, round(branch.motion, EQUAL)
 
 
 def _refused(request: Request, named: Sequence[Branch]) -> str:

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import StraightLineCode
 from armkin.forward import position
 from armkin.inverse import near_itself
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.turns import nearest_copy
-from armkin.inverse.closed.candidates import Recorded, entries, preferred, recorded
+from armkin.inverse.closed.candidates import Recorded, as_rows, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.doubtful import Doubts, decided
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
@@ -53,66 +52,65 @@ def solve(
     near: (N, n), one: (n,) if it serves all; workers: threads.
     """
     runner, N = recorded(arm, task, geometry), len(given)
-    code = runner.code.always() if N == 1 else runner.code.get(N)
-    if runner.axes is None:
-        runner.axes = _axes(runner, code, given[:0])
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
-    threads = code is not None and workers > 1
     tip = None if one is None else position(arm, one)
 
-    def part(rows: slice) -> list[Doubts]:
-        """Some rows, by a thread of its own."""
+    def part(rows: slice) -> list[NDArray[np.intp]]:
+        """Some rows, by a thread of its own; returns the targets on an edge."""
         workspace: list[NDArray[Any]] = []
-        doubts: list[Doubts] = []
+        doubts: list[NDArray[np.intp]] = []
         for start in range(rows.start, rows.stop, arrays.CHUNK):
             some = slice(start, min(start + arrays.CHUNK, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
             if task.orientation == "full":
                 goal, rounding[some], columns = read_poses(goal)
             target[some] = goal
-            found, workspace = _candidates(runner, code, goal, columns, close, workspace)
+            found, workspace = _candidates(runner, goal, columns, workspace)
             there = None
             if examine:
                 first = goal[:, 0] if columns is None else columns[9]
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
-            doubts += _keep(goals, runner.axes or (), out.part(some), found, start, close, there)
+            doubts.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
         return doubts
 
-    parts = shared(part, N, workers if threads else 1, arrays.CHUNK, arrays.CHUNK)
+    parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
     doubts = [doubt for one_part in parts for doubt in one_part]
-    if doubts and examine:
-        together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
+    if examine and any(map(len, doubts)):
+        together = _alone(runner, target, np.concatenate(doubts))
         out = decided(Goals(arm, task, target, near), runner, out, together)
     return Solved(out, math.prod(runner.axes), target, rounding)
 
 
-def _axes(runner: Recorded, code: StraightLineCode | None, goal: Array) -> tuple[int, ...]:
-    """Lengths of the branch axes; goal: no targets."""
-    if code is not None:
-        return np.broadcast_shapes((1, 1, 1), *code.axes()[:-3])
-    values = runner.candidates(entries(runner.task, goal), [None] * runner.arm.n)[:-3]
-    return np.broadcast_shapes((1, 1, 1, 0), *map(np.shape, values))[:-1]
-
-
 def _candidates(
     runner: Recorded,
-    code: StraightLineCode | None,
     goal: Array,
     columns: list[Entry] | None,
-    near: Array,
     workspace: list[NDArray[Any]],
 ) -> tuple[list[Array], list[NDArray[Any]]]:
     """A chunk's candidates as `Recorded.candidates` returns them, and the buffers that they stand in."""
-    N, task = len(goal), runner.task
-    if code is None:
-        return runner.candidates(entries(task, goal), preferred(runner.arm, near)), workspace
+    N, code = len(goal), runner.code
     if N == 1:
-        return code.single(pose.read_one(goal[0]) if task.orientation == "full" else goal[0].tolist()), workspace
+        return _in_numbers(runner, goal), workspace
     if not workspace or workspace[-1].shape[-1] != N:
         workspace = code.workspace(N)
-    return list(code.run(entries(task, goal) if columns is None else columns, workspace)), workspace
+    return list(code.run(entries(runner.task, goal) if columns is None else columns, workspace)), workspace
+
+
+def _in_numbers(runner: Recorded, target: Array) -> list[Array]:
+    """Candidates in plain Python: to the last digit the same, whatever a target is asked together with."""
+    full = runner.task.orientation == "full"
+    return runner.code.one_by_one([pose.read_one(one) if full else one.tolist() for one in target])
+
+
+def _alone(runner: Recorded, target: Array, rows: NDArray[np.intp]) -> Doubts:
+    """Some of the targets as doubtful ones: what is singular hangs on the last digit."""
+    *values, miss, _, free = _in_numbers(runner, target[rows])
+    shape = (*runner.axes, len(rows))
+    q = as_rows(values, len(rows))
+    miss, free = (np.broadcast_to(x, shape).reshape(-1, len(rows)) for x in (miss, free))
+    return Doubts(rows, q, miss.T <= ACCEPTED**2, np.asarray((free > 0).any(axis=0)))
 
 
 def _keep(
@@ -120,16 +118,15 @@ def _keep(
     axes: tuple[int, ...],
     part: Batch,
     found: list[Array],
-    start: int,
     near: Array,
     there: NDArray[np.intp] | None,
-) -> list[Doubts]:
-    """Write a chunk's branches, which begins at row `start`; returns the targets on an edge.
+) -> NDArray[np.intp]:
+    """Write a chunk's branches; returns the targets on an edge.
 
     there: `near_itself.reached`, if that is asked.
     """
     arm = goals.arm
-    *values, miss, doubt, free = found
+    *values, miss, doubt, _ = found
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
@@ -143,15 +140,7 @@ def _keep(
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
-    if not len(doubtful):
-        return []
-    q, loose = np.empty((*axes, len(doubtful), arm.n)), np.zeros((*axes, len(doubtful)), bool)
-    for i, value in enumerate(values):
-        q[..., i] = value[..., doubtful] if np.shape(value)[-1:] == (N,) else value
-    loose |= np.greater(free[..., doubtful] if np.shape(free)[-1:] == (N,) else free, 0)  # constants are numbers
-    q = q.reshape(B, -1, arm.n).transpose(1, 0, 2)
-    free_somewhere = np.asarray(loose.reshape(B, -1).any(axis=0))
-    return [Doubts(start + doubtful, q, valid[:, doubtful].T, free_somewhere)]
+    return doubtful
 
 
 def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:

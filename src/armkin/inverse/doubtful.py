@@ -43,7 +43,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
         found = regular_targets.settle(goals.of(rows), q[part], valid[part])
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
-        new = np.flatnonzero(found.known & (found.double | found.changed | moving))
+        new = np.flatnonzero(found.known)
         if len(new):
             order = np.argsort(~found.branch[new], axis=1, kind="stable")
             kept = np.take_along_axis(found.q[new], order[:, :, None], axis=1)

@@ -60,7 +60,7 @@ class OneTarget:
         definition, geometry = solver(arm, task)
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
-        code = recorded(arm, definition, geometry).code.always()
+        code = recorded(arm, definition, geometry).code
         self._run, self._off = code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, room(arm)

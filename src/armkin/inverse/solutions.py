@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 
@@ -70,8 +71,8 @@ class Solutions:
 
     @cached_property
     def order(self) -> NDArray[np.intp]:
-        """(..., B) branches by rank: within limits first, then by motion, missing ones last."""
-        key = np.where(self.valid, self.motion, np.inf)
+        """(..., B) branches by rank: within limits first, then by motion, equal ones as listed, missing ones last."""
+        key = np.where(self.valid, self.motion.round(EQUAL), np.inf)
         by_motion = np.argsort(key, axis=-1, kind="stable")
         outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
         by_limits = np.argsort(outside, axis=-1, kind="stable")
@@ -79,8 +80,8 @@ class Solutions:
 
     @cached_property
     def best(self) -> NDArray[np.intp]:
-        """(...) index of the branch within limits that moves the joints least, or -1."""
-        key = np.where(self.within_limits, self.motion, np.inf)
+        """(...) index of the branch within limits that moves the joints least, the first of equal ones, or -1."""
+        key = np.where(self.within_limits, self.motion.round(EQUAL), np.inf)
         if not key.shape[-1]:  # no target of the batch has a branch
             return np.full(self.status.shape, -1)
         index = np.argmin(key, axis=-1)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Entry, wrapped
 from armkin.forward import one_pose
+from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 TURN = 2 * np.pi
+HALF = np.pi + SLACK  # how far above `near` a copy may be
 MOST = 50_000  # copies of one branch that `turns` gives
 
 
@@ -26,22 +28,25 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
     """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
 
     value: any shape, in [-pi, pi]; near: broadcastable [rad]. Returns the values and
-    whether they are within [lower, upper]; where no copy is, the principal value.
+    whether they are within [lower, upper]; where no copy is, the principal value. Of two that are half a turn from
+    `near`, to within SLACK, the one above it: rounding must not decide.
     """
-    at_zero = isinstance(near, float) and near == 0.0
     if lower >= -np.pi and upper <= np.pi:
         # the principal value is the only one that can be legal, but for half a turn, which has two
-        low, high = lower - SLACK, upper + SLACK
+        value, low, high = _principal(value), lower - SLACK, upper + SLACK
         if low <= -np.pi or high >= np.pi:
             value = _half_turned(value, near, low, high)
         if low <= -np.pi and high >= np.pi:
             return value, True
         return value, (value >= low) & (value <= high)
+    at_zero = isinstance(near, float) and near == 0.0
     principal = value
-    if not at_zero:
-        turned = np.asarray(near - value)  # one array for all steps: it stays in the cache
+    if at_zero:
+        value = _principal(value)
+    else:
+        turned = np.asarray((near + HALF) - value)  # one array for all steps: it stays in the cache
         turned /= TURN
-        np.rint(turned, out=turned)
+        np.floor(turned, out=turned)
         turned *= TURN
         turned += value
         value = turned
@@ -55,26 +60,32 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
         fits = below & (moved <= upper + SLACK)
         value, below = np.where(fits, moved, value), below & ~fits
-    if lower < last + SLACK and above.any():
+    if lower < last + 3 * SLACK and above.any():
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)
         value, above = np.where(fits, moved, value), above & ~fits
     outside = below | above
-    if value is not principal:
-        value = np.where(outside, principal, value)
+    if not at_zero and outside.any():
+        value = np.where(outside, _principal(principal), value)
     return value, ~outside
 
 
+def _principal(value: Array) -> Array:
+    """Values in [-pi, pi]; half a turn, which has two, as the positive one."""
+    negative = value < SLACK - np.pi
+    return np.where(negative, value + TURN, value) if negative.any() else value
+
+
 def _half_turned(value: Array, near: Entry, low: float, high: float) -> Array:
-    """Principal values; of half a turn, which has two, the one that is legal and nearer."""
-    some = np.flatnonzero(np.abs(value) > np.pi - SLACK)
+    """Principal values; of half a turn the copy that is legal and nearer."""
+    some = np.flatnonzero(value > np.pi - SLACK)
     if not len(some):
         return value
     one, close = value.take(some), np.broadcast_to(near, value.shape).flat[some]
-    other = one - np.copysign(TURN, one)
+    other = one - TURN
     legal = (one >= low) & (one <= high)
     better = (other >= low) & (other <= high)
-    better &= ~legal | (np.abs(other - close) < np.abs(one - close))
+    better &= ~legal | (np.abs(other - close) < np.abs(one - close) - SLACK)
     value = value.copy()
     value.put(some, np.where(better, other, one))
     return value
@@ -89,23 +100,25 @@ def nearest_number(value: float, near: float, lower: float, upper: float, slides
     low, high = lower - SLACK, upper + SLACK
     if slides:
         return value, low <= value <= high
+    principal = value + TURN if value < SLACK - math.pi else value
     if lower >= -math.pi and upper <= math.pi:
-        legal = low <= value <= high
-        if (low <= -math.pi or high >= math.pi) and abs(value) > math.pi - SLACK:
-            other = value - math.copysign(TURN, value)
-            if low <= other <= high and (not legal or abs(other - near) < abs(value - near)):
+        legal = low <= principal <= high
+        if (low <= -math.pi or high >= math.pi) and principal > math.pi - SLACK:
+            other = principal - TURN
+            if low <= other <= high and (not legal or abs(other - near) < abs(principal - near) - SLACK):
                 return other, True
-        return value, legal
-    principal, first = value, -math.pi
-    if near != 0.0:
-        value, first = value + TURN * float(round((near - value) / TURN)), near - math.pi
+        return principal, legal
+    if near == 0.0:
+        value, first = principal, -math.pi
+    else:
+        value, first = value + TURN * float(math.floor((near + HALF - value) / TURN)), near - math.pi
     if (lower <= first and upper >= first + TURN) or low <= value <= high:
         return value, True
     if value < low and upper > first + TURN - SLACK:
         moved = value + TURN * math.ceil((low - value) / TURN)
         if moved <= high:
             return moved, True
-    if value > high and lower < first + SLACK:
+    if value > high and lower < first + 3 * SLACK:
         moved = value - TURN * math.ceil((value - upper - SLACK) / TURN)
         if moved >= low:
             return moved, True
@@ -155,7 +168,7 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
             inside = lower - SLACK <= row[i] <= upper + SLACK
             choices.append([float(row[i])] if inside else [])
         elif not (np.isfinite(lower) and np.isfinite(upper)):
-            value, ok = nearest_copy(row[i : i + 1] % TURN, close[i], lower, upper)
+            value, ok = nearest_copy(wrapped(row[i : i + 1]), close[i], lower, upper)
             choices.append([float(value[0])] if np.all(ok) else [])
         else:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))
@@ -171,4 +184,4 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - close) * unit).sum(axis=1)
-    return rows[np.argsort(motion, kind="stable")]
+    return rows[np.argsort(motion.round(EQUAL), kind="stable")]

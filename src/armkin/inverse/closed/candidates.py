@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import LazyCode
+from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
 from armkin.inverse.closed import crossings
 from armkin.inverse.closed.geometry import Geometry
@@ -35,9 +35,17 @@ class Recorded:
     def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
         self.arm, self.task, self.geometry = arm, task, geometry
         self.link = [pose.constant(L) for L in arm.link]
-        inputs = 12 if task.orientation == "full" else len(task.labels)
-        self.code = LazyCode(lambda goal: self.candidates(goal, [None] * arm.n), inputs)
-        self.axes: tuple[int, ...] | None = None  # lengths of the branch axes
+
+    @cached_property
+    def code(self) -> StraightLineCode:
+        """The candidates as straight-line code; recording it takes milliseconds."""
+        inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
+        return StraightLineCode(lambda goal: self.candidates(goal, [None] * self.arm.n), inputs)
+
+    @cached_property
+    def axes(self) -> tuple[int, ...]:
+        """Lengths of the branch axes."""
+        return np.broadcast_shapes((1, 1, 1), *self.code.axes()[:-3])
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
         """Joint values of all candidates, their squared residual, edge and free of `Doubt`: n + 3 arrays."""
@@ -52,11 +60,7 @@ class Recorded:
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
-        code = self.code.get(N)
-        if code is None:
-            found = self.candidates(entries(self.task, target), [None] * self.arm.n)
-        else:
-            found = list(code.run(entries(self.task, target), code.workspace(N)))
+        found = list(self.code.run(entries(self.task, target), self.code.workspace(N)))
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 

@@ -47,3 +47,4 @@ HALFWAY = 1e-13  # residual of a point halfway between two answers that makes th
 ILL = 1e4  # norm of the inverse Jacobian from which on an answer is near a singularity
 INFINITE = 1e4  # a prismatic value that is a root at infinity, seen through rounding
 AT_ZERO = 1e-6  # virtual joints closer to zero than this are worth correcting
+EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones

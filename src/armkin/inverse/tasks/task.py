@@ -157,7 +157,7 @@ def _off(T: Array, entries: pose.Pose) -> Array:
     """How far the columns of (N, 4, 4) are from those of rotations: (N,)."""
     check = rotation_check()
     if len(T) == 1:
-        return check.single(pose.read_one(T[0]))[0]
+        return check.one_by_one([pose.read_one(T[0])])[0]
     return np.array(check.run(entries, check.workspace(len(T)))[0])
 
 

@@ -6,6 +6,7 @@
 #define ARM_SQRT(x) sqrt(x)
 #define ARM_CBRT(x) cbrt(x)
 #define ARM_RINT(x) rint(x)
+#define ARM_FLOOR(x) floor(x)
 #define ARM_CEIL(x) ceil(x)
 #define ARM_COPYSIGN(x, y) copysign(x, y)
 #define ARM_ABS(x) fabs(x)

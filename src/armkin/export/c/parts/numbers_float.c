@@ -6,6 +6,7 @@
 #define ARM_SQRT(x) sqrtf(x)
 #define ARM_CBRT(x) cbrtf(x)
 #define ARM_RINT(x) floorf((x) + 0.5f)
+#define ARM_FLOOR(x) floorf(x)
 #define ARM_CEIL(x) ceilf(x)
 #define ARM_COPYSIGN(x, y) copysignf(x, y)
 #define ARM_ABS(x) fabsf(x)
