@@ -24,6 +24,7 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.doubtful import examined
+from armkin.inverse.elimination.merge import projection
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.recognise import solver
@@ -176,6 +177,10 @@ def _rows(
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
         out = examined(goals, out, doubtful, candidates, others, unsettled)
+        order = projection(arm.prismatic, out.q[doubtful]).argsort(axis=1)  # as those of all other targets
+        for array in (out.q, out.valid, out.within, out.branch):
+            some = array[doubtful]
+            array[doubtful] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)
     return out, B
 
 

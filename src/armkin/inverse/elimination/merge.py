@@ -45,9 +45,10 @@ def concatenate(parts: list[Answers]) -> Answers:
 
 
 def projection(prismatic: Bool, q: Array) -> Array:
-    """One number for each joint vector (M, 6), equal for equal poses of the joints, else hardly ever."""
+    """One number for each joint vector (..., n), n <= 6, equal for equal poses of the joints, else hardly ever."""
     cosine, sine = np.where(prismatic, q, np.cos(q)), np.where(prismatic, q, np.sin(q))
-    return np.asarray(cosine @ _WEIGHTS[0] + sine @ _WEIGHTS[1])
+    weights = _WEIGHTS[:, : q.shape[-1]]
+    return np.asarray(cosine @ weights[0] + sine @ weights[1])
 
 
 def difference(prismatic: Bool, end: Array, start: Array) -> Array:
