@@ -40,10 +40,12 @@ def test_near_as_a_batch_is_near_one_by_one(name: str) -> None:
 @pytest.mark.parametrize("near", [0.0, -90.0, 90.0])
 def test_half_a_turn_from_near_is_above_it(near: float) -> None:
     arm = shipped("ur5e")[0]  # limits of 360 degrees, so that both copies are legal, but for joint 3
-    target = armkin.fk(arm, np.radians([[180.0, -90, 90, -90, -90, 180], [90, 180, 45, 0, 90, -90]]))
+    target = armkin.fk(
+        arm, np.radians([[180.0, -90.0, 90.0, -90.0, -90.0, 180.0], [90.0, 180.0, 45.0, 0.0, 90.0, -90.0]])
+    )
     for found in (
-        armkin.ik(arm, target, near=np.radians([near] * 6)),
-        armkin.ik(arm, target[0], near=[np.radians(near)] * 6),
+        armkin.ik(arm, target, near=np.full(6, np.radians(near))),
+        armkin.ik(arm, target[0], near=np.full(6, np.radians(near))),
     ):
         away = np.degrees(found.q - found.near[..., None, :])[..., [0, 1, 3, 4, 5]]
         half = np.abs(np.abs(away) - 180.0) < 1e-7

@@ -42,7 +42,9 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
     def nothing(goals: Goals, q: np.ndarray, valid: np.ndarray) -> regular_targets.Regular:
         decided.append(len(q))
         none = np.zeros(len(q), bool)
-        return regular_targets.Regular(none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), q.shape[2]), bool), q)
+        return regular_targets.Regular(
+            none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), q.shape[2]), bool), q, none
+        )
 
     monkeypatch.setattr(regular_targets, "settle", nothing)
     _, one_by_one = nearly_singular(name, least, most)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula import arrays, pose
+from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.forward import position
 from armkin.inverse import near_itself
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.turns import nearest_copy
-from armkin.inverse.closed.candidates import Recorded, as_rows, entries, recorded
+from armkin.inverse.closed.candidates import Recorded, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.doubtful import Doubts, decided
+from armkin.inverse.doubtful import Doubts, as_doubts, decided
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task, read_poses
@@ -56,10 +56,10 @@ def solve(
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
 
-    def part(rows: slice) -> list[NDArray[np.intp]]:
+    def part(rows: slice) -> list[Doubts]:
         """Some rows, by a thread of its own; returns the targets on an edge."""
         workspace: list[NDArray[Any]] = []
-        doubts: list[NDArray[np.intp]] = []
+        doubts: list[Doubts] = []
         for start in range(rows.start, rows.stop, arrays.CHUNK):
             some = slice(start, min(start + arrays.CHUNK, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
@@ -72,13 +72,15 @@ def solve(
                 first = goal[:, 0] if columns is None else columns[9]
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
-            doubts.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
+            edge = _keep(goals, runner.axes, out.part(some), found, close, there)
+            if len(edge):
+                doubts.append(as_doubts(runner, found, start + edge, edge))
         return doubts
 
     parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
     doubts = [doubt for one_part in parts for doubt in one_part]
-    if examine and any(map(len, doubts)):
-        together = _alone(runner, target, np.concatenate(doubts))
+    if examine and doubts:
+        together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
         out = decided(Goals(arm, task, target, near), runner, out, together)
     return Solved(out, math.prod(runner.axes), target, rounding)
 
@@ -92,25 +94,10 @@ def _candidates(
     """A chunk's candidates as `Recorded.candidates` returns them, and the buffers that they stand in."""
     N, code = len(goal), runner.code
     if N == 1:
-        return _in_numbers(runner, goal), workspace
+        return runner.in_numbers(goal), workspace
     if not workspace or workspace[-1].shape[-1] != N:
         workspace = code.workspace(N)
     return list(code.run(entries(runner.task, goal) if columns is None else columns, workspace)), workspace
-
-
-def _in_numbers(runner: Recorded, target: Array) -> list[Array]:
-    """Candidates in plain Python: to the last digit the same, whatever a target is asked together with."""
-    full = runner.task.orientation == "full"
-    return runner.code.one_by_one([pose.read_one(one) if full else one.tolist() for one in target])
-
-
-def _alone(runner: Recorded, target: Array, rows: NDArray[np.intp]) -> Doubts:
-    """Some of the targets as doubtful ones: what is singular hangs on the last digit."""
-    *values, miss, _, free = _in_numbers(runner, target[rows])
-    shape = (*runner.axes, len(rows))
-    q = as_rows(values, len(rows))
-    miss, free = (np.broadcast_to(x, shape).reshape(-1, len(rows)) for x in (miss, free))
-    return Doubts(rows, q, miss.T <= ACCEPTED**2, np.asarray((free > 0).any(axis=0)))
 
 
 def _keep(

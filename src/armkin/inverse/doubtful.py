@@ -12,7 +12,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse import regular_targets, singularities
 from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
-from armkin.inverse.numeric.tolerances import SAME
+from armkin.inverse.numeric.tolerances import ACCEPTED, SAME
 from armkin.inverse.solutions import Status
 
 AT_ONCE = 256  # targets examined together
@@ -27,23 +27,36 @@ class Doubts(NamedTuple):
     free: Bool
 
 
+def as_doubts(runner: Recorded, found: list[Array], rows: NDArray[np.intp], some: NDArray[np.intp]) -> Doubts:
+    """Some of the targets that candidates were found for, as targets `rows` of a batch."""
+    shape = (*runner.axes, len(some))
+
+    def of_some(entry: Array) -> Array:
+        """Of every branch and target, (K, B)."""
+        own = entry[..., some] if np.ndim(entry) and entry.shape[-1] > 1 else entry  # constants are numbers
+        return np.broadcast_to(own, shape).reshape(-1, len(some)).T
+
+    *values, miss, _, free = found
+    q = np.stack([of_some(value) for value in values], axis=2)
+    return Doubts(rows, q, of_some(miss) <= ACCEPTED**2, np.asarray((of_some(free) > 0).any(axis=1)))
+
+
 def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch:
     """Decide what doubtful targets are: those that are regular all at once, the others posture by posture.
 
     Where a joint is free, the candidates are not all.
     """
     arm, _, target, near = goals
-    doubtful, q, valid, free = doubts
-    left = free.copy()
-    for start in range(0, len(doubtful), AT_ONCE):
-        part = start + np.flatnonzero(~free[start : start + AT_ONCE])
-        rows = doubtful[part]
+    left = doubts.free.copy()
+    for start in range(0, len(left), AT_ONCE):
+        part = start + np.flatnonzero(~doubts.free[start : start + AT_ONCE])
         if not len(part):
             continue
-        found = regular_targets.settle(goals.of(rows), q[part], valid[part])
+        rows = doubts.rows[part]
+        found = regular_targets.settle(goals.of(rows), doubts.q[part], doubts.valid[part])
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
-        new = np.flatnonzero(found.known)
+        new = np.flatnonzero(found.known & (found.double | found.changed | moving))
         if len(new):
             order = np.argsort(~found.branch[new], axis=1, kind="stable")
             kept = np.take_along_axis(found.q[new], order[:, :, None], axis=1)
@@ -51,37 +64,38 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             write(arm, out, rows[new], kept, there, order, near[rows[new]])
             out.status[rows[new]] = np.where(found.double[new], Status.BOUNDARY, Status.EXACT)
             out.status[rows[new[moving[new]]]], out.free[rows[new]] = Status.SINGULAR, found.free[new]
+    if not left.any():
+        return out
 
-    open_ = np.flatnonzero(left)
-    first, other, loose, ends = _freed(goals, runner, doubts, open_[free[open_]])
+    rows = doubts.rows[left]  # what is singular hangs on the last digit
+    some = as_doubts(runner, runner.in_numbers(target[rows]), rows, np.arange(len(rows)))
+    first, other, loose, ends = _freed(goals, runner, some)
 
-    def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
+    def candidates(of: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""
-        some = open_[some]
-        if not loose[some].any():
-            return first[some], loose[some]
-        more = [other[some]]
+        if not loose[of].any():
+            return first[of], loose[of]
+        more = [other[of]]
         if runner.geometry.ends:
-            more.append(q[some])  # it may be that the joint is not quite free
-        fixed = np.zeros((len(some), sum(part.shape[1] for part in more)), bool)
-        return np.concatenate([first[some], *more], axis=1), np.concatenate([loose[some], fixed], axis=1)
+            more.append(some.q[of])  # it may be that the joint is not quite free
+        fixed = np.zeros((len(of), sum(part.shape[1] for part in more)), bool)
+        return np.concatenate([first[of], *more], axis=1), np.concatenate([loose[of], fixed], axis=1)
 
     unsettled = None
     if runner.geometry.ends:
         unsettled = np.zeros(len(target), bool)
-        unsettled[doubtful[ends]], out.complete[doubtful[ends]] = True, False
-    return examined(goals, out, doubtful[open_], candidates, runner.others, unsettled)
+        unsettled[rows[ends]], out.complete[rows[ends]] = True, False
+    return examined(goals, out, rows, candidates, runner.others, unsettled)
 
 
-def _freed(
-    goals: Goals, runner: Recorded, doubts: Doubts, rows: NDArray[np.intp]
-) -> tuple[Array, Array, Bool, NDArray[np.intp]]:
+def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> tuple[Array, Array, Bool, NDArray[np.intp]]:
     """Candidates of the doubtful targets, those that leave a joint free with preferred values, as near `near`.
 
     And the same with other values, nan where these change nothing; which candidates they change (K, B); and the targets
-    on which the joints that the geometry calls ends are free. rows: the targets that leave joints free.
+    on which the joints that the geometry calls ends are free.
     """
     arm, task, target, near = goals
+    rows = np.flatnonzero(doubts.free)
     first, loose = doubts.q.copy(), np.zeros(doubts.q.shape[:2], bool)
     other, ends = np.full(first.shape, np.nan), [rows[:0]]
     for start in range(0, len(rows), AT_ONCE):

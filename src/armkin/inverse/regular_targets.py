@@ -32,7 +32,7 @@ class Regular(NamedTuple):
     """What is known of K targets: known (K,) whether anything is, branch (K, B) candidates that are its branches.
 
     double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another. free: (K, n) joints that
-    move along a self-motion. q: (K, B, n) the candidates, some of them corrected.
+    move along a self-motion. q: (K, B, n) the candidates, those of changed targets (K,) corrected.
     """
 
     known: Bool
@@ -40,6 +40,7 @@ class Regular(NamedTuple):
     double: Bool
     free: Bool
     q: Array
+    changed: Bool
 
 
 class _Slopes(NamedTuple):
@@ -70,7 +71,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
     r, J = newton.scaled(arm, task, both, np.repeat(target, B + 1, axis=0))
     size = np.sqrt((r * r).sum(axis=1)).reshape(K, B + 1)
     at = _Slopes(r.reshape(K, B + 1, -1)[:, 1:], size[:, 1:], J.reshape(K, B + 1, *J.shape[1:])[:, 1:])
-    q, valid = _corrected(arm, task, q, valid, at, target)
+    q, valid, changed = _corrected(arm, task, q, valid, at, target)
     # `near` is no branch itself, accepted candidates need no correction, and others are beyond it
     known = (size[:, 0] > SOLUTION) & valid.any(axis=1)
     known &= ~(valid & ~(at.size < CLOSED)).any(axis=1)
@@ -100,20 +101,20 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
     known &= ~(either & weak.moving[:, :, None]).any(axis=(1, 2))
     for row in np.flatnonzero(known & weak.moving.any(axis=1)):
         known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])
-    second = at.size[:, None] < at.size[:, :, None]  # the more exact of two stays
-    branch = valid & ~(one & second).any(axis=2) & ~(one & ~second).any(axis=1)
+    branch = valid & ~one.any(axis=1)  # the first of two stays
     double, free = either.any(axis=(1, 2)) | (branch & (sigma < DOUBLE)).any(axis=1), weak.joints.any(axis=1)
-    return Regular(known, branch, np.asarray(double), np.asarray(free), q)
+    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed)
 
 
-def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, Bool]:
-    """Candidates and accepted ones, after one step of those that are only just not accepted.
+def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, Bool, Bool]:
+    """Candidates, accepted ones and changed targets, after one step of those that are only just not accepted.
 
     at: of the candidates; what changes with a correction is written into it.
     """
     k, b = np.nonzero(~valid & (at.size < NEARBY))
+    changed = np.zeros(len(q), bool)
     if not len(k):
-        return q, valid
+        return q, valid, changed
     step = (np.linalg.pinv(at.J[k, b]) @ at.r[k, b, :, None])[:, :, 0]
     better = q[k, b] + step * radian_or_reach(arm)
     r, J = newton.scaled(arm, task, better, target[k])
@@ -121,9 +122,9 @@ def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target:
     good = (np.abs(step).max(axis=1) < SHORT) & (size < CLOSED)
     k, b = k[good], b[good]
     q, valid = q.copy(), valid.copy()
-    q[k, b], valid[k, b] = better[good], True
+    q[k, b], valid[k, b], changed[k] = better[good], True, True
     at.r[k, b], at.size[k, b], at.J[k, b] = r[good], size[good], J[good]
-    return q, valid
+    return q, valid, changed
 
 
 def _bounds(J: Array) -> tuple[Array, Bool]:

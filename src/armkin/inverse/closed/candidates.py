@@ -57,6 +57,11 @@ class Recorded:
             miss = np.maximum(miss, _sum_miss(self.task, values, goal))
         return [*values, miss, found.doubt.edge, found.doubt.free]
 
+    def in_numbers(self, target: Array) -> list[Array]:
+        """`candidates` in plain Python: to the last digit the same, whatever a target is asked together with."""
+        full = self.task.orientation == "full"
+        return self.code.one_by_one([pose.read_one(one) if full else one.tolist() for one in target])
+
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
