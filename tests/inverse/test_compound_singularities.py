@@ -375,3 +375,15 @@ def test_a_self_motion_of_two_dimensions_that_meets_another(q: list[float]) -> N
         verdict = truth.judge(arm, screw, "pose", joints, target, near)
         assert verdict, verdict
         assert not verdict.solutions.complete[0]
+
+
+def test_a_folded_arm_of_equal_links_beside_its_kite() -> None:
+    """Joints 2 and 4 alone move the folded arm; it meets the four-bar motion that moves joints 3 and 6 as well."""
+    rows = zip([90, 0, 0, 90, -90, 0], [0, -200, -200, 0, 0, 0], [100, 0, 0, 100, 100, 100], strict=True)
+    joints = [{"dh": {"alpha": alpha, "a": a, "d": d, "theta": 0}} for alpha, a, d in rows]
+    arm = case({"convention": "standard", "joints": joints}, "pose").arm
+    target = armkin.fk(arm, np.radians([0.0, 90.0, 180.0, 0.0, 0.0, 180.0]))
+    for near in ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]):
+        s = armkin.ik(arm, target, near=np.radians(near))
+        folded = np.abs(np.cos(s.q[s.valid][:, 2]) + 1.0) < 1e-9
+        assert (int(folded.sum()), int(s.valid.sum())) == (1, 6)

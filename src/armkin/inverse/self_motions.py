@@ -38,10 +38,13 @@ STALLED = 1e-6  # residual from which a step that brings hardly anything tells t
 Int = NDArray[np.int64]
 
 
-def drop_contained(arm: Arm, task: Task, q: Array, sigma: Array, chosen: Bool, curve: Bool, target: Array) -> None:
+def drop_contained(
+    arm: Arm, task: Task, q: Array, sigma: Array, resting: Bool, chosen: Bool, curve: Bool, target: Array
+) -> None:
     """Of self-motions through each other keep the one of more joints, and no root of high order beside or on one.
 
-    Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves. `near`, the first, stays.
+    Changes chosen (K, M); curve, resting: (K, M, n) the joints that a posture's self-motion moves, and those that rest
+    there, so that they rest on all of a curve if they do on a part of it. `near`, the first, stays.
     """
     for k in np.flatnonzero(curve.any(axis=(1, 2))):
         mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
@@ -57,6 +60,7 @@ def drop_contained(arm: Arm, task: Task, q: Array, sigma: Array, chosen: Bool, c
             chosen[k, i] = i == 0 or not one
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
+            wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
             if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
                 chosen[k, i] = False

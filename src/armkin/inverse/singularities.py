@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 SURE = 1e-14  # residuals below this are equal
+RESTING = 1e-9  # [rad, reaches] a radian: joints that move less do not move
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
@@ -134,6 +135,8 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     k, b = np.nonzero(valid)
     if len(k):
         sigma[k, b], V[k, b], nullity[k, b] = newton.null_space(arm, task, q[k, b], target[k])
+    # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
+    resting = (nullity == 1)[:, :, None] & (np.abs(V[:, :, -1]) < RESTING)
     # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
     rank = np.maximum(size, SURE)
     rank[:, 0] = 0.0
@@ -174,6 +177,10 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         if (some := np.flatnonzero(far.any(axis=1))).size:
             at, goal = q[k[some], b[some]], target[k[some]]
             mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
+            i, c = np.nonzero(far & mine & (resting[k] & joints[:, None]).any(axis=2))  # where another curve crosses
+            ask(k[i], c)
+            rests = resting[k[i], c] & ~which[k[i], c]
+            mine[i, c] &= ~(moves[k[i], c] & (joints[i] & rests).any(axis=1))
         mine[np.arange(len(k)), b] = True
         on = mine  # but not what is one with it in a valley beside the self-motion
         mine = on | one
@@ -192,7 +199,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
-    self_motions.drop_contained(arm, task, q, sigma, chosen, curve, target)
+    self_motions.drop_contained(arm, task, q, sigma, resting, chosen, curve, target)
     self_motions.drop_twins(arm, task, q, chosen, curve, target)
     order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
     there = np.take_along_axis(chosen, order, axis=1)
