@@ -11,6 +11,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
+from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import missing as missed
 
 CASES = [
@@ -44,6 +45,18 @@ def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: li
     other = np.array([*other[:3, 3], *other[:3, 2]]) if task is not None else other
     batch = armkin.ik(arm, np.array([other, target]), task)
     np.testing.assert_array_equal(batch.q[1][batch.valid[1]], s.q[s.valid])
+
+
+def test_what_else_was_found_stays_beside_a_legal_posture() -> None:
+    """Self-motions cross where `near` stands, outside its limits; those of joints 4 and 6 were listed no more."""
+    arm, _ = shipped("wx250s")
+    q = np.radians([0.0, 90, 90, 180, 180, 180])
+    s = armkin.ik(arm, armkin.fk(arm, q), near=q)
+    assert s.best >= 0
+    found = s.q[s.valid]
+    assert len(found) == 8
+    same = np.abs(newton.difference(arm, found, q))[:, [0, 1, 2, 4]].max(axis=1) < 1e-9
+    assert same.sum() == 1
 
 
 def narrowed(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]:

@@ -12,7 +12,7 @@ import armkin
 from armkin.errors import UsageError
 from armkin.inverse.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.arm import Arm
+from armkin.model.arm import Arm, from_links
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
@@ -60,7 +60,13 @@ def test_seven_joints_have_a_pose_and_one_too_many() -> None:
             armkin.ik(taskless(name), np.eye(4))
 
 
-def test_no_task_fits_joints_that_reach_no_position_at_will() -> None:
+def test_an_arm_without_a_task_says_what_to_ask_for() -> None:
     arm = armkin.lock(taskless("ur5e"), {"J1": 0.0, "J5": 1.57, "J6": 0.0})  # three parallel axes, not along z
-    with pytest.raises(UsageError, match="no task fits"):
+    with pytest.raises(UsageError, match=r"no task fits .* 3 joints \(RRR\) by itself: ask for task pose"):
         armkin.ik(arm, [0, 0, 0])
+    q = np.array([0.3, 0.4, 0.5])
+    found = armkin.ik(arm, armkin.fk(arm, q), "pose")
+    assert np.abs(found.q[found.valid] - q).max(axis=1).min() < 1e-9
+    four = from_links(np.tile(np.eye(4) + 100.0 * np.eye(4, k=3), (5, 1, 1)), [False] * 4)  # in the x-y plane
+    with pytest.raises(UsageError, match="move the tool in 3 of its six directions"):
+        armkin.ik(four, [0, 0, 0])

@@ -6,17 +6,17 @@ double root at a limit is off it by as much as arithmetic can tell its halves ap
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
+from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
-from armkin.inverse.batch import Batch, Goals, wider
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse import singularities
+from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closest import closest
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
-from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.solutions import Status
 from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
@@ -24,12 +24,18 @@ OFF = 1e-7  # [rad, reaches] how far outside limits a double root may be that st
 MOVES = 1e-12  # smallest singular value of a posture on a self-motion, not in a valley
 
 
-def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions]) -> Batch:
+def listed(goals: Goals, out: Batch) -> Batch:
     """The same branches, with legal ones for targets on an edge that have none, where such a posture is found.
 
-    goals, out: N targets and their branches; again: the solver, for a target and another `near`.
+    goals, out: N targets and their branches. The legal posture takes the place of the one that it shares a self-motion
+    with, as `near` would.
     """
     arm, task, target, near = goals
+
+    def no_more(rows: NDArray[np.int64], lost: Bool) -> tuple[Array, NDArray[np.int64]]:
+        """Further candidates: none, those that were found are all."""
+        return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64)
+
     edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
     for k in edge[~out.within[edge].any(axis=1)]:
         q = out.q[k, out.valid[k]]
@@ -45,19 +51,18 @@ def listed(goals: Goals, out: Batch, again: Callable[[Array, Array], Solutions])
             legal = exact[0]
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
-        # of a self-motion as exact as what was listed; with a margin, for `again` has to take it as a branch
+        # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
         if miss > (0.9 * SOLUTION if hair.any() else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
             continue
-        found = again(target[k], legal)
-        if found.best < 0:
+        beside = Goals(arm, task, target[k : k + 1], legal[None])
+        label = out.branch[k, out.valid[k]].astype(np.int64)
+        found = singularities.examine(beside, q[None], label, np.zeros((1, len(q)), bool), no_more)
+        _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
+        if not (inside & found.valid[0]).any():
             continue
-        width = found.q.shape[0]
-        if width > out.q.shape[1]:
-            out = wider(out, width)
-        out.q[k], out.valid[k], out.within[k], out.branch[k] = np.nan, False, False, -1
-        copies, inside = nearest_row(arm, np.nan_to_num(found.q), near[k])
-        out.q[k, :width] = np.where(found.valid[:, None], copies, np.nan)
-        out.valid[k, :width], out.within[k, :width] = found.valid, inside & found.valid
-        out.branch[k, :width] = found.branch
-        out.status[k], out.free[k], out.complete[k] = found.status, found.free, found.complete
+        if found.q.shape[1] > out.q.shape[1]:
+            out = wider(out, found.q.shape[1])
+        row = np.array([k])
+        write(arm, out, row, found.q, found.valid, named(found.label, found.valid), near[row])
+        out.status[row], out.free[row] = found.status, found.free
     return out

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from armkin.errors import RedundantArmError, UsageError
+from armkin.errors import UsageError
 from armkin.inverse import general, nearly_special, tool_axis
 from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.tasks.fitting import default_task, rank, task_for
+from armkin.inverse.tasks.fitting import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import actual
 
@@ -31,7 +31,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     task = task_for(arm, task_name)
     if arm.n > task.constraints:
         surplus = arm.n - task.constraints
-        raise _redundant(
+        raise redundant(
             arm,
             surplus,
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
@@ -45,7 +45,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             f"{effective} at a time:\nthere would be infinitely many solutions or none"
         )
         if usual in (None, task.name):
-            raise _redundant(arm, arm.n - effective, problem)
+            raise redundant(arm, arm.n - effective, problem)
         raise UsageError(f"{problem}; its usual task is {usual}", robot=arm.name, task=task.name, usual_task=usual)
     for recognise in _CLASSES:
         geometry = recognise(arm, task)
@@ -56,12 +56,6 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     joints = f"the {arm.n} joints that are not held" if arm.held else f"its {arm.n} joints"
     hint = hint or ("; hold fewer joints" if arm.held else "")
     raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}", robot=arm.name, task=task.name)
-
-
-def _redundant(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
-    names = list(arm.joint_names)
-    advice = f"hold {surplus} of {', '.join(names)} with armkin.lock(arm, {{joint: value}})"
-    return RedundantArmError(problem, advice=advice, robot=arm.name, joints=names, surplus=surplus)
 
 
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:

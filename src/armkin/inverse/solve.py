@@ -89,11 +89,7 @@ def ik(
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
     if examine:
-        out = legal_postures.listed(
-            Goals(arm, definition, target, each),
-            out,
-            lambda goal, close: ik(arm, goal, definition.name, near=close),
-        )
+        out = legal_postures.listed(Goals(arm, definition, target, each), out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:

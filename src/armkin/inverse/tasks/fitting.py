@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.errors import UsageError
+from armkin.errors import RedundantArmError, UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
@@ -27,16 +27,31 @@ def task_for(arm: Arm, name: str | None = None) -> Task:
     """
     name = name or arm.task or default_task(arm)
     if name is None:
-        raise UsageError(
-            f"{arm.name}: no task fits its {_joints(arm)}: there is no position that it could reach at will; "
-            "fk, pulses and workspace work, ik does not"
-        )
+        raise _taskless(arm)
     if name not in LABELS:
         raise UsageError(f"unknown task '{name}'; tasks are {', '.join(LABELS)}")
     task = _BUILDERS[name](arm, name)
     if isinstance(task, str):
         raise UsageError(f"{arm.name}: task {name} does not fit its {_joints(arm)}: {task}")
     return task
+
+
+def _taskless(arm: Arm) -> UsageError:
+    """What to say of an arm whose structure suggests no task."""
+    problem = f"{arm.name}: no task fits its {_joints(arm)} by itself"
+    if arm.n == 1:
+        return UsageError(f"{problem}: fk, pulses and workspace work, ik does not")
+    free = rank(arm, _free(arm, "pose"))
+    if free < arm.n:
+        return redundant(arm, arm.n - free, f"{problem}: together they move the tool in {free} of its six directions")
+    return UsageError(f"{problem}: ask for task pose, whole poses of which it reaches some")
+
+
+def redundant(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
+    """The error of an arm so many of whose joints have to be held."""
+    names = list(arm.joint_names)
+    advice = f"hold {surplus} of {', '.join(names)} with armkin.lock(arm, {{joint: value}})"
+    return RedundantArmError(problem, advice=advice, robot=arm.name, joints=names, surplus=surplus)
 
 
 def default_task(arm: Arm) -> str | None:
