@@ -387,3 +387,12 @@ def test_a_folded_arm_of_equal_links_beside_its_kite() -> None:
         s = armkin.ik(arm, target, near=np.radians(near))
         folded = np.abs(np.cos(s.q[s.valid][:, 2]) + 1.0) < 1e-9
         assert (int(folded.sum()), int(s.valid.sum())) == (1, 6)
+
+
+def test_self_motions_that_cross_are_found_from_anywhere() -> None:
+    """Joint 1 turns with the wrist; where the wrist is straight joints 4 and 6 turn. From some 4 of 8 were found."""
+    arm, _ = shipped("wx250s")
+    target = armkin.fk(arm, np.radians([0.0, 90.0, 90.0, 90.0, 180.0, 0.0]))
+    near = np.radians([[47, -79, -158, -166, 108, 142], [123, -160, 79, -112, 125, 14], [32, -56, -37, 134, -94, 42]])
+    for one in near:
+        assert armkin.ik(arm, target, near=one).valid.sum() == 8

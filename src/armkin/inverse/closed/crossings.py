@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near there
 MOST = 12  # places looked at for each target
 AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
+ONE = 0.13  # [rad, reaches] places closer than this are one: half of the steps that are looked at
 STEP = 1.0  # [rad, reaches] joints that move farther from one step to the next are not on one curve
 
 
@@ -46,28 +47,43 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         product = np.linalg.det(U) * np.linalg.det(V) * S[:, :-1].prod(axis=1)
         bordered[some] = np.concatenate([product[:, None], U[:, :, -1], V[:, -1]], axis=1)
         way, share = _change(arm, q, bordered.reshape(N, steps, B, -1))
-        changes = ~np.isnan(share) & ~found
+        changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         found |= changes
+        second[changes] = 0.0  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         with np.errstate(invalid="ignore"):
             twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
         found[:, :, b] &= ~twin.any(axis=2)
-    lowest = np.argsort(np.where(found, second, np.inf).reshape(N, -1), axis=1)[:, :MOST]
-    at = np.take_along_axis(place.reshape(N, -1, n), lowest[:, :, None], axis=1)
-    at = np.where(np.take_along_axis(found.reshape(N, -1), lowest, axis=1)[:, :, None], at, np.nan).reshape(-1, n)
+    at = _apart(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
     out = np.full((len(at), 8, n), np.nan)
     some = np.flatnonzero(~np.isnan(at).any(axis=1))
-    _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, lowest.shape[1], axis=0)[some])
+    _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, MOST, axis=0)[some])
     one, other = V[:, rank - 1], V[:, rank - 2]
     ways = np.stack([one, other, (one + other) / 2**0.5, (one - other) / 2**0.5], axis=1)
     start = (at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
-    goal = np.repeat(target, lowest.shape[1], axis=0)[np.repeat(some, 8)]
+    goal = np.repeat(target, MOST, axis=0)[np.repeat(some, 8)]
     there, size = newton.correct(arm, task, start, goal, steps=10)
     # what falls back stands for no self-motion: it is on both, nearly
     back = np.abs(newton.difference(arm, there, np.repeat(at[some], 8, axis=0))).max(axis=1) < 0.5 * AWAY
     out[some] = np.where((back | (size > SEED))[:, None], np.nan, there).reshape(-1, 8, n)
     return out.reshape(N, -1, n)
+
+
+def _apart(arm: Arm, place: Array, second: Array) -> Array:
+    """Of places (N, P, n) the `MOST` with the smallest second singular values (N, P), each crossing once; else nan."""
+    out = np.full((len(place), MOST, arm.n), np.nan)
+    for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
+        order = np.argsort(second[k], kind="stable")
+        count = 0
+        for at in place[k, order[: np.isfinite(second[k]).sum()]]:
+            with np.errstate(invalid="ignore"):
+                known = np.abs(newton.difference(arm, out[k, :count], at)).max(axis=1, initial=0.0) < ONE
+            if not known.any():
+                out[k, count], count = at, count + 1
+                if count == MOST:
+                    break
+    return out
 
 
 def _least(second: Array) -> Bool:
