@@ -17,6 +17,7 @@ SOURCE = Path(__file__).parents[1] / "src"
 MAY_IMPORT: dict[str, str] = {
     "errors": "",
     "board_kinds": "",
+    "signals": "",
     "files": "errors",
     "formula": "errors",
     "robot_file": "errors files board_kinds",
@@ -50,7 +51,7 @@ MAY_IMPORT: dict[str, str] = {
     "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
     "board/kinds": "errors board_kinds formula robot_file model motors motion board/ports board/backend board/firmware"
     " board/grbl board/feetech board/klipper board/sim",
-    "board": "errors board_kinds formula robot_file model forward motors motion board/ports board/backend"
+    "board": "errors signals board_kinds formula robot_file model forward motors motion board/ports board/backend"
     " board/firmware board/grbl board/feetech board/klipper board/kinds board/sim",
     "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/kinds board/sim",

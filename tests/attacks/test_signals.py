@@ -84,7 +84,7 @@ def test_ctrl_c_while_modules_are_imported_is_silent() -> None:
     began = time.monotonic()
     subprocess.run([*ARMKIN, "fk", "three_dof", "home"], check=True, capture_output=True)
     whole = time.monotonic() - began
-    # the garbage collector's setting is the first thing that it does
+    # the garbage collector's setting is the first thing that it does with signals taken
     program = "import armkin.cli, gc, types; tell = lambda *numbers: print(flush=True)\n"
     program += "armkin.cli.gc = types.SimpleNamespace(set_threshold=tell); armkin.cli.main()"
     for i in range(12):

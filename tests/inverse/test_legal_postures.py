@@ -59,6 +59,17 @@ def test_what_else_was_found_stays_beside_a_legal_posture() -> None:
     assert same.sum() == 1
 
 
+def test_two_roots_in_one_stay_a_boundary_where_a_legal_one_is_found() -> None:
+    arm = armkin.load("planar_2dof")
+    q = np.array([0.3, 1e-5])  # all but stretched, and outside its limits by less than arithmetic can tell
+    lower, upper = arm.lower.copy(), arm.upper.copy()
+    lower[1], upper[1] = -1e-5 + 5e-8, 1e-5 - 5e-8
+    arm = replace(arm, lower=lower, upper=upper)
+    s = armkin.ik(arm, armkin.fk(arm, q)[:2, 3], "xy", near=[0.1, 0.2])
+    assert s.best >= 0
+    assert s.status == Status.BOUNDARY
+
+
 def narrowed(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]:
     """An arm with a wrist whose joints have so many degrees each, around random middles; joint 5 passes zero."""
     arm, rng = armkin.load(robot), np.random.default_rng(4)

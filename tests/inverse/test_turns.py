@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,19 @@ def test_a_ur_has_copies_by_the_dozen() -> None:
         assert len(turns(arm, row)) == 2**two
 
 
+def test_the_first_of_all_copies_is_the_branch_at_half_a_turn_too() -> None:
+    """Both copies of a joint half a turn from `near` are as far."""
+    arm = armkin.load(ROBOTS / "ur5e.yaml")
+    rng = np.random.default_rng(2)
+    q, near = (np.pi / 4 * rng.integers(-4, 5, (40, 6)) for _ in range(2))
+    s = armkin.ik(arm, armkin.fk(arm, q), near=near)
+    best = np.take_along_axis(s.q, s.best[:, None, None], axis=1)[:, 0]
+    assert (s.best >= 0).all()
+    assert (np.abs(np.abs(best - near) - np.pi) < 1e-9).any()
+    for row, close in zip(best, near, strict=True):
+        np.testing.assert_allclose(turns(arm, row, close)[0], row, rtol=0, atol=1e-9)
+
+
 def test_best_is_the_legal_branch_that_moves_least() -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
     rng = np.random.default_rng(5)
@@ -109,8 +123,19 @@ def test_best_is_the_legal_branch_that_moves_least() -> None:
     np.testing.assert_allclose(s.motion[s.valid], motion[s.valid])
     legal = np.where(s.within_limits, motion, np.inf)
     np.testing.assert_array_equal(s.best, legal.argmin(axis=1))
+    np.testing.assert_array_equal(s.best, s.order[:, 0])
     ranked = np.take_along_axis(np.where(s.valid, motion + 1e6 * ~s.within_limits, np.inf), s.order, axis=1)
     finite = np.nan_to_num(ranked, posinf=1e12)
     assert (np.diff(finite, axis=1) >= 0).all()
     inside = (s.q >= arm.lower - 1e-9) & (s.q <= arm.upper + 1e-9)
     np.testing.assert_array_equal(s.within_limits, inside.all(axis=2) & s.valid)
+
+
+def test_of_branches_that_move_the_joints_equally_the_first_is_best() -> None:
+    arm = planar([(-180, 180), (-180, 180)])
+    s = armkin.ik(arm, [300.0, 200.0], near=[np.arctan2(2, 3), 0.0])  # elbow up and down, as far on either side
+    assert abs(s.motion[0] - s.motion[1]) < 1e-9
+    for noise in (-1e-13, 1e-13):
+        shaken = replace(s, q=s.q + np.array([[noise, noise], [0.0, 0.0]]))
+        assert shaken.best == 0
+        assert shaken.order.tolist() == [0, 1]

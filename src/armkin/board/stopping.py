@@ -5,8 +5,10 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 from armkin.board.backend import StoppedError
+from armkin.signals import put_off
 
 
 class Stop:
@@ -19,8 +21,10 @@ class Stop:
     def __call__(self) -> bool:
         return self.signal != 0
 
-    def caught(self, number: int, frame: object) -> None:
+    def caught(self, number: int, frame: FrameType | None) -> None:
         """The signal handler; a second Ctrl-C does not wait for the board."""
+        if (self.signal or self.at_once) and put_off(number, frame):
+            return
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number

@@ -14,7 +14,6 @@ inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or 
 rows.py            many of them in chunks; csv_rows.py: from CSV; batch.py: their answers
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
 default_port.py    the port; board_link.py: an open machine, signals
-signals.py         Ctrl-C and its like while modules are imported
 
 What is printed:
 
@@ -33,7 +32,7 @@ import io
 import os
 import sys
 
-from armkin.cli.signals import interrupted
+from armkin.signals import interrupted
 
 TYPE_CHECKING = False  # importing typing takes long enough for a Ctrl-C, which `main` takes care of
 

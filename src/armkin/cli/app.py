@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 from armkin.cli import output
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
-from armkin.cli.signals import put_off
+from armkin.signals import put_off
 
 _INTERRUPTED = 130
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}

@@ -58,11 +58,6 @@ class StraightLineCode:
         finally:
             np.setbufsize(before)
 
-    @property
-    def outputs(self) -> list[Any]:
-        """What is recorded of each output: a node, an array or a number."""
-        return self._recording.outputs
-
     def axes(self) -> list[tuple[int, ...]]:
         """Lengths of the branch axes of each output."""
         from armkin.formula.recording import axes_of
@@ -90,8 +85,7 @@ class StraightLineCode:
 class LazyCode:
     """Straight-line code that is recorded at the first batch of 64 or at the fifth call: it takes milliseconds.
 
-    Recorded or not, a batch is computed by the same operations of numpy; a single target is always computed in
-    plain Python. So no result depends on what was asked before.
+    Recorded or not, it is computed by the same operations of numpy, so that no result depends on what was asked before.
     """
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:

@@ -73,13 +73,13 @@ def solve(
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
             edge = _keep(goals, runner.axes, out.part(some), found, close, there)
-            if len(edge):
+            if examine and len(edge):
                 doubts.append(as_doubts(runner, found, start + edge, edge))
         return doubts
 
     parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
     doubts = [doubt for one_part in parts for doubt in one_part]
-    if examine and doubts:
+    if doubts:
         together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
         out = decided(Goals(arm, task, target, near), runner, out, together)
     return Solved(out, math.prod(runner.axes), target, rounding)

@@ -64,5 +64,6 @@ def listed(goals: Goals, out: Batch) -> Batch:
             out = wider(out, found.q.shape[1])
         row = np.array([k])
         write(arm, out, row, found.q, found.valid, named(found.label, found.valid), near[row])
-        out.status[row], out.free[row] = found.status, found.free
+        out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed
+        out.free[k] |= found.free[0]
     return out

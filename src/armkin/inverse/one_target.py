@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
-from armkin.formula.recording import axes_of
 from armkin.forward import point_numbers
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.turns import TURN, nearest_number
@@ -60,14 +59,13 @@ class OneTarget:
         definition, geometry = solver(arm, task)
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
-        code = recorded(arm, definition, geometry).code
-        self._run, self._off = code.numbers(), rotation_check().numbers()
+        runner = recorded(arm, definition, geometry)
+        self._run, self._off = runner.code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, room(arm)
         self._home_tip = self._point(*arm.home.tolist())
         self._close = [THERE * unit for unit in radian_or_reach(arm).tolist()]
-        own = [axes_of(x) for x in code.outputs]
-        axes = np.broadcast_shapes((1, 1, 1), *own[: arm.n])
+        own, axes = runner.code.axes(), runner.axes
         self.count = math.prod(axes)
         self._plain = [not a for a in own]  # outputs that are a number, not a tuple
         places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in own[: arm.n + 1]]

@@ -43,8 +43,9 @@ def drop_contained(
 ) -> None:
     """Of self-motions through each other keep the one of more joints, and no root of high order beside or on one.
 
-    Changes chosen (K, M); curve, resting: (K, M, n) the joints that a posture's self-motion moves, and those that rest
-    there, so that they rest on all of a curve if they do on a part of it. `near`, the first, stays.
+    Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves; resting: (K, M, n) joints
+    that do not move along the one direction that it loses: a curve that moves such a joint is another. `near`, the
+    first, stays.
     """
     for k in np.flatnonzero(curve.any(axis=(1, 2))):
         mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))

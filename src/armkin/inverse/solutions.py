@@ -72,7 +72,7 @@ class Solutions:
     @cached_property
     def order(self) -> NDArray[np.intp]:
         """(..., B) branches by rank: within limits first, then by motion, equal ones as listed, missing ones last."""
-        key = np.where(self.valid, self.motion.round(EQUAL), np.inf)
+        key = _rounded(np.where(self.valid, self.motion, np.inf))
         by_motion = np.argsort(key, axis=-1, kind="stable")
         outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
         by_limits = np.argsort(outside, axis=-1, kind="stable")
@@ -81,10 +81,10 @@ class Solutions:
     @cached_property
     def best(self) -> NDArray[np.intp]:
         """(...) index of the branch within limits that moves the joints least, the first of equal ones, or -1."""
-        key = np.where(self.within_limits, self.motion.round(EQUAL), np.inf)
+        key = np.where(self.within_limits, self.motion, np.inf)
         if not key.shape[-1]:  # no target of the batch has a branch
             return np.full(self.status.shape, -1)
-        index = np.argmin(key, axis=-1)
+        index = np.argmin(_rounded(key), axis=-1)
         return np.where(np.isfinite(np.min(key, axis=-1)), index, -1)
 
     def residual(self) -> tuple[Array, Array]:
@@ -99,3 +99,9 @@ class Solutions:
         mm = np.linalg.norm(missing[:, :p], axis=1).reshape(self.valid.shape)
         rad = np.linalg.norm(missing[:, p:], axis=1).reshape(self.valid.shape)
         return mm, rad
+
+
+def _rounded(motion: Array) -> Array:
+    """How much more than the least (..., B) of each target, inf where there is none: equal if rounding explains it."""
+    least = motion.min(axis=-1, initial=np.inf, keepdims=True)
+    return (motion - np.where(np.isfinite(least), least, 0.0)).round(EQUAL)

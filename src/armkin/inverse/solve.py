@@ -173,7 +173,7 @@ def _rows(
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
         out = examined(goals, out, doubtful, candidates, others, unsettled)
-        order = projection(arm.prismatic, out.q[doubtful]).argsort(axis=1)  # as those of all other targets
+        order = projection(arm.prismatic, out.q[doubtful]).argsort(axis=1)  # one order, whatever was found first
         for array in (out.q, out.valid, out.within, out.branch):
             some = array[doubtful]
             array[doubtful] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)

@@ -40,7 +40,7 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
             return value, True
         return value, (value >= low) & (value <= high)
     at_zero = isinstance(near, float) and near == 0.0
-    principal = value
+    given = value
     if at_zero:
         value = _principal(value)
     else:
@@ -60,13 +60,15 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
         fits = below & (moved <= upper + SLACK)
         value, below = np.where(fits, moved, value), below & ~fits
-    if lower < last + 3 * SLACK and above.any():
+    if (
+        lower < last + 3 * SLACK and above.any()
+    ):  # a copy is SLACK above the lower end, where a legal one may be below it
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)
         value, above = np.where(fits, moved, value), above & ~fits
     outside = below | above
     if not at_zero and outside.any():
-        value = np.where(outside, _principal(principal), value)
+        value = np.where(outside, _principal(given), value)
     return value, ~outside
 
 
@@ -148,9 +150,9 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
-    q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n). An unlimited revolute
-    joint has copies without end: it gives the one nearest to `near` alone. Raises UsageError for more
-    than `MOST` copies.
+    q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n); of equal motions the copy above `near` is first.
+    An unlimited revolute joint has copies without end: it gives the one nearest to `near` alone. Raises UsageError for
+    more than `MOST` copies.
 
     >>> import armkin
     >>> arm = armkin.load("robots/ur5e.yaml")  # limits of +-360 degrees, joint 3 of +-180
@@ -173,7 +175,7 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
         else:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))
             last = int(np.floor((upper + SLACK - row[i]) / TURN))
-            choices.append([float(row[i] + TURN * k) for k in range(first, last + 1)])
+            choices.append([float(row[i] + TURN * k) for k in range(last, first - 1, -1)])
     count = math.prod(map(len, choices))
     if count > MOST:
         raise UsageError(

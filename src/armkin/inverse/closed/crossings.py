@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near there
 MOST = 12  # places looked at for each target
 AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
-ONE = 0.13  # [rad, reaches] places closer than this are one: half of the steps that are looked at
+ONE = 0.13  # [rad, reaches] places closer than this are one: half a step of a joint that turns
 STEP = 1.0  # [rad, reaches] joints that move farther from one step to the next are not on one curve
 
 
@@ -50,7 +50,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         found |= changes
-        second[changes] = 0.0  # there, not at a step beside it
+        second[changes] *= 1e-3  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         with np.errstate(invalid="ignore"):
             twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME

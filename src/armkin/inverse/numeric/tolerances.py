@@ -17,6 +17,7 @@ BESIDE = 0.2  # postures of self-motions this close are asked whether they are o
 TURNED = 1e-5  # joints that a self-motion holds differ by less along it
 DRIFT = 1e-3  # and those that it moves, but too slowly to be called free
 THERE = 1e-11  # [rad, reaches] a branch this close to `near` is there: `near` solves the target, too
+EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones
 
 # ---- how singular
 HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
@@ -47,4 +48,3 @@ HALFWAY = 1e-13  # residual of a point halfway between two answers that makes th
 ILL = 1e4  # norm of the inverse Jacobian from which on an answer is near a singularity
 INFINITE = 1e4  # a prismatic value that is a root at infinity, seen through rounding
 AT_ZERO = 1e-6  # virtual joints closer to zero than this are worth correcting
-EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones

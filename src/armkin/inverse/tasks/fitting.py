@@ -39,9 +39,9 @@ def task_for(arm: Arm, name: str | None = None) -> Task:
 def _taskless(arm: Arm) -> UsageError:
     """What to say of an arm whose structure suggests no task."""
     problem = f"{arm.name}: no task fits its {_joints(arm)} by itself"
-    if arm.n == 1:
-        return UsageError(f"{problem}: fk, pulses and workspace work, ik does not")
     free = rank(arm, _free(arm, "pose"))
+    if free < 2:
+        return UsageError(f"{problem}: fk, pulses and workspace work, ik does not")
     if free < arm.n:
         return redundant(arm, arm.n - free, f"{problem}: together they move the tool in {free} of its six directions")
     return UsageError(f"{problem}: ask for task pose, whole poses of which it reaches some")

@@ -122,7 +122,7 @@ int arm_best(const arm_solution *found, int count, const arm_real *near)
         arm_real motion = 0;
         for (j = 0; j < ARM_JOINTS; j++)
             motion += ARM_ABS(found[b].q[j] - near[j]) * (arm_slides[j] ? 1 : (arm_real)180 / ARM_PI);
-        if (found[b].within_limits && (best < 0 || motion < least - ARM_SLACK * 180 / ARM_PI)) { /* of equal ones the first */
+        if (found[b].within_limits && (best < 0 || motion < least - ARM_EQUAL)) { /* of equal ones the first */
             best = b;
             least = motion;
         }

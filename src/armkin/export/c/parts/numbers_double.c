@@ -2,6 +2,7 @@
 #define ARM_PI 3.141592653589793
 #define ARM_TURN 6.283185307179586
 #define ARM_SLACK 1e-9 /* rad or mm: a joint this far outside still counts as on its limit */
+#define ARM_EQUAL 5e-7 /* degrees or mm: motions that differ by less are equal */
 #define ARM_INFINITY ((double)INFINITY)
 #define ARM_SQRT(x) sqrt(x)
 #define ARM_CBRT(x) cbrt(x)

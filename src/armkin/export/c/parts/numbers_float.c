@@ -2,6 +2,7 @@
 #define ARM_PI 3.1415927f
 #define ARM_TURN 6.2831853f
 #define ARM_SLACK 1e-5f /* rad or mm: a joint this far outside still counts as on its limit */
+#define ARM_EQUAL 5e-4f /* degrees or mm: motions that differ by less are equal */
 #define ARM_INFINITY INFINITY
 #define ARM_SQRT(x) sqrtf(x)
 #define ARM_CBRT(x) cbrtf(x)
