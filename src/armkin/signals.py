@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
 _AGAIN_S = 0.001
+_waiting: set[int] = set()  # signals that come again
 _NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # one module goes by its first two names
 
 
@@ -31,7 +32,9 @@ def put_off(number: int, frame: FrameType | None) -> bool:
         frame = frame.f_back
     if frame is None:
         return False
-    _thread.start_new_thread(_again, (number, _thread.get_ident()))
+    if number not in _waiting:
+        _waiting.add(number)
+        _thread.start_new_thread(_again, (number, _thread.get_ident()))
     return True
 
 
@@ -39,6 +42,7 @@ def _again(number: int, main: int) -> None:
     import signal
 
     time.sleep(_AGAIN_S)
+    _waiting.discard(number)
     if sys.platform == "win32":
         _thread.interrupt_main(number)
     else:

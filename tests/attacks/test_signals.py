@@ -122,6 +122,21 @@ import numpy
         assert process.stderr.read() == b""
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_a_signal_while_a_plan_imports_a_module_with_a_port_open(tmp_path: Path) -> None:
+    (tmp_path / "half.py").write_text("""
+import os, signal
+class Late:
+    def __set_name__(self, owner, name): os.kill(os.getpid(), signal.SIGINT)
+class Half: late = Late()
+""")
+    program = "import time; from armkin.board.stopping import planning, stoppable\n"
+    program += "with stoppable(), planning():\n    import half\n    time.sleep(60)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment)
+    assert (done.returncode, done.stderr) == (130, "")
+
+
 def test_the_command_line_imports_next_to_nothing_before_it_takes_signals() -> None:
     program = "import sys; before = set(sys.modules); import armkin.cli; print(*sorted(set(sys.modules) - before))"
     program = f"import sys; sys.path.insert(0, {str(ROOT / 'src')!r}); {program}"
