@@ -396,3 +396,12 @@ def test_self_motions_that_cross_are_found_from_anywhere() -> None:
     near = np.radians([[47, -79, -158, -166, 108, 142], [123, -160, 79, -112, 125, 14], [32, -56, -37, 134, -94, 42]])
     for one in near:
         assert armkin.ik(arm, target, near=one).valid.sum() == 8
+
+
+def test_a_self_motion_that_hardly_turns_joint_6_is_listed_once() -> None:
+    """Axes 1 and 4 all but in one line: while they turn by 57 degrees joint 6 turns by 0.07, and there were two."""
+    arm, _ = shipped("irb2400")
+    q = [-15.117339140, -160.561638794, -109.409431080, -58.906870688, -21.966855012, 96.853237894]
+    s = armkin.ik(arm, armkin.fk(arm, np.radians(q)))
+    assert s.status == Status.SINGULAR
+    assert s.valid.sum() == 4

@@ -15,7 +15,7 @@ SAME = 1e-7  # distance of joint values that rounding explains
 HAIR = 0.05  # branches this close are one if the posture between them solves the target, too
 BESIDE = 0.2  # postures of self-motions this close are asked whether they are one
 TURNED = 1e-5  # joints that a self-motion holds differ by less along it
-DRIFT = 1e-3  # and those that it moves, but too slowly to be called free
+DRIFT = 2e-3  # and those that it moves, but too slowly to be called free
 THERE = 1e-11  # [rad, reaches] a branch this close to `near` is there: `near` solves the target, too
 EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones
 
