@@ -78,7 +78,7 @@ class UsageError(ArmkinError, ValueError):
 
 
 class RedundantArmError(UsageError):
-    """An arm has more joints than its task has constraints, or than one more moves; fields: robot, joints, surplus."""
+    """An arm has joints beyond its task's constraints, or that move alike; fields: robot, joints, surplus."""
 
 
 class NoHomingError(UsageError):

@@ -40,13 +40,9 @@ def test_near_as_a_batch_is_near_one_by_one(name: str) -> None:
 @pytest.mark.parametrize("near", [0.0, -90.0, 90.0])
 def test_half_a_turn_from_near_is_above_it(near: float) -> None:
     arm = shipped("ur5e")[0]  # limits of 360 degrees, so that both copies are legal, but for joint 3
-    target = armkin.fk(
-        arm, np.radians([[180.0, -90.0, 90.0, -90.0, -90.0, 180.0], [90.0, 180.0, 45.0, 0.0, 90.0, -90.0]])
-    )
-    for found in (
-        armkin.ik(arm, target, near=np.full(6, np.radians(near))),
-        armkin.ik(arm, target[0], near=np.full(6, np.radians(near))),
-    ):
+    q = np.radians([[180.0, -90.0, 90.0, -90.0, -90.0, 180.0], [90.0, 180.0, 45.0, 0.0, 90.0, -90.0]])
+    target, close = armkin.fk(arm, q), np.full(6, np.radians(near))
+    for found in (armkin.ik(arm, target, near=close), armkin.ik(arm, target[0], near=close)):
         away = np.degrees(found.q - found.near[..., None, :])[..., [0, 1, 3, 4, 5]]
         half = np.abs(np.abs(away) - 180.0) < 1e-7
         assert half.any()

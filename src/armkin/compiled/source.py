@@ -131,8 +131,8 @@ def _choose(arm: Arm, branches: int) -> str:
             loops.append(copied)
             continue
         # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
-        turned = _every(f"{at} += ARM_TURN * ARM_FLOOR(({close} + (ARM_PI + ARM_SLACK) - {at}) / ARM_TURN);")
-        positive = _every(f"{at} = {at} < ARM_SLACK - ARM_PI ? {at} + ARM_TURN : {at};")
+        turned = _every(f"{at} = arm_nearest({at}, {close});")
+        positive = _every(f"{at} = arm_principal({at});")
         wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
         loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))

@@ -141,10 +141,7 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
     held = [request.arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     for answer in answers:
         near = units.joints_in(request.arm, request.near_out)
-        branches = sorted(
-            (_nearer(request.arm, branch, near, held) for branch in answer.branches),
-            key=_rank,
-        )
+        branches = sorted((_nearer(request.arm, branch, near, held) for branch in answer.branches), key=_rank)
         names = tuple(dict.fromkeys(branch.name for branch in branches))
         wanted = set(names)
         if request.branch is not None:

@@ -60,9 +60,8 @@ def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
         fits = below & (moved <= upper + SLACK)
         value, below = np.where(fits, moved, value), below & ~fits
-    if (
-        lower < last + 3 * SLACK and above.any()
-    ):  # a copy is SLACK above the lower end, where a legal one may be below it
+    # a copy is up to SLACK above the half turn, and a legal one as far below the lower end
+    if lower < last + 3 * SLACK and above.any():
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)
         value, above = np.where(fits, moved, value), above & ~fits

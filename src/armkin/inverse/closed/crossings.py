@@ -74,12 +74,10 @@ def _apart(arm: Arm, place: Array, second: Array) -> Array:
     """Of places (N, P, n) the `MOST` with the smallest second singular values (N, P), each crossing once; else nan."""
     out = np.full((len(place), MOST, arm.n), np.nan)
     for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
-        order = np.argsort(second[k], kind="stable")
+        found = np.flatnonzero(np.isfinite(second[k]))
         count = 0
-        for at in place[k, order[: np.isfinite(second[k]).sum()]]:
-            with np.errstate(invalid="ignore"):
-                known = np.abs(newton.difference(arm, out[k, :count], at)).max(axis=1, initial=0.0) < ONE
-            if not known.any():
+        for at in place[k, found[np.argsort(second[k, found], kind="stable")]]:
+            if not (np.abs(newton.difference(arm, out[k, :count], at)).max(axis=1) < ONE).any():
                 out[k, count], count = at, count + 1
                 if count == MOST:
                     break
