@@ -140,7 +140,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "motion/test_singular_paths.py": (),
     "motion/test_time_law.py": ("test_a_long_way_takes_little_memory_beside_its_own",),
     "plot/test_plot.py": (),
-    "reach/test_workspace.py": (
+    "reachability/test_workspace.py": (
         "test_a_full_disk_leaves_no_file",
         "test_few_samples_do_not_wait_for_the_volume",
         "test_memory_does_not_grow_with_the_samples",

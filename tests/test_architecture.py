@@ -33,7 +33,7 @@ MAY_IMPORT: dict[str, str] = {
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
     "motion": "errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
-    "reach": "errors files formula model forward motors",
+    "reachability": "errors files formula model forward motors",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
@@ -41,7 +41,7 @@ MAY_IMPORT: dict[str, str] = {
     "compiled": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
     " export/c",
     "view": "errors formula model forward",
-    "plot": "errors files formula model forward motion view reach",
+    "plot": "errors files formula model forward motion view reachability",
     "board/ports": "errors",
     "board/firmware": "board/backend errors board_kinds formula model forward motors motion board/ports robot_file",
     "board/backend": "formula model motion motors board/ports",
@@ -54,7 +54,8 @@ MAY_IMPORT: dict[str, str] = {
     "board": "errors signals board_kinds formula robot_file model forward motors motion board/ports board/backend"
     " board/firmware board/grbl board/feetech board/klipper board/kinds board/sim",
     "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion path_file reach view board board/ports board/backend board/firmware board/feetech board/kinds board/sim",
+    " motion path_file reachability view board board/ports board/backend board/firmware board/feetech"
+    " board/kinds board/sim",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

@@ -25,7 +25,7 @@ from armkin.motors import (
     resolution,
     rounding,
 )
-from armkin.reach.measures import measure
+from armkin.reachability.measures import measure
 
 ROOT = Path(__file__).parents[1]
 THREE_DOF = armkin.load(ROOT / "robots/three_dof.yaml")

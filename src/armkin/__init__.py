@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
     from armkin.motors import rounding as rounding
-    from armkin.reach.survey import workspace as workspace
+    from armkin.reachability.survey import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
@@ -87,7 +87,7 @@ _HOME = {
     "joints": "motors",
     "pulses": "motors",
     "rounding": "motors",
-    "workspace": "reach.survey",
+    "workspace": "reachability.survey",
 }
 
 __all__ = [*_HOME, "__version__"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.reach import workspace
+from armkin.reachability import workspace
 from command_line import ROOT, THREE_DOF, run
 
 PNG = b"\x89PNG\r\n\x1a\n"

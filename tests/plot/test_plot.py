@@ -18,7 +18,7 @@ from armkin.forward import fk
 from armkin.model.arm import from_links
 from armkin.plot import plot_poses, plot_workspace
 from armkin.plot.canvas import space, tick_step
-from armkin.reach import Workspace, workspace
+from armkin.reachability import Workspace, workspace
 from armkin.robot_file import catalogue
 from armkin.view.skeleton import skeleton
 from command_line import ROOT

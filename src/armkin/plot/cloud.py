@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.plot.canvas import INK, SOFT, flat, picture, space, true_proportions
 
 if TYPE_CHECKING:
-    from armkin.reach import Workspace
+    from armkin.reachability import Workspace
 
 COLOURS = ("manipulability", "step_error", "reach", "z")
 KEEP = 150_000  # samples of a survey that are enough for a picture: more cannot be told apart

@@ -15,7 +15,7 @@ from armkin.forward import as_joints, fk
 from armkin.forward import frames as joint_frames
 from armkin.model.limits import outside
 from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
-from armkin.reach.volume import motion
+from armkin.reachability.volume import motion
 from armkin.view.skeleton import Skeleton, skeleton
 
 if TYPE_CHECKING:

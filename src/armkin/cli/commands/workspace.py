@@ -15,7 +15,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Workspace as Answer
-    from armkin.reach import Workspace
+    from armkin.reachability import Workspace
 
 
 def workspace(
@@ -62,8 +62,8 @@ def workspace(
     half a pulse off, in the worst combination.
     """
     import armkin
-    from armkin.reach import cloud
-    from armkin.reach.sampling import MOST
+    from armkin.reachability import cloud
+    from armkin.reachability.sampling import MOST
 
     arm = inputs.load(robot)
     measures = list(dict.fromkeys(measure or ()))
@@ -75,7 +75,7 @@ def workspace(
     if plot is not None:  # say what is missing before the work, not after it
         from armkin.plot import canvas
         from armkin.plot.cloud import KEEP
-        from armkin.reach.measures import MEASURES
+        from armkin.reachability.measures import MEASURES
 
         canvas.check(plot)
         canvas.require()
@@ -108,7 +108,7 @@ def workspace(
 
 def _points(grid: str) -> list[int]:
     """`--grid 10` or `--grid 10,20,30`."""
-    from armkin.reach.sampling import MOST
+    from armkin.reachability.sampling import MOST
 
     words = grid.split(",")
     if len(words) == 1 and (parts := grid.lower().replace("*", "x").split("x"))[1:] and all(map(is_number, parts)):

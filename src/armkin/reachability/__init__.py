@@ -7,6 +7,6 @@ cloud.py     .csv, .npz, .ply
 survey.py    `workspace`: all of it in one pass of bounded memory
 """
 
-from armkin.reach.survey import Workspace, workspace
+from armkin.reachability.survey import Workspace, workspace
 
 __all__ = ["Workspace", "workspace"]

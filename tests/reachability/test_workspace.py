@@ -18,10 +18,10 @@ from armkin.forward import fk, jacobian, position
 from armkin.model.arm import Arm, from_links
 from armkin.model.rotation import transform
 from armkin.motors import joints_per_pulse, rounding
-from armkin.reach import workspace
-from armkin.reach.measures import measure
-from armkin.reach.sampling import CHUNK, Random, grid
-from armkin.reach.volume import extent
+from armkin.reachability import workspace
+from armkin.reachability.measures import measure
+from armkin.reachability.sampling import CHUNK, Random, grid
+from armkin.reachability.volume import extent
 
 ROOT = Path(__file__).parents[2]
 THREE_DOF = armkin.load(ROOT / "robots/three_dof.yaml")

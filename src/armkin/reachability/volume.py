@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.reach.sampling import span
+from armkin.reachability.sampling import span
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

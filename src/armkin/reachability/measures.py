@@ -11,7 +11,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
 from armkin.motors import joints_per_pulse
-from armkin.reach.volume import motion
+from armkin.reachability.volume import motion
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -15,10 +15,10 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
 from armkin.model.arm import actual
-from armkin.reach import cloud as clouds
-from armkin.reach.measures import MEASURES, measure
-from armkin.reach.sampling import Random, Sampling, grid
-from armkin.reach.volume import Extent, extent
+from armkin.reachability import cloud as clouds
+from armkin.reachability.measures import MEASURES, measure
+from armkin.reachability.sampling import Random, Sampling, grid
+from armkin.reachability.volume import Extent, extent
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
