@@ -23,25 +23,31 @@ MAY_IMPORT: dict[str, str] = {
     "robot_file": "errors files board_kinds",
     "model": "errors formula robot_file",
     "forward": "errors formula model",
+    "view": "errors formula model forward",
+    "keep_out/shapes": "formula robot_file model",
+    "keep_out": "errors formula robot_file model forward view keep_out/shapes",
     "inverse/tasks": "errors formula model forward",
     "inverse/numeric": "errors formula model forward inverse/tasks",
     "inverse/closed": "errors formula model forward inverse/tasks inverse/numeric",
     "inverse/elimination": "errors formula model inverse/numeric",
     "inverse/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/closed",
-    "inverse": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
+    "inverse": "keep_out keep_out/shapes"
+    " errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
     " inverse/branches",
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
-    "motion": "errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
-    "reachability": "errors files formula model forward motors",
+    "motion": "keep_out keep_out/shapes"
+    " errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
+    "reachability": "keep_out keep_out/shapes errors files formula model forward motors",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
-    "export/c": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
+    "export/c": "keep_out keep_out/shapes"
+    " errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
-    "compiled": "errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
+    "compiled": "keep_out keep_out/shapes"
+    " errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
     " export/c",
-    "view": "errors formula model forward",
-    "plot": "errors files formula model forward motion view reachability",
+    "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
     "board/ports": "errors",
     "board/firmware": "board/backend errors board_kinds formula model forward motors motion board/ports robot_file",
     "board/backend": "formula model motion motors board/ports",
@@ -51,9 +57,11 @@ MAY_IMPORT: dict[str, str] = {
     "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
     "board/kinds": "errors board_kinds formula robot_file model motors motion board/ports board/backend board/firmware"
     " board/grbl board/feetech board/klipper board/sim",
-    "board": "errors signals board_kinds formula robot_file model forward motors motion board/ports board/backend"
+    "board": "keep_out keep_out/shapes"
+    " errors signals board_kinds formula robot_file model forward motors motion board/ports board/backend"
     " board/firmware board/grbl board/feetech board/klipper board/kinds board/sim",
-    "teach": "errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
+    "teach": "keep_out keep_out/shapes"
+    " errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reachability view board board/ports board/backend board/firmware board/feetech"
     " board/kinds board/sim",
 }

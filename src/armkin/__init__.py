@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from armkin.inverse.solutions import Solutions as Solutions
     from armkin.inverse.solutions import Status as Status
     from armkin.inverse.solve import ik as ik
+    from armkin.keep_out.clearance import Clearance as Clearance
+    from armkin.keep_out.clearance import clearance as clearance
+    from armkin.keep_out.loading import load as load
     from armkin.model.arm import Arm as Arm
-    from armkin.model.build import load as load
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
     from armkin.motion.path import path as path
@@ -76,8 +78,10 @@ _HOME = {
     "Solutions": "inverse.solutions",
     "Status": "inverse.solutions",
     "ik": "inverse.solve",
+    "Clearance": "keep_out.clearance",
+    "clearance": "keep_out.clearance",
+    "load": "keep_out.loading",
     "Arm": "model.arm",
-    "load": "model.build",
     "lock": "model.lock",
     "unlock": "model.lock",
     "path": "motion.path",

@@ -126,8 +126,8 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
     return np.where(known[..., 0], values, np.nan)
 
 
-def _move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
-    """The pose after a joint's motion."""
+def move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
+    """The pose after a joint's motion: ``P Z(r q)``, r the joint's ratio."""
     value = _turned(arm, joint, value)
     return pose.slide(P, value) if arm.prismatic[joint] else pose.rotate(P, *arrays.cos_sin(value))
 
@@ -164,7 +164,7 @@ def tip_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """The tool's pose, row by row: 16 entries."""
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
-        P = pose.times(_move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+        P = pose.times(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
     return _rows(P)
 
 
@@ -173,7 +173,7 @@ def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
     out = _rows(pose.constant(arm.base))
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
-        P = _move(arm, P, i, q[i])
+        P = move(arm, P, i, q[i])
         out += _rows(pose.times(P, pose.constant(arm.frame[i])))
         P = pose.times(P, pose.constant(arm.link[i + 1]))
     return out + _rows(P)
@@ -190,7 +190,7 @@ def _both(arm: Arm, q: list[Entry]) -> list[Entry]:
     axes = []
     for i in range(arm.n):
         axes.append((P[6:9], P[9:12]))
-        P = pose.times(_move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+        P = pose.times(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
     columns = []
     for i, (z, origin) in enumerate(axes):
         lever = arrays.combine(1.0, P[9:12], -1.0, origin)

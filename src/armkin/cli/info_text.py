@@ -32,6 +32,7 @@ def text(answer: Mapping[str, Any]) -> str:
         _matrix(answer),
         _hardware(answer),
         _solver(answer),
+        _keep_outs(answer),
         _lacks(answer["lacks"], answer["lines_to_add"]),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -207,6 +208,24 @@ def _solver(answer: Mapping[str, Any]) -> str:
     if answer["ik_refuses"]:
         lines.append(wrapped(answer["ik_refuses"], "  ik       ", " " * 11))
     return "\n".join(lines)
+
+
+def _keep_outs(answer: Mapping[str, Any]) -> str:
+    """Bodies and what they keep out of, where there are keep-outs."""
+    if "bodies" not in answer:
+        return ""
+    rows = [["body", "radius/mm", ""]]
+    rows += [[b["name"], short(b["radius_mm"]), "assumed" if b["assumed"] else ""] for b in answer["bodies"]]
+    away = f", {short(answer['clearance_mm'])} mm away" if answer["clearance_mm"] else ""
+    lines = [wrapped(f"{', '.join(answer['keep_out'])}{away}", "  keep out ", " " * 11)]
+    if answer["pairs_left_out"]:
+        words = ", ".join(" and ".join(pair) for pair in answer["pairs_left_out"])
+        lines.append(wrapped(f"{words}: they overlap in every posture", "  left out ", " " * 11))
+    if answer["hits_at_home"]:
+        from armkin.keep_out.clearance import said
+
+        lines.append(wrapped(said(answer["hits_at_home"]), "  at home  ", " " * 11))
+    return "\n".join([table(rows, left=(0, 2)), "", *lines])
 
 
 def _lacks(lacks: dict[str, list[str]], add: list[str]) -> str:

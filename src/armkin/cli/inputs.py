@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def load(robot: str) -> Arm:
-    """The arm of a robot file, or of a shipped robot."""
-    from armkin.model.build import load
+def load(robot: str, scene: str | None = None) -> Arm:
+    """The arm of a robot file, or of a shipped robot, in its scene."""
+    from armkin.keep_out.loading import load
     from armkin.robot_file.catalogue import locate
 
     if not robot:
@@ -30,7 +30,9 @@ def load(robot: str) -> Arm:
     if is_number(robot) and not os.path.exists(robot):
         raise UsageError(f"ROBOT comes first, then the numbers: '{robot}' is no robot file")
     files.keep(locate(robot))
-    arm = load(robot)
+    if scene is not None:
+        files.keep(scene)
+    arm = load(robot, scene)
     unit_notes.robot_file(arm)
     return arm
 

@@ -30,6 +30,10 @@ Joints = Annotated[
         autocompletion=completion.poses,
     ),
 ]
+Scene = Annotated[
+    str | None,
+    typer.Option("--scene", metavar="FILE", help="Keep-outs in a file of their own, added to the robot's."),
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
 JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]
 Batch = Annotated[

@@ -58,21 +58,21 @@ def read(robot: str | None) -> Piped:
     return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
 
 
-def poses(robot: str | None, words: Sequence[str] | None) -> tuple[Arm, list[list[float]]]:
+def poses(robot: str | None, words: Sequence[str] | None, scene: str | None = None) -> tuple[Arm, list[list[float]]]:
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
-    if not words and (found := joint_values(robot)) is not None:
+    if not words and (found := joint_values(robot, scene)) is not None:
         return found
-    arm = inputs.load(inputs.named(robot))
+    arm = inputs.load(inputs.named(robot), scene)
     return arm, [inputs.joints(arm, words)]
 
 
-def joint_values(robot: str | None) -> tuple[Arm, list[list[float]]] | None:
+def joint_values(robot: str | None, scene: str | None = None) -> tuple[Arm, list[list[float]]] | None:
     """The arm and joint values [deg | mm] of what `fk`, `ik` or `pulses` with --json has printed.
 
     robot: a robot given as well, which must be the same. None if there is a robot and nothing on standard
     input. Answers of ik without a branch within limits are skipped, with a warning.
     """
-    found = answers(robot)
+    found = answers(robot, scene)
     if found is None:
         return None
     arm, parsed = found
@@ -90,7 +90,7 @@ def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
     return values
 
 
-def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:
+def answers(robot: str | None, scene: str | None = None) -> tuple[Arm, list[dict[str, Any]]] | None:
     """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
     text = _text()
     if not text.strip():
@@ -102,7 +102,7 @@ def answers(robot: str | None) -> tuple[Arm, list[dict[str, Any]]] | None:
         if robot is None or text.lstrip()[:1] == "{":
             raise
         raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
-    arm = inputs.load(robot or parsed[0]["robot_file"])
+    arm = inputs.load(robot or parsed[0]["robot_file"], scene)
     for answer in parsed:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]

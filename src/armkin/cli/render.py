@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import output
@@ -15,8 +15,15 @@ if TYPE_CHECKING:
 
 
 def head(arm: Arm) -> Head:
-    """What every JSON object begins with: the robot, its file as given and the file's hash."""
-    return {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
+    """What every JSON object begins with: the robot, its file as given and the file's hash; the scene's, too."""
+    found: Head = {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
+    found.update(scene(arm))
+    return found
+
+
+def scene(arm: Arm) -> Any:
+    """The keys of an answer that was made in a scene; none without."""
+    return {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
 
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
@@ -27,6 +34,24 @@ def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
         [violation(arm, i, row[i]) for i, is_outside in enumerate(flags) if is_outside] if any(flags) else []
         for row, flags in zip(values.tolist(), outside(arm, q).tolist(), strict=True)
     ]
+
+
+def near_by(arm: Arm, q: Array) -> list[Any]:
+    """What each posture (N, n) [rad | mm] is near to, for JSON; nothing without keep-outs."""
+    if not arm.keep_out:
+        return [{}] * len(q)
+    from armkin.keep_out.clearance import hits
+
+    return [{"clearance_mm": mm, "hits": hit} for mm, hit in hits(arm, q)]
+
+
+def hits_said(found: Mapping[str, Any]) -> str:
+    """Hits in words: ``hits table by 12.3 mm (q3)``; nothing where there are none."""
+    if not found.get("hits"):
+        return ""
+    from armkin.keep_out.clearance import said
+
+    return said(found["hits"])
 
 
 def violation(arm: Arm, joint: int, value: float) -> Violation:
@@ -109,7 +134,9 @@ def joint_headings(arm: Arm) -> list[str]:
     return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
 
 
-def warn_of_limits(arm: Arm, found: list[Violation]) -> None:
-    """Say which joints of a pose are outside their limits."""
+def warn_of_limits(arm: Arm, found: list[Violation], near: Mapping[str, Any] | None = None) -> None:
+    """Say which joints of a pose are outside their limits, and what it hits."""
     if found:
         output.warn("; ".join(said(arm, violation) for violation in found))
+    if near is not None and (words := hits_said(near)):
+        output.warn(f"this pose {words}")

@@ -25,6 +25,8 @@ from armkin.inverse.closest import closest as nearest_pose
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.solve import ik
+from armkin.keep_out.clearance import Hit, hits
+from armkin.keep_out.clearance import said as hits_said
 from armkin.model import limits, units
 from armkin.model.lock import lock, unlock
 
@@ -47,6 +49,7 @@ class Request:
     branch: str | None = None  # name of the branch wanted
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
+    ignore: bool = False  # keep-outs: a branch with hits is taken where none is free
     every: bool = True  # keep all branches; False: of the swept values' branches those that an answer shows
     ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
 
@@ -67,6 +70,13 @@ class Branch(NamedTuple):
     residual_mm: float
     residual_deg: float
     motion: float  # sum of |change| from near [deg | mm]
+    clearance: float | None = None  # [mm] where there are keep-outs that count
+    hits: Sequence[Hit] = ()
+
+    @property
+    def may_be_taken(self) -> bool:
+        """Whether it is within limits and hits nothing."""
+        return self.within_limits and not self.hits
 
 
 class Answer(NamedTuple):
@@ -77,7 +87,7 @@ class Answer(NamedTuple):
     why: str
     complete: bool
     free: list[str]
-    branches: list[Branch]  # within limits first, then by motion
+    branches: list[Branch]  # within limits first, of them free ones, then by motion
     best: int | None
     refused: str | None = None  # why no branch of the name asked for is the best one
     total: int = 0  # branches found; more than `branches` where not every one is kept
@@ -148,7 +158,7 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
             with suppress(UsageError):  # none of that name reaches this target
                 wanted = {names[i] for i in find(names, request.branch)}
             wanted = wanted if answer.best is not None else set()
-        best = next((i for i, b in enumerate(branches) if b.within_limits and b.name in wanted), None)
+        best = _best(request, branches, [b.name in wanted for b in branches])
         yield request, answer._replace(branches=branches, best=best)
         if best is not None:
             request = replace(request, near=branches[best].joints)
@@ -197,7 +207,29 @@ def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionErro
         return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
     if answer.refused is not None:
         return NoBranchError(answer.refused if legal else f"{answer.refused}; {away}", **fields)
+    if legal:
+        return blocked(request, answer)
     return NoBranchError(f"no branch is within limits; {away}", **fields)
+
+
+def blocked(request: Request, answer: Answer) -> NoBranchError:
+    """That every branch within limits hits something, and what."""
+    words = {f"{b.name or 'it'} {hits_said(list(b.hits))}": b.hits for b in answer.branches if b.within_limits}
+    return NoBranchError(
+        f"every branch within limits hits something: {'; '.join(words)}",
+        robot=request.arm.name,
+        status=answer.status,
+        branches_within_limits=answer.within_limits,
+        hits=[hit for each in words.values() for hit in each],
+    )
+
+
+def _best(request: Request, branches: Sequence[Branch], wanted: Sequence[bool]) -> int | None:
+    """The first branch that is wanted, within limits and free; where hits are ignored and none is, with hits."""
+    both = list(enumerate(zip(branches, wanted, strict=True)))
+    free = (i for i, (branch, named) in both if named and branch.may_be_taken)
+    hit = (i for i, (branch, named) in both if named and branch.within_limits and request.ignore)
+    return next(free, next(hit, None))
 
 
 def _holds(request: Request) -> Iterator[dict[str, float]]:
@@ -234,6 +266,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     # From here on plain Python: numpy is slow at single numbers, and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     kept = [name for name in arm.joint_names if name not in held]
+    near_by = iter(hits(arm, q[s.valid])) if arm.keep_out else itertools.repeat((None, ()))
     told = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
     for i, (valid, status, sure) in enumerate(told):
         branches = [
@@ -246,6 +279,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
                 miss[i][b],
                 turn[i][b],
                 motion[i][b],
+                *next(near_by),
             )
             for b in range(len(valid))
             if valid[b]
@@ -282,9 +316,9 @@ class _Found:
 
     def thin_out(self) -> None:
         """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
-        nearest: dict[tuple[str, bool], tuple[Branch, bool]] = {}
+        nearest: dict[tuple[str, bool, bool], tuple[Branch, bool]] = {}
         for item in sorted(self.branches, key=lambda item: _rank(item[0])):
-            nearest.setdefault((item[0].name, item[0].within_limits), item)
+            nearest.setdefault((item[0].name, item[0].within_limits, item[0].may_be_taken), item)
         # A branch's q is a row of the array of all targets, which shall go.
         self.branches = [(branch._replace(q=branch.q.copy()), named) for branch, named in nearest.values()]
 
@@ -293,7 +327,7 @@ class _Found:
         assert self.best is not None
         first = self.best[1]
         both = sorted(self.branches, key=lambda item: _rank(item[0]))
-        best = next((i for i, (branch, named) in enumerate(both) if branch.within_limits and named), None)
+        best = _best(request, [branch for branch, _ in both], [named for _, named in both])
         refused = None
         if request.branch is not None and best is None:
             refused = _refused(request, [branch for branch, named in both if named])
@@ -312,16 +346,20 @@ class _Found:
         )
 
 
-def _rank(branch: Branch) -> tuple[bool, float]:
-    return not branch.within_limits, round(branch.motion, EQUAL)
+def _rank(branch: Branch) -> tuple[bool, bool, float]:
+    hit = branch.within_limits and bool(branch.hits)  # outside limits hits do not count
+    return not branch.within_limits, hit, round(branch.motion, EQUAL)
 
 
 def _refused(request: Request, named: Sequence[Branch]) -> str:
-    """What keeps the branches of the name asked for from being taken: all of them are outside limits."""
+    """What keeps the branches of the name asked for from being taken: they are outside limits, or hit something."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"
     said: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
     for branch in named:
+        if branch.within_limits and branch.hits:
+            said.setdefault(branch.name, f"'{branch.name}' {hits_said(list(branch.hits))}")
+            continue
         joints = ", ".join(request.arm.joint_names[i] for i in branch.outside)
         said.setdefault(branch.name, f"'{branch.name}' is outside limits" + (f": {joints}" if joints else ""))
     return "; ".join(said.values())

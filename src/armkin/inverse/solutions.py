@@ -14,6 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
+from armkin.keep_out.clearance import clear
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -70,18 +71,27 @@ class Solutions:
         return total
 
     @cached_property
+    def clear(self) -> NDArray[np.bool_]:
+        """(..., B) branches that hit no keep-out, limits apart; all, where the arm has no keep-outs."""
+        return clear(self.arm, self.q) & self.valid if self.arm.keep_out else self.valid
+
+    @cached_property
     def order(self) -> NDArray[np.intp]:
-        """(..., B) branches by rank: within limits first, then by motion, equal ones as listed, missing ones last."""
+        """(..., B) branches by rank: within limits first, of them free ones, then by motion, missing ones last."""
         key = _rounded(np.where(self.valid, self.motion, np.inf))
         by_motion = np.argsort(key, axis=-1, kind="stable")
         outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
+        if self.arm.keep_out:
+            hit = ~np.take_along_axis(self.clear, by_motion, axis=-1)
+            outside = np.where(outside, 2, hit)
         by_limits = np.argsort(outside, axis=-1, kind="stable")
         return np.take_along_axis(by_motion, by_limits, axis=-1)
 
     @cached_property
     def best(self) -> NDArray[np.intp]:
-        """(...) index of the branch within limits that moves the joints least, the first of equal ones, or -1."""
-        key = np.where(self.within_limits, self.motion, np.inf)
+        """(...) index of the branch within limits and free that moves the joints least, the first of several, or -1."""
+        legal = self.within_limits & self.clear if self.arm.keep_out else self.within_limits
+        key = np.where(legal, self.motion, np.inf)
         if not key.shape[-1]:  # no target of the batch has a branch
             return np.full(self.status.shape, -1)
         index = np.argmin(_rounded(key), axis=-1)

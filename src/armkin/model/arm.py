@@ -15,6 +15,7 @@ from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
     from armkin.robot_file import Board, Gripper, Homing, Motor, RobotFile
+    from armkin.robot_file.keep_out import Entry
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,6 +52,12 @@ class Arm:
     motors: tuple[Motor, ...] = ()  # in the order of the pulses; () for an arm without a robot file
     homing: tuple[Homing | None, ...] = ()  # of every joint
     hard_limits: tuple[bool, ...] = ()  # of every joint: whether its switch stops every motion into it
+    body_radius: Array | None = None  # (n + 1,) [mm] of the base and of what each joint moves, nan where not said
+    keep_out: tuple[Entry, ...] = ()  # of the robot file, then of the scene
+    clearance: float = 0.0  # [mm] that is kept from them
+    scene: str = ""  # the scene's file, as given
+    scene_sha256: str = ""  # of its bytes
+    whole: tuple[Arm, Mapping[str, float]] | None = None  # with keep-outs: what `lock` was given
     gripper: Gripper | None = None
     board: Board | None = None
     path: str = ""  # of the robot file, as given

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,23 +14,21 @@ from armkin.model.rotation import FLIP, cos_sin_deg, inverse, transform
 
 if TYPE_CHECKING:
     from armkin.robot_file import Joint, RobotFile
+    from armkin.robot_file.scene import Scene
 
 
 def load(path: str | PathLike[str]) -> Arm:
     """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
 
     Raises FileError if it cannot be read and RobotFileError if it is not valid.
-
-    >>> load("three_dof").joint_names
-    ('q1', 'q2', 'q3')
     """
     from armkin import robot_file
 
     return build(robot_file.read(path))
 
 
-def build(file: RobotFile) -> Arm:
-    """The arm of a validated robot file."""
+def build(file: RobotFile, scene: Scene | None = None) -> Arm:
+    """The arm of a validated robot file, with a scene's keep-outs behind the file's own."""
     base = transform(file.base.xyz, file.base.rpy)
     tool = transform(file.tool.xyz, file.tool.rpy)
     before, after, frame = [], [], []
@@ -71,6 +69,7 @@ def build(file: RobotFile) -> Arm:
         motor_bias=bias,
         poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
         motors=file.motor_list(),
+        **_keep_outs(file, scene),
         homing=tuple(j.homing for j in file.joints),
         hard_limits=tuple(j.homing is not None and j.hard_limits is not False for j in file.joints),
         gripper=file.gripper,
@@ -81,6 +80,19 @@ def build(file: RobotFile) -> Arm:
         source=file.source,
         file=file,
     )
+
+
+def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
+    """The arm's fields about keep-outs; none where there are none, so that such an arm is built as ever."""
+    if not file.keep_out and scene is None:
+        return {}
+    radii = [math.nan if body is None else body.radius for body in (file.base.body, *(j.body for j in file.joints))]
+    fields: dict[str, Any] = {"body_radius": np.array(radii), "keep_out": file.keep_out, "clearance": file.clearance}
+    if scene is not None:
+        fields["keep_out"] = (*file.keep_out, *scene.keep_out)
+        fields["clearance"] = max(file.clearance, scene.clearance)
+        fields |= {"scene": scene.path, "scene_sha256": scene.sha256}
+    return fields
 
 
 def _dh(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:

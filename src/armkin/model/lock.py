@@ -69,6 +69,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
         homing=tuple(arm.homing[i] for i in kept),
         hard_limits=tuple(arm.hard_limits[i] for i in kept),
         held=(*arm.held, *held),
+        whole=(arm, dict(held)) if arm.keep_out else None,
         **rest,
     )
 

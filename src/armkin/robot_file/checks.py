@@ -53,6 +53,10 @@ def problems(robot: RobotKeys) -> Iterator[Problem]:
     yield from _poses(robot)
     yield from _motors(robot)
     yield from _axes(robot)
+    if robot.keep_out:
+        from armkin.robot_file import keep_out  # for files that have some alone
+
+        yield from keep_out.problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
 
 
 def _poses(robot: RobotKeys) -> Iterator[Problem]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from armkin.robot_file import model, strict_yaml
+from armkin.robot_file import keep_out, model, strict_yaml
 
 Path = tuple[str | int, ...]
 
@@ -25,11 +25,26 @@ _MODELS: dict[str, type[BaseModel]] = {
     "gripper": model.Gripper,
     "homing": model.Homing,
     "board": model.Board,
-    "base": model.Pose,
+    "base": model.Base,
+    "body": model.Body,
     "tool": model.Pose,
     "zero_pose": model.Pose,
 }
+# The same of keep-outs, whose keys (min, max, from, to) are other keys' synonyms elsewhere.
+_KEEP_OUT: dict[str, type[BaseModel]] = {
+    "keep_out": keep_out.Entry,
+    "box": keep_out.Box,
+    "capsule": keep_out.Capsule,
+}
 _EXAMPLES: dict[str, str] = {
+    "body": "{radius: 40}, in mm",
+    "box": "{min: [200, -300, 0], max: [500, 300, 120]}",
+    "capsule": "{from: [0, 400, 0], to: [0, 400, 900], radius: 60}",
+    "min": "[x, y, z] in mm",
+    "max": "[x, y, z] in mm",
+    "size": "[x, y, z] in mm",
+    "from": "[x, y, z] in mm",
+    "to": "[x, y, z] in mm",
     "xyz": "[x, y, z] in mm",
     "rpy": "[roll, pitch, yaw] in degrees",
     "w": "[x, y, z], of length 1",
@@ -115,6 +130,8 @@ def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
         if error["type"] == "problems":
             yield from error["ctx"]["problems"]
+        elif error["type"] == "errors":  # of a part that is validated by itself
+            yield from told(error["ctx"]["errors"])
         elif error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
             continue  # pydantic counts valid items only, and the invalid ones are told already
         elif error["type"] == "missing" and path and isinstance(path[-1], int):
@@ -218,12 +235,12 @@ def _unknown_key(path: Path) -> str:
     near = _suggestion(path)
     if near is not None:
         return f"unknown key; did you mean {near}?"
-    for name, other in _MODELS.items():
+    for name, other in _models(path).items():
         if key in other.model_fields and other is not owner and name:
             return f"unknown key here; it belongs in {_place(name)}"
-    if key in model.RobotKeys.model_fields:
+    if key in model.RobotKeys.model_fields and path[0] != "keep_out":
         return "unknown key here; it belongs at the top of the file"
-    return f"unknown key; the keys here are {', '.join(owner.model_fields)}"
+    return f"unknown key; the keys here are {', '.join(_keys(owner))}"
 
 
 def _place(name: str) -> str:
@@ -232,16 +249,21 @@ def _place(name: str) -> str:
 
 def _suggestion(path: Path) -> str | None:
     key, owner = str(path[-1]), _owner(path)
-    belongs = any(key in other.model_fields for other in _MODELS.values())
-    return None if belongs else _nearest(key, list(owner.model_fields))
+    belongs = any(key in _keys(other) for other in _models(path).values())
+    return None if belongs else _nearest(key, _keys(owner), {} if path[0] == "keep_out" else _SYNONYMS)
 
 
-def _nearest(word: str, choices: list[str]) -> str | None:
+def _keys(owner: type[BaseModel]) -> list[str]:
+    """The keys of a model as files have them."""
+    return [field.alias or name for name, field in owner.model_fields.items()]
+
+
+def _nearest(word: str, choices: list[str], synonyms: dict[str, str] = _SYNONYMS) -> str | None:
     import difflib
 
     low = word.strip().lower().replace("-", "_").replace(" ", "_")
     by_lower = {choice.lower(): choice for choice in choices}
-    synonym = _SYNONYMS.get(low, low)
+    synonym = synonyms.get(low, low)
     if synonym.lower() in by_lower:
         return by_lower[synonym.lower()]
     near = difflib.get_close_matches(low, by_lower, n=1, cutoff=0.65)
@@ -250,7 +272,12 @@ def _nearest(word: str, choices: list[str]) -> str | None:
 
 def _owner(path: Path) -> type[BaseModel]:
     names = [part for part in path[:-1] if isinstance(part, str)]
-    return _MODELS.get(names[-1] if names else "", model.RobotKeys)
+    return _models(path).get(names[-1] if names else "", model.RobotKeys)
+
+
+def _models(path: Path) -> dict[str, type[BaseModel]]:
+    """Which models the keys of a place may belong to."""
+    return _KEEP_OUT if path[:1] == ("keep_out",) and len(path) > 1 else _MODELS
 
 
 def _example(path: Path) -> str:

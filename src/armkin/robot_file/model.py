@@ -9,8 +9,10 @@ Angles are degrees and lengths millimetres here; ``armkin.model.arm`` turns them
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+from armkin.robot_file.keys import Angle, Length, Model
 
 MAX_JOINTS = 12
 MAX_MOTORS = 24  # two on each joint
@@ -24,8 +26,6 @@ BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "pico6", "gr
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 
 # Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
-Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
-Length = Annotated[float, Field(ge=-1e7, le=1e7)]
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres
 Rate = Annotated[float, Field(ge=1e-6, le=1e6)]  # less would take ages, and overflow what divides by it
 Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
@@ -33,6 +33,19 @@ Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
 Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
 # An int and not a Literal, which would take `true` for 1; 0 is for `checks` to find.
 Sign = Annotated[int, Field(ge=-1, le=1, json_schema_extra={"enum": [1, -1]})]
+
+
+Size = Annotated[float, Field(ge=0, le=1e6)]
+
+
+def _keep_out(values: Any) -> Any:
+    """The entries of `armkin.robot_file.keep_out`, whose models are built for files that have some alone."""
+    from armkin.robot_file import keep_out
+
+    return keep_out.read(values)
+
+
+KeepOut = Annotated[tuple[Any, ...], BeforeValidator(_keep_out)]
 
 
 def dot(a: Triple, b: Triple) -> float:
@@ -77,12 +90,7 @@ Ratio = Annotated[
 ]
 
 
-class _Model(BaseModel):
-    # defer_build: RobotFile's validator holds those of all the others, and is built by the reader.
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
-
-
-class Pose(_Model):
+class Pose(Model):
     """A fixed frame: a position, then R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
     xyz: tuple[Length, Length, Length] = Field((0.0, 0.0, 0.0), description="Position [x, y, z] in mm.")
@@ -91,7 +99,19 @@ class Pose(_Model):
     )
 
 
-class DH(_Model):
+class Body(Model):
+    """What a joint moves: capsules along its part of the arm's skeleton."""
+
+    radius: Size = Field(description="In mm; 0: no body.")
+
+
+class Base(Pose):
+    """The fixed frame before joint 1, and the body that stands there."""
+
+    body: Body | None = Field(None, description="What stands before joint 1, for keep-outs: {radius: 60}, in mm.")
+
+
+class DH(Model):
     """One row of a Denavit-Hartenberg table."""
 
     alpha: Angle = Field(description="Twist in degrees; with convention modified it stands before the joint.")
@@ -100,7 +120,7 @@ class DH(_Model):
     theta: Angle = Field(0.0, description="Offset in degrees: DH angle = sign x joint value + theta.")
 
 
-class Screw(_Model):
+class Screw(Model):
     """A joint's screw axis at the zero pose, in the base frame."""
 
     w: tuple[Unit, Unit, Unit] = Field(
@@ -115,7 +135,7 @@ class Screw(_Model):
     )
 
 
-class Drive(_Model):
+class Drive(Model):
     """One motor: a stepper with its chain to the joint, an RC servo, or a servo on a serial bus."""
 
     kind: Literal["stepper", "servo", "bus", "spindle"] = Field(
@@ -195,7 +215,7 @@ class Gripper(Drive):
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to grip.")
 
 
-class Homing(_Model):
+class Homing(Model):
     """How a joint finds its limit switch."""
 
     switch: Name = Field(description="The board's limit input, for example X.")
@@ -213,7 +233,7 @@ class Homing(_Model):
     )
 
 
-class Board(_Model):
+class Board(Model):
     """The controller that drives the motors."""
 
     kind: BoardKind = Field(
@@ -232,7 +252,7 @@ class Board(_Model):
     )
 
 
-class Joint(_Model):
+class Joint(Model):
     """One joint, its place in the chain, its range and its motor."""
 
     name: Name = Field(description="The joint's name in tables, in messages and on the command line.")
@@ -248,6 +268,9 @@ class Joint(_Model):
     max_speed: Rate | None = Field(None, description="deg/s or mm/s; needed to send motion.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2; needed to send motion.")
     max_jerk: Rate | None = Field(None, description="deg/s3 or mm/s3; absent: acceleration may change at once.")
+    body: Body | None = Field(
+        None, description="What this joint moves, for keep-outs: {radius: 40}, in mm. Absent: 2 % of the reach."
+    )
     drive: Drive | None = Field(None, description="The joint's own motor; coupled joints use motors.")
     homing: Homing | None = Field(None, description="The limit switch; absent: `armkin home` refuses.")
     hard_limits: bool | None = Field(
@@ -276,7 +299,7 @@ class Joint(_Model):
         return w, v
 
 
-class RobotKeys(_Model):
+class RobotKeys(Model):
     """A robot file's keys, before `robot.RobotFile` holds them to the rules between them."""
 
     name: Annotated[str, Field(min_length=1, max_length=80)] = Field(description="The arm's name, one line.")
@@ -292,7 +315,7 @@ class RobotKeys(_Model):
     pitch_offset: Angle = Field(
         0.0, description="Degrees added to the sum of the parallel joints' angles in the tasks with a pitch."
     )
-    base: Pose = Field(Pose.model_construct(), description="Fixed frame before joint 1.")
+    base: Base = Field(Base.model_construct(), description="Fixed frame before joint 1.")
     tool: Pose = Field(Pose.model_construct(), description="Fixed frame after the last joint: the TCP.")
     zero_pose: Pose | None = Field(
         None, description="Convention screws: the end frame in the base frame when all joints are 0."
@@ -313,6 +336,8 @@ class RobotKeys(_Model):
         description="Named joint values in degrees or mm, as {park: [0, 90, -90]}; `home` is always one.",
         max_length=MAX_POSES,
     )
+    clearance: Size = Field(0.0, description="How far the arm keeps from every keep-out, in mm.")
+    keep_out: KeepOut = Field((), description="Where the arm must not go: self, floors, boxes, capsules.")
 
     def motor_list(self) -> tuple[Motor, ...]:
         """The motors, whether they are written as `motors` or as the joints' drives; () if there are none."""

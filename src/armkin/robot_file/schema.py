@@ -6,11 +6,12 @@ every schema version knows.
 
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from armkin.robot_file.model import Pose
+from armkin.robot_file import keep_out
+from armkin.robot_file.model import Base, Pose
 from armkin.robot_file.robot import RobotFile
 
 # The smallest useful file of each convention.
@@ -76,8 +77,26 @@ def json_schema() -> dict[str, Any]:
     >>> json_schema()["required"]
     ['name', 'convention', 'joints']
     """
-    Pose.model_rebuild()  # its defaults stand in the schema, and its own build was deferred
-    return made_from(RobotFile, "armkin robot file", examples=EXAMPLES)
+    for model in (Pose, Base):  # their defaults stand in the schema, and their own build was deferred
+        model.model_rebuild()
+    return with_keep_out(made_from(RobotFile, "armkin robot file", examples=EXAMPLES))
+
+
+def scene_schema() -> dict[str, Any]:
+    """The schema of a scene."""
+    from armkin.robot_file.scene import Scene
+
+    return with_keep_out(made_from(Scene, "armkin scene"))
+
+
+def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
+    """A schema whose `keep_out` says what an entry is: the word self, or one of the shapes."""
+    made = _tidied(TypeAdapter(keep_out.Entry).json_schema(schema_generator=_Generator))
+    schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
+    schema["$defs"]["Entry"] = made
+    items = {"anyOf": [{"const": keep_out.SELF}, {"$ref": "#/$defs/Entry"}]}
+    schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out.MOST}
+    return schema
 
 
 def made_from(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from armkin.cli.answers.arm import Frame as Frame
 from armkin.cli.answers.arm import Head as Head
 from armkin.cli.answers.arm import Ik as Ik
 from armkin.cli.answers.arm import Info as Info
+from armkin.cli.answers.arm import KeepOuts as KeepOuts
+from armkin.cli.answers.arm import Near as Near
 from armkin.cli.answers.arm import Ports as Ports
 from armkin.cli.answers.arm import PulsePositions as PulsePositions
 from armkin.cli.answers.arm import Pulses as Pulses

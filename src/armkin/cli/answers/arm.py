@@ -10,6 +10,8 @@ class Head(TypedDict):
     robot: Annotated[str, "the arm's name"]
     robot_file: Annotated[str, "as given: a path, or the name of a shipped robot"]
     robot_sha256: Annotated[str, "of the file's bytes: a changed file is noticed"]
+    scene: Annotated[NotRequired[str], "with --scene: the file as given"]
+    scene_sha256: Annotated[NotRequired[str], "of its bytes"]
 
 
 class Violation(TypedDict):
@@ -21,6 +23,16 @@ class Violation(TypedDict):
     upper: Annotated[float | None, "null: unlimited"]
 
 
+Hit = TypedDict("Hit", {"body": str, "with": str, "depth_mm": float})
+
+
+class Near(TypedDict):
+    """What a posture is near to, where there are keep-outs."""
+
+    clearance_mm: Annotated[NotRequired[float | None], "least distance of any pair, clearance taken off; null: none"]
+    hits: Annotated[NotRequired[list[Hit]], "pairs that are too near, the deepest first: body, with, depth_mm"]
+
+
 class Frame(TypedDict):
     """A frame of the arm."""
 
@@ -29,7 +41,7 @@ class Frame(TypedDict):
     rotation: Annotated[list[list[float]], "3 x 3, row by row"]
 
 
-class Fk(Head):
+class Fk(Head, Near):
     """Where the tool is."""
 
     joints: Annotated[list[float], "as given [deg or mm]"]
@@ -43,7 +55,7 @@ class Fk(Head):
     frames: Annotated[NotRequired[list[Frame]], "with --frames: base first, tool last"]
 
 
-class Branch(TypedDict):
+class Branch(Near):
     """One branch, modulo whole turns: the legal copy nearest to --near."""
 
     joints: Annotated[list[float], "[deg or mm]"]
@@ -56,7 +68,7 @@ class Branch(TypedDict):
     turns: Annotated[NotRequired[list[list[float]]], "with --turns: all copies within limits, the nearest first"]
 
 
-class Closest(TypedDict):
+class Closest(Near):
     """The nearest pose within limits."""
 
     joints: Annotated[list[float], "[deg or mm]"]
@@ -81,10 +93,13 @@ class Ik(Head):
     joint_units: Annotated[list[str], "deg or mm"]
     branch_count: Annotated[int, "found, listed or not"]
     branches_within_limits: int
-    branches: Annotated[list[Branch], "within limits first, then by motion; all of them with --all-branches"]
+    branches: Annotated[
+        list[Branch], "within limits first, of them those without hits, then by motion; all with --all-branches"
+    ]
     best: Annotated[int | None, "index of the default answer in `branches`"]
-    closest: Annotated[Closest | None, "whenever `best` is null"]
+    closest: Annotated[Closest | None, "whenever `best` is null, but where every branch within limits hits something"]
     free_joints: Annotated[list[str], "joints whose value does not matter here (a self-motion)"]
+    branches_free: Annotated[NotRequired[int], "within limits and without hits, where there are keep-outs"]
 
 
 class PulsePositions(TypedDict):
@@ -105,7 +120,7 @@ class Rounded(TypedDict):
 _From = TypedDict("_From", {"from": Annotated[list[float], "where `moves` begin [deg or mm]"]})
 
 
-class Pulses(Head, _From):
+class Pulses(Head, _From, Near):
     """Motor pulses of a pose."""
 
     motors: Annotated[list[str], "names"]
@@ -143,6 +158,9 @@ class Workspace(Head):
     seconds: float
 
 
+_Ends = TypedDict("_Ends", {"from": list[float], "to": list[float]})
+
+
 class Solver(TypedDict):
     """How targets are solved."""
 
@@ -161,7 +179,32 @@ class Solving(TypedDict):
     ik_refuses: Annotated[str | None, "why there is no solver"]
 
 
-class Info(Head, Solving):
+class BodySegment(_Ends):
+    """A part of a body."""
+
+    slide: Annotated[NotRequired[bool], "true: it begins where the body before ends, given for the home pose"]
+
+
+class BodyOf(TypedDict):
+    """What a joint moves."""
+
+    name: Annotated[str, "the joint's name, or base"]
+    radius_mm: float
+    assumed: Annotated[bool, "no file states it: 2 % of the reach"]
+    segments: Annotated[list[BodySegment], "in the frame that the body moves with: fk --frames has it"]
+
+
+class KeepOuts(TypedDict):
+    """Bodies, and what they are held against; absent where there are no keep-outs."""
+
+    clearance_mm: NotRequired[float]
+    keep_out: Annotated[NotRequired[list[str]], "names of the keep-outs, self among them"]
+    bodies: NotRequired[list[BodyOf]]
+    pairs_left_out: Annotated[NotRequired[list[list[str]]], "bodies that overlap in every posture looked at"]
+    hits_at_home: NotRequired[list[Hit]]
+
+
+class Info(Head, Solving, KeepOuts):
     """What a robot file says."""
 
     description: str

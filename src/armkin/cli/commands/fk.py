@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe
+from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe, Scene
 from armkin.cli.render import fixed
 from armkin.cli.rows import Chunk, all_rows, one_row
 from armkin.model import units
@@ -23,6 +23,7 @@ def fk(
     q: Joints = None,
     frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
     compiled: Compiled = False,
+    scene: Scene = None,
     json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
@@ -32,15 +33,15 @@ def fk(
         from armkin.cli.csv_rows import batch_rows
 
         inputs.no_numbers(q)
-        arm = inputs.load(inputs.named(robot))
+        arm = inputs.load(inputs.named(robot), scene)
         chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
     else:
-        arm, values = _poses(robot, q)
+        arm, values = _poses(robot, q, scene)
         if len(values) == 1:
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out) as write:
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-            render.warn_of_limits(arm, answer["violations"])
+            render.warn_of_limits(arm, answer["violations"], answer)
             return
         chunks = all_rows(values)
     from armkin.cli.batch import run_batch
@@ -56,14 +57,14 @@ def fk(
     tally.warn_of_limits()
 
 
-def _poses(robot: str | None, q: list[str] | None) -> tuple[Arm, list[list[float]]]:
+def _poses(robot: str | None, q: list[str] | None, scene: str | None) -> tuple[Arm, list[list[float]]]:
     """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
     if q:
-        arm = inputs.load(inputs.named(robot))
+        arm = inputs.load(inputs.named(robot), scene)
         return arm, [inputs.joints(arm, q)]
     from armkin.cli import piped_answers
 
-    return piped_answers.poses(robot, q)
+    return piped_answers.poses(robot, q, scene)
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
@@ -76,7 +77,8 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
     T = poses + 0.0  # no -0.0
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
-    violations = render.violations(arm, chunk.values, q)
+    violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
+    in_scene = render.scene(arm)
     joints = chunk.values.tolist()
     joint_units, head = units.names(arm), render.head(arm)
     for i, pose in enumerate(T):
@@ -93,6 +95,8 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
             "within_limits": not violations[i],
             "violations": violations[i],
         }
+        answer.update(in_scene)
+        answer.update(near[i])
         if F is not None:
             answer["frames"] = [
                 {"name": name, "position_mm": frame[:3, 3].tolist(), "rotation": frame[:3, :3].tolist()}

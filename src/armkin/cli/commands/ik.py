@@ -22,6 +22,7 @@ from armkin.cli.options import (
     Near,
     Out,
     RobotOrPipe,
+    Scene,
     Sweep,
     Target,
     TaskName,
@@ -58,6 +59,7 @@ def ik(
         bool,
         typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
     ] = False,
+    scene: Scene = None,
     compiled: Compiled = False,
     workers: Workers = 1,
     json: JsonLines = False,
@@ -72,8 +74,8 @@ def ik(
     from armkin.inverse import choose
     from armkin.inverse.tasks.fitting import task_for
 
-    given = None if target or batch is not None else piped_answers.joint_values(robot)
-    arm = inputs.load(inputs.named(robot)) if given is None else given[0]
+    given = None if target or batch is not None else piped_answers.joint_values(robot, scene)
+    arm = inputs.load(inputs.named(robot), scene) if given is None else given[0]
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
     held = lock_and_sweep.locks(arm, lock)
@@ -122,6 +124,8 @@ def ik(
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+    if answer["best"] is None and answer["closest"] is None:
+        raise choose.blocked(request, found)
     if answer["best"] is None and answer["closest"] is not None:
         raise choose.refusal(request, found, answer["closest"]["distance_mm"])
 
@@ -189,8 +193,11 @@ def _answer(
     listed, best = found.branches, found.best
     if not all_branches:
         listed, best = ([], None) if best is None else ([listed[best]], 0)
-    return {
-        **render.head(arm),
+    head = render.head(arm)
+    answer: Ik = {
+        "robot": head["robot"],
+        "robot_file": head["robot_file"],
+        "robot_sha256": head["robot_sha256"],
         "task": task.name,
         "target": values,
         "target_labels": list(task.labels),
@@ -207,17 +214,26 @@ def _answer(
         "closest": _closest(request, goal, found) if best is None and with_closest else None,
         "free_joints": found.free,
     }
+    if arm.keep_out:
+        answer.update(render.scene(arm))
+        answer["branches_free"] = sum(branch.may_be_taken for branch in found.branches)
+    return answer
 
 
-def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Closest:
-    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for."""
+def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Closest | None:
+    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
+
+    None where every branch within limits hits something.
+    """
     import armkin
     from armkin.inverse import choose
 
     arm = request.arm
     if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
         legal = found.branches[0]
-        return {
+        if legal.hits:
+            return None
+        answer: Closest = {
             "joints": legal.joints,
             "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
             "distance_mm": legal.residual_mm,
@@ -225,8 +241,10 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Clos
             "converged": True,
             "branch": legal.name,
         }
+        answer.update(_near_to(arm, legal))
+        return answer
     nearest = choose.closest(request, goal)
-    return {
+    answer = {
         "joints": units.joints_out(arm, nearest.q).tolist(),
         "position_mm": nearest.position.tolist(),
         "distance_mm": nearest.distance,
@@ -234,6 +252,13 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Clos
         "converged": nearest.converged,
         "branch": None,
     }
+    answer.update(render.near_by(arm, nearest.q[None])[0])
+    return answer
+
+
+def _near_to(arm: Arm, branch: choose.Branch) -> Any:
+    """What a branch is near to, where there are keep-outs."""
+    return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
 
 
 def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Branch:
@@ -247,6 +272,7 @@ def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Bran
         "residual_deg": branch.residual_deg,
         "motion": branch.motion,
     }
+    row.update(_near_to(arm, branch))
     if turns:
         from armkin.inverse import choose
 
@@ -270,7 +296,7 @@ def _text(arm: Arm, answer: Ik) -> str:
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])
         mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
-        note = f"outside limits: {bad}" if bad else ""
+        note = "; ".join(filter(None, [f"outside limits: {bad}" if bad else "", render.hits_said(branch)]))
         rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
         for copy in branch.get("turns", ())[1:]:
             rows.append(["", "  or", *map(fixed, copy), "", ""])
@@ -289,6 +315,8 @@ def _summary(answer: Ik) -> str:
     """What the table does not show: how many branches there are, and by which method."""
     count, legal = answer["branch_count"], answer["branches_within_limits"]
     text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
+    if "branches_free" in answer:
+        text += f", {answer['branches_free']} free"
     if answer["free_joints"]:
         text += f"; free: {', '.join(answer['free_joints'])}"
     if count > len(answer["branches"]):

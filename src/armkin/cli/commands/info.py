@@ -5,23 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Json, Out, Robot, TaskName
+from armkin.cli.options import Json, Out, Robot, Scene, TaskName
 from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.cli.answers import Info, Solving
+    from armkin.cli.answers import Info, KeepOuts, Solving
     from armkin.model.arm import Arm
     from armkin.robot_file import Joint, Motor, RobotFile
 
 
-def info(robot: Robot, task: TaskName = None, json: Json = False, out: Out = None) -> None:
+def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = False, out: Out = None) -> None:
     """What a robot file says, checked.
 
     DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the
     task of `armkin ik` with its target's numbers, how it is solved, and what pulses, send and home still need.
     """
-    arm = inputs.load(robot)
+    arm = inputs.load(robot, scene)
     answer = _answer(arm, task)
     with output.destination(out) as write:
         if json:
@@ -46,7 +46,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "joint_units": units.names(arm),
         "joints": [_joint(joint) for joint in file.joints],
         "poses": units.poses_out(arm),
-        "base": file.base.model_dump(),
+        "base": file.base.model_dump(exclude_none=True),
         "tool": file.tool.model_dump(),
         "zero_pose": None if file.zero_pose is None else file.zero_pose.model_dump(),
         **_task(arm, task),
@@ -59,12 +59,22 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "board": None if file.board is None else file.board.model_dump(exclude_none=True),
         "lacks": needs(arm),
         "lines_to_add": lines_to_add(arm),
+        **_keep_outs(arm),
     }
+
+
+def _keep_outs(arm: Arm) -> KeepOuts:
+    """Bodies, pairs that do not count, hits at home; nothing without keep-outs."""
+    if not arm.keep_out:
+        return {}
+    from armkin.keep_out.report import report
+
+    return report(arm)  # type: ignore[return-value]
 
 
 def _joint(joint: Joint) -> dict[str, Any]:
     entry = joint.model_dump(exclude={"drive"})
-    return {key: value for key, value in entry.items() if key not in ("dh", "screw") or value is not None}
+    return {key: value for key, value in entry.items() if key not in ("dh", "screw", "body") or value is not None}
 
 
 def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import typer
 from armkin.cli import inputs, output, piped_answers, render
 from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe
+from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe, Scene
 from armkin.cli.render import fixed
 from armkin.cli.rows import Chunk, all_rows, one_row
 from armkin.model import units
@@ -31,6 +31,7 @@ def pulses(
         bool,
         typer.Option("--best", help="Of the pulses around the target, those whose tip is nearest to it."),
     ] = False,
+    scene: Scene = None,
     json: JsonLines = False,
     batch: Batch = None,
     out: Out = None,
@@ -44,17 +45,17 @@ def pulses(
 
     if batch is not None:
         inputs.no_numbers(q)
-        arm = inputs.load(inputs.named(robot))
+        arm = inputs.load(inputs.named(robot), scene)
         chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
     else:
-        arm, values = piped_answers.poses(robot, q)
+        arm, values = piped_answers.poses(robot, q, scene)
         chunks = all_rows(values)
     origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
     if batch is None and len(values) == 1:
         [answer] = _answers(arm, one_row(values[0]), origin, best)
         with output.destination(out) as write:
             write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-        render.warn_of_limits(arm, answer["violations"])
+        render.warn_of_limits(arm, answer["violations"], answer)
         for name in answer["outside_travel"]:
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
@@ -81,7 +82,8 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     r = rounded if found is None else found.chosen
     moves = (r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))).tolist()
     actual = units.joints_out(arm, r.actual_joints).tolist()
-    violations = render.violations(arm, chunk.values, q)
+    violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
+    in_scene = render.scene(arm)
     too_far = outside_travel(arm, r.pulses)
     names = motor_names(arm)
     head, kinds, joint_units = render.head(arm), pulse_units(arm), units.names(arm)
@@ -122,6 +124,8 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
             "violations": outside,
             "outside_travel": [name for name, beyond in zip(names, far, strict=True) if beyond] if any(far) else [],
         }
+        answer.update(in_scene)
+        answer.update(near[i])
         if found is not None and plain is not None:
             answer["rounded"] = {"pulses": plain[i][0], "error_mm": plain[i][1]}
             answer["gain_mm"] = gains[i]

@@ -6,15 +6,22 @@ import typer
 
 from armkin.cli import output
 from armkin.cli.options import Out
+from armkin.errors import UsageError
 
 
 def schema(
-    path: Annotated[bool, typer.Option("--path", help="That of path files instead.")] = False, out: Out = None
+    path: Annotated[bool, typer.Option("--path", help="That of path files instead.")] = False,
+    scene: Annotated[bool, typer.Option("--scene", help="That of scenes instead.")] = False,
+    out: Out = None,
 ) -> None:
     """JSON Schema of robot files, for editors."""
     import json
 
     from armkin import path_file, robot_file
+    from armkin.robot_file.schema import scene_schema
 
+    if path and scene:
+        raise UsageError("--path and --scene: give one of the two")
+    made = scene_schema() if scene else (path_file if path else robot_file).json_schema()
     with output.destination(out) as write:
-        write(json.dumps((path_file if path else robot_file).json_schema(), indent=2) + "\n")
+        write(json.dumps(made, indent=2) + "\n")

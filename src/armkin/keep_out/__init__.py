@@ -1,0 +1,11 @@
+"""Where an arm must not go: its bodies, what stands around it, how far apart they are, and proofs of motions.
+
+loading.py    `armkin.load`: a robot, its scene, and a check that some posture is free
+bodies.py     the arm's bodies: capsules along its skeleton
+shapes/       what stands around it: one file a shape
+guard.py      which pairs count, and how far apart each is in a posture
+clearance.py  `armkin.clearance`, and hits in words
+report.py     what `armkin info` tells
+
+Nothing here knows boards. An arm without keep-outs comes no farther than `loading`.
+"""

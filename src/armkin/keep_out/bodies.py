@@ -1,0 +1,146 @@
+"""The bodies of an arm: capsules along its skeleton, one body a joint, and one for what stands before joint 1.
+
+Body 0 is the base's, body i the one that joint i moves. A segment's ends are constant in the frame after its
+joint's motion; a slide's own segment begins where the body before ends, so it is as long as the slide is out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import pose
+from armkin.formula.arrays import Array, Entry
+from armkin.formula.trace import LazyCode
+from armkin.forward import move
+from armkin.view.skeleton import shape
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armkin.model.arm import Arm
+
+BASE = "base"
+ASSUMED = 0.02  # of the reach: the radius of a body that the file does not state
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Capsules of one arm, lengths in mm; their segments are in the order of the bodies.
+
+    segment i goes from begin[i] to end[i] in the frame after joint owner[i]'s motion (0: in the world); where
+    slide[i], begin[i] is a place in the frame before that motion.
+    """
+
+    names: tuple[str, ...]  # (n + 1,) base first
+    radius: Array  # (n + 1,)
+    assumed: NDArray[np.bool_]  # (n + 1,) the file does not state it
+    owner: NDArray[np.intp]  # (S,) body of each segment
+    begin: Array  # (S, 3)
+    end: Array  # (S, 3)
+    slide: NDArray[np.bool_]  # (S,)
+
+    def exists(self, body: int) -> bool:
+        """Whether a body has a segment and a radius."""
+        return bool(self.radius[body] > 0 and (self.owner == body).any())
+
+
+@lru_cache(maxsize=64)
+def bodies(arm: Arm) -> Bodies:
+    """The bodies of an arm that has keep-outs, or of any other with radii assumed.
+
+    >>> import armkin
+    >>> found = bodies(armkin.load("three_dof"))
+    >>> found.names, found.radius.tolist(), found.end[found.owner == 2].tolist()
+    (('base', 'q1', 'q2', 'q3'), [12.7, 12.7, 12.7, 12.7], [[197.0, 0.0, 0.0]])
+    """
+    said = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
+    assumed = np.isnan(said)
+    form, least = shape(arm), 1e-9 * arm.reach
+    owner, begin, end, slide = [], [], [], []
+
+    def add(body: int, a: Array, b: Array, slides: bool = False) -> None:
+        owner.append(body)
+        begin.append(a)
+        end.append(b)
+        slide.append(slides)
+
+    still = list(_segments(form.bodies[0], least))
+    first = form.bodies[1]
+    if not arm.prismatic[0]:  # what lies on joint 1's own axis does not turn
+        on_axis = [s for s in _segments(first, least) if _on_axis(s, least)]
+        still += [(_placed(arm.link[0], a), _placed(arm.link[0], b)) for a, b in on_axis]
+    for a, b in still or [(form.bodies[0][-1],) * 2]:
+        add(0, a, b)
+    for i in range(arm.n):
+        corners = form.bodies[i + 1]
+        own = list(_segments(corners, least))
+        if i == 0 and not arm.prismatic[0]:
+            own = [s for s in own if not _on_axis(s, least)]
+        elif arm.prismatic[i]:
+            add(i + 1, corners[0], corners[0], True)
+        elif not own:
+            own = [(corners[-1], corners[-1])]  # a body without length is a sphere
+        for a, b in own:
+            add(i + 1, a, b)
+    return Bodies(
+        (BASE, *arm.joint_names),
+        np.where(assumed, ASSUMED * arm.reach, said),
+        assumed,
+        np.array(owner),
+        np.array(begin),
+        np.array(end),
+        np.array(slide),
+    )
+
+
+def _segments(corners: Array, least: float) -> list[tuple[Array, Array]]:
+    """Neighbouring corners that are apart."""
+    pairs = pairwise(corners)
+    return [(a, b) for a, b in pairs if np.linalg.norm(b - a) > least]
+
+
+def _on_axis(segment: tuple[Array, Array], least: float) -> bool:
+    return all(float(np.hypot(*point[:2])) <= least for point in segment)
+
+
+def _placed(T: Array, point: Array) -> Array:
+    return np.asarray(T[:3, :3] @ point + T[:3, 3])
+
+
+def ends(arm: Arm, q: Array) -> tuple[Array, Array]:
+    """Both ends of every segment: q (N, n) [rad | mm] -> (3, S, N) twice, in the world."""
+    form = bodies(arm)
+    out = np.empty((2, 3, len(form.owner), len(q)))
+    columns = list(np.ascontiguousarray(q.T))
+    code = _recorded(arm).get(len(q))
+    found = _ends(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
+    for k, entry in enumerate(found):
+        segment, rest = divmod(k, 6)
+        out[rest // 3, rest % 3, segment] = entry
+    return out[0], out[1]
+
+
+@lru_cache(maxsize=64)
+def _recorded(arm: Arm) -> LazyCode:
+    return LazyCode(lambda q: _ends(arm, q), arm.n)
+
+
+def _ends(arm: Arm, q: list[Entry]) -> list[Entry]:
+    """Six numbers a segment: where it begins and where it ends."""
+    form = bodies(arm)
+    out: list[Entry] = []
+    for k in np.flatnonzero(form.owner == 0):
+        out += [*map(float, form.begin[k]), *map(float, form.end[k])]
+    P = pose.constant(arm.link[0])
+    for i in range(arm.n):
+        before, P = P, move(arm, P, i, q[i])
+        for k in np.flatnonzero(form.owner == i + 1):
+            out += pose.apply(before if form.slide[k] else P, [float(x) for x in form.begin[k]])
+            out += pose.apply(P, [float(x) for x in form.end[k]])
+        P = pose.times(P, pose.constant(arm.link[i + 1]))
+    return out

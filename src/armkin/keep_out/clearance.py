@@ -1,0 +1,115 @@
+"""`armkin.clearance`: how far an arm is from the nearest thing that it must not touch, and hits in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armkin.formula.arrays import Array
+from armkin.forward import as_joints
+from armkin.keep_out.guard import CHUNK, Guard, guard
+from armkin.model.lock import unlock
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """mm: (...,) least distance of any pair, `clearance` taken off, negative where the arm hits something, inf for
+    an arm without keep-outs; body, other: (...,) the names of that pair, text for one posture.
+    """
+
+    mm: Array
+    body: NDArray[np.str_]
+    other: NDArray[np.str_]
+
+
+Hit = TypedDict("Hit", {"body": str, "with": str, "depth_mm": float})  # a pair that is too near
+
+
+def clearance(arm: Arm, q: ArrayLike) -> Clearance:
+    """How far an arm is from hitting anything: q (..., n) [rad | mm].
+
+    >>> import armkin, numpy as np
+    >>> arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")
+    >>> found = armkin.clearance(arm, np.deg2rad([0, 0, -45]))
+    >>> found.mm.round(3), str(found.body), str(found.other)
+    (np.float64(-37.434), 'q3', 'floor')
+    """
+    values = as_joints(arm, q)
+    whole, full = whole_arm(arm, values.reshape(-1, arm.n))
+    lead = values.shape[:-1]
+    if not whole.keep_out:
+        nothing = np.full(lead, "", dtype="<U1")
+        return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
+    held = guard(whole)
+    mm, which = least(held, full)
+    bodies, others = (np.array([held.of(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
+    return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
+
+
+def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
+    """The arm whose joints `armkin.lock` held, and its joint values: q (N, n)."""
+    while arm.whole is not None:
+        arm, held = arm.whole
+        q = unlock(arm, held, q)
+    return arm, q
+
+
+def least(held: Guard, q: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Least clearance and its pair: q (N, n) -> (N,), (N,); nan where a joint value is, inf where nothing counts."""
+    mm, which = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
+    for k in range(0, len(q) if held.pairs else 0, CHUNK):
+        apart = held.clearances(q[k : k + CHUNK])
+        which[k : k + CHUNK] = apart.argmin(axis=1)
+        mm[k : k + CHUNK] = apart.min(axis=1)
+    mm[np.isnan(q).any(axis=1)] = np.nan
+    return mm, which
+
+
+def clear(arm: Arm, q: Array) -> NDArray[np.bool_]:
+    """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); a row of nan is none."""
+    whole, full = whole_arm(arm, q.reshape(-1, arm.n))
+    free: NDArray[np.bool_] = np.asarray(np.isfinite(full).all(axis=1))
+    if whole.keep_out:
+        free[free] = least(guard(whole), full[free])[0] >= 0.0
+    return free.reshape(q.shape[:-1])
+
+
+def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
+    """Of each posture (N, n) the least clearance [mm] (None: nothing counts) and its hits, the deepest first."""
+    whole, full = whole_arm(arm, q)
+    held = guard(whole)
+    found = []
+    for row in held.clearances(full):
+        deep = [k for k in np.argsort(row, kind="stable") if row[k] < 0]
+        hit: list[Hit] = [{"body": held.of(k)[0], "with": held.of(k)[1], "depth_mm": float(-row[k])} for k in deep]
+        found.append((float(row.min()) if len(row) else None, hit))
+    return found
+
+
+def said(hits: list[Hit]) -> str:
+    """Hits in words.
+
+    >>> said([{"body": "q3", "with": "table", "depth_mm": 12.345}])
+    'hits table by 12.3 mm (q3)'
+    """
+    words = [f"{hit['with']} by {_size(hit['depth_mm'])} ({hit['body']})" for hit in hits]
+    return f"hits {', '.join(words)}" if words else ""
+
+
+def _size(mm: float) -> str:
+    return f"{mm:.1f} mm" if mm >= 0.05 else "less than 0.1 mm"
+
+
+def assumed(arm: Arm) -> list[tuple[str, float]]:
+    """Bodies whose radius no file states, and the radius [mm] that is taken: none for an arm without keep-outs."""
+    whole = whole_arm(arm, np.empty((0, arm.n)))[0]
+    if not whole.keep_out:
+        return []
+    form = guard(whole).bodies
+    return [(name, float(r)) for name, r, so in zip(form.names, form.radius, form.assumed, strict=True) if so]

@@ -1,0 +1,158 @@
+"""Which pairs of an arm's bodies and keep-outs count, and how far apart each is in a posture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.errors import RobotFileError
+from armkin.formula.arrays import Array
+from armkin.keep_out.bodies import Bodies, bodies, ends
+from armkin.keep_out.shapes import Shape, shape_of
+from armkin.keep_out.shapes.segments import between
+from armkin.robot_file.keep_out import SELF, names, problems
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armkin.model.arm import Arm
+
+POSTURES = 256  # in which a pair that always overlaps is looked for, home among them
+CHUNK = 512  # postures at once: what stays in the cache
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
+
+
+class Pair(NamedTuple):
+    """A body and what it is held against."""
+
+    body: int  # index of `Bodies.names`; of two bodies the later one
+    other: int | None  # the other body; None: an obstacle
+    name: str  # of the other
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """An arm's pairs; `distances` has their columns in this order."""
+
+    arm: Arm
+    bodies: Bodies
+    obstacles: tuple[tuple[str, Shape], ...]
+    pairs: tuple[Pair, ...]
+    left_out: tuple[tuple[str, str], ...]
+    moving: NDArray[np.intp]  # segments that are held against obstacles, by body
+    first: NDArray[np.intp]  # where in `moving` each body begins
+    ours: NDArray[np.intp]  # (M,) segments of the later body, by pair of bodies
+    theirs: NDArray[np.intp]  # (M,) of the earlier one
+    starts: NDArray[np.intp]  # where in them each pair begins
+
+    def distances(self, q: Array) -> Array:
+        """Signed distance of every pair, `clearance` not taken off: q (N, n) [rad | mm] -> (N, pairs) [mm]."""
+        out = np.empty((len(q), len(self.pairs)))
+        for k in range(0, len(q), CHUNK):
+            out[k : k + CHUNK] = self._distances(q[k : k + CHUNK]).T
+        return out
+
+    def _distances(self, q: Array) -> Array:
+        """(pairs, N)"""
+        a, b = ends(self.arm, q)
+        radius, owner = self.bodies.radius, self.bodies.owner
+        found = []
+        if len(self.moving):
+            begin, end = a[:, self.moving], b[:, self.moving]
+            less = radius[owner[self.moving]][:, None]
+            found = [np.minimum.reduceat(shape.distance(begin, end) - less, self.first) for _, shape in self.obstacles]
+        if len(self.ours):
+            i, j = self.ours, self.theirs
+            apart = between(a[:, i], b[:, i], a[:, j], b[:, j])
+            apart -= (radius[owner[i]] + radius[owner[j]])[:, None]
+            found.append(np.minimum.reduceat(apart, self.starts))
+        return np.concatenate(found) if found else np.empty((0, len(q)))
+
+    def clearances(self, q: Array) -> Array:
+        """The same with `clearance` taken off: negative is a hit."""
+        return self.distances(q) - self.arm.clearance
+
+    def of(self, pair: int) -> tuple[str, str]:
+        """The names of a pair: body, and what it is held against."""
+        return self.bodies.names[self.pairs[pair].body], self.pairs[pair].name
+
+
+@lru_cache(maxsize=64)
+def guard(arm: Arm) -> Guard:
+    """The pairs of an arm with keep-outs; pairs of bodies that overlap in all postures looked at are left out."""
+    entries = list(zip(names(arm.keep_out), arm.keep_out, strict=True))
+    obstacles = tuple((name, shape_of(entry)) for name, entry in entries if entry.kind != SELF)
+    if not any(entry.kind == SELF for _, entry in entries):
+        return _of(arm, obstacles, [], ())
+    form = bodies(arm)
+    there = [k for k in range(arm.n + 1) if form.exists(k)]
+    pairs = [(later, earlier) for later in there for earlier in there if later - earlier >= 2]
+    apart = _of(arm, (), pairs, ()).distances(postures(arm)).max(axis=0, initial=-np.inf)
+    kept = [pair for pair, most in zip(pairs, apart, strict=True) if most >= 0.0]
+    left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in kept)
+    return _of(arm, obstacles, kept, left)
+
+
+def _of(
+    arm: Arm,
+    obstacles: tuple[tuple[str, Shape], ...],
+    pairs: list[tuple[int, int]],
+    left_out: tuple[tuple[str, str], ...],
+) -> Guard:
+    form = bodies(arm)
+    solid = [k for k in range(1, arm.n + 1) if form.exists(k)]
+    moving = np.flatnonzero(np.isin(form.owner, solid))
+    segments = [np.flatnonzero(form.owner == k) for k in range(arm.n + 1)]
+    both = [[(i, j) for i in segments[later] for j in segments[earlier]] for later, earlier in pairs]
+    flat = np.array([one for part in both for one in part], dtype=np.intp).reshape(-1, 2)
+    sizes = [len(part) for part in both]
+    listed = [Pair(k, None, name) for name, _ in obstacles for k in solid]
+    listed += [Pair(later, earlier, form.names[earlier]) for later, earlier in pairs]
+    return Guard(
+        arm,
+        form,
+        obstacles,
+        tuple(listed),
+        left_out,
+        moving,
+        np.flatnonzero(np.diff(form.owner[moving], prepend=-1)),
+        flat[:, 0],
+        flat[:, 1],
+        np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.empty(0, np.intp),
+    )
+
+
+def postures(arm: Arm) -> Array:
+    """Home, and the first points of the Halton sequence in the first n primes, scaled to the limits: (256, n)."""
+    span = np.where(arm.prismatic, arm.reach, np.pi)
+    low = np.where(np.isfinite(arm.lower), arm.lower, -span)
+    high = np.where(np.isfinite(arm.upper), arm.upper, span)
+    unit = np.array([[_radical_inverse(i, base) for base in _PRIMES[: arm.n]] for i in range(1, POSTURES)])
+    return np.concatenate([arm.home[None], low + unit * (high - low)])
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    """The digits of an index behind the point, in reverse: 6 = 110 in base 2 is 0.011 (Halton 1960)."""
+    value, share = 0.0, 1.0 / base
+    while index:
+        index, digit = divmod(index, base)
+        value += digit * share
+        share /= base
+    return value
+
+
+def check(arm: Arm) -> None:
+    """Raise RobotFileError for names that clash, and for an obstacle that is hit in every posture looked at."""
+    where = arm.scene or arm.path or arm.name
+    for path, text in problems(arm.keep_out, ["base", *arm.joint_names]):
+        raise RobotFileError(f"{where}: keep_out {int(path[1]) + 1}: {text}", file=where)
+    held = guard(arm)
+    apart = held.clearances(postures(arm))
+    for name, _ in held.obstacles:
+        columns = [k for k, pair in enumerate(held.pairs) if pair.other is None and pair.name == name]
+        if columns and (apart[:, columns].min(axis=1) < 0).all():
+            hint = "is the base's z right?" if name.startswith("floor") else "does the arm stand in it?"
+            raise RobotFileError(f"{where}: {name} is hit in every posture: {hint}", file=where, keep_out=name)

@@ -1,0 +1,35 @@
+"""`armkin.load`: a robot by name or file, and the scene that it stands in."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from armkin.model.build import build
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def load(path: str | PathLike[str], scene: str | PathLike[str] | None = None) -> Arm:
+    """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
+
+    scene: a file whose keep-outs are added to the robot's. Raises FileError if a file cannot be read and
+    RobotFileError if it is not valid, or if a keep-out is hit in every posture.
+
+    >>> load("three_dof").joint_names
+    ('q1', 'q2', 'q3')
+    """
+    from armkin import robot_file
+
+    file, around = robot_file.read(path), None
+    if scene is not None:
+        from armkin.robot_file.scene import read
+
+        around = read(scene)
+    arm = build(file, around)
+    if arm.keep_out:
+        from armkin.keep_out.guard import check
+
+        check(arm)
+    return arm

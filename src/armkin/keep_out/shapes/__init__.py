@@ -1,0 +1,41 @@
+"""What stands around an arm: one file a shape, each with the function `read` that takes a keep-out's entry.
+
+floor.py, box.py, capsule.py; segments.py: how far segments are from each other
+
+floor.py, box.py, capsule.py; segments.py: how far segments are from each other
+
+A shape tells its signed distance to segments (negative inside), its corners for pictures, and its numbers for C.
+Another shape is one more file, a line in `_OF`, its keys in `armkin.robot_file.keep_out` and its distance in C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+from armkin.keep_out.shapes import box, capsule, floor
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.robot_file.keep_out import Entry
+
+
+class Shape(Protocol):
+    """A solid that does not move; lengths in mm, in the frame of targets."""
+
+    def distance(self, a: Array, b: Array) -> Array:
+        """Least signed distance over segments: a, b (3, ...) -> (...)."""
+
+    def triangles(self, size: float) -> Array:
+        """Its surface for pictures: (T, 3, 3); size: how far one without end is drawn [mm]."""
+
+    def numbers(self) -> tuple[str, list[float]]:
+        """Its function in C and what that is given."""
+
+
+_OF: dict[str, Callable[[Entry], Shape]] = {"floor": floor.read, "box": box.read, "capsule": capsule.read}
+
+
+def shape_of(entry: Entry) -> Shape:
+    """The shape of an entry that is not `self`."""
+    return _OF[entry.kind](entry)

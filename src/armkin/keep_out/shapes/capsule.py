@@ -1,0 +1,61 @@
+"""A capsule: all points within a radius of a segment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.keep_out.shapes.segments import between
+
+if TYPE_CHECKING:
+    from armkin.robot_file.keep_out import Entry
+
+_ROUND = 24  # corners of its circles in pictures
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule:
+    """A segment with a radius."""
+
+    begin: Array  # (3,)
+    end: Array  # (3,)
+    radius: float
+
+    def distance(self, a: Array, b: Array) -> Array:
+        """Distance of segments to its own, less its radius: a, b (3, ...) -> (...)."""
+        ends = (end.reshape(3, *[1] * (a.ndim - 1)) for end in (self.begin, self.end))
+        return between(a, b, *ends) - self.radius
+
+    def triangles(self, size: float) -> Array:
+        """A tube with half balls."""
+        return tube(self.begin, self.end, self.radius)
+
+    def numbers(self) -> tuple[str, list[float]]:
+        """Its function in C and what that is given."""
+        return "capsule", [*self.begin.tolist(), *self.end.tolist(), self.radius]
+
+
+def read(entry: Entry) -> Capsule:
+    """The capsule of an entry."""
+    assert entry.capsule is not None
+    return Capsule(np.array(entry.capsule.begin), np.array(entry.capsule.end), entry.capsule.radius)
+
+
+def tube(begin: Array, end: Array, radius: float) -> Array:
+    """Triangles (T, 3, 3) of a capsule's surface."""
+    along = end - begin
+    length = float(np.linalg.norm(along))
+    z = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    turn = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
+    circle = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
+    rings = []
+    for centre, heights in ((begin, np.linspace(-np.pi / 2, 0, 5)), (end, np.linspace(0, np.pi / 2, 5))):
+        rings += [centre + radius * (np.cos(h) * circle + np.sin(h) * z) for h in heights]
+    grid = np.array(rings)
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    return np.concatenate([np.stack(one, axis=2).reshape(-1, 3, 3) for one in ((a, b, c), (a, c, d))])
