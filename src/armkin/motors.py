@@ -124,6 +124,17 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     return np.asarray(arm.home + q)
 
 
+def settled(arm: Arm, q: ArrayLike) -> Array:
+    """Joint values within the limits that have the same pulses, if there are: whole steps may be half a step outside.
+
+    q: (..., n) [rad | mm]. Returns (..., n); q itself where its nearest legal values have other pulses.
+    """
+    values = np.asarray(q, dtype=float)
+    inside = np.clip(values, arm.lower, arm.upper)
+    same = (pulses(arm, inside) == pulses(arm, values)).all(axis=-1, keepdims=True)
+    return np.where(same, inside, values)
+
+
 def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
     """Exact and actual joints and tips of the pulses for q.
 

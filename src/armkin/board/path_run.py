@@ -24,10 +24,16 @@ Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory fro
 
 
 def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
-    """A plan's motion between the gripper's, from counts. Raises UsageError if the board is too slow for it."""
+    """A plan's approach, if it has one, and its motion between the gripper's, from counts.
+
+    Raises UsageError if the board is too slow for it.
+    """
     whole = plan.motion
     edges = [0, *(marker.before for marker in plan.markers), len(whole.stretches)]
     found, at, q = [], np.asarray(start, dtype=np.int64), whole.start
+    if plan.approach is not None:
+        found.append(lay(plan.approach, at))
+        at = found[0].end
     for a, b in pairwise(edges):
         trajectory = Trajectory(plan.arm, q, whole.stretches[a:b])
         one = lay(trajectory, at)
@@ -48,13 +54,14 @@ def check_gripper(plan: PathPlan, board: Configuration | Foreign) -> None:
 def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: Progress, first: int = 0) -> None:
     """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them."""
     done, total = 0.0, sum(one.duration for one in laid)
+    markers = [None] * (plan.approach is not None) + [marker.value for marker in plan.markers]
     for k, one in enumerate(laid, first):
         if one.trajectory.stretches:
             begun = done
             machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
             done += one.duration
-        if k < len(plan.markers):
-            _grip(machine, plan.arm.name, plan.markers[k].value)
+        if k < len(markers) and (value := markers[k]) is not None:
+            _grip(machine, plan.arm.name, value)
 
 
 def _grip(machine: Backend, name: str, value: str | float) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armkin.motion.branch_chains import Run
     from armkin.motion.branch_path import Carried
     from armkin.motion.linked_branches import Columns
+    from armkin.motion.trajectory import Trajectory
 
 _WHY = {
     "end": "carries all",
@@ -136,7 +137,12 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "nearest_singularity": None
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
+        **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
     }
+
+
+def _approach(move: Trajectory) -> dict[str, Any]:
+    return {"from_joints": units.joints_out(move.arm, move.start).tolist(), "duration_s": move.duration}
 
 
 def _shown(arm: Arm, joint: int, value: float) -> float:

@@ -16,7 +16,7 @@ from armkin.model.lock import lock, unlock
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.path import path
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import check_rates, straight
+from armkin.motion.plan import approach, check_jerk, check_rates
 from armkin.motion.time_optimal import Knots
 from armkin.motion.trajectory import Straight, Stretch
 
@@ -36,8 +36,8 @@ def path_held(
 ) -> PathPlan:
     """`armkin.path` with joints held: joint name -> value [rad | mm]. The plan is one of the whole arm.
 
-    start, near, jerk: (n,) of all joints, options as in `armkin.path`. The held joints go to their values first, by a
-    joint move. Raises as `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
+    start, near, jerk: (n,) of all joints, options as in `armkin.path`. The held joints go to their values in the plan's
+    approach. Raises as `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
     """
     check_rates(arm)
     free = lock(arm, held)
@@ -54,14 +54,12 @@ def path_held(
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)
         raise
-    whole = _of_all(plan, arm, held)
-    first = straight(arm, here, ready, options.get("speed", 1.0), options.get("accel", 1.0), jerk)
-    before: list[Stretch] = [first] if first.duration else []
+    whole, begun = _of_all(plan, arm, held), unlock(arm, held, plan.motion.start)
     made = [_widened(one, arm, held) for one in plan.motion.stretches]
-    moved = len(before)
     for k, (_, base) in plan.on_path.items():
-        whole.along(k + moved, made[k], base)
-    return whole.finished(here, before + made, [replace(m, before=m.before + moved) for m in plan.markers])
+        whole.along(k, made[k], base)
+    whole.approach = approach(arm, here, begun, plan.speed, options.get("accel", 1.0), check_jerk(arm, jerk))
+    return whole.finished(begun, made, plan.markers)
 
 
 def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
@@ -82,6 +80,7 @@ def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
         nearest_singularity=None if worst is None else (*worst[:2], whole(worst[2])),
         markers=[],
         trajectory=None,
+        approach=None,
         on_path={},
     )
 

@@ -25,10 +25,11 @@ from armkin.motion.branch_path import Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.plan import check_rates, check_share, straight
+from armkin.motion.plan import approach, check_jerk, check_rates, check_share, straight
 from armkin.motion.profile import at_rest
 from armkin.motion.route import joined
 from armkin.motion.trajectory import Straight, Stretch
+from armkin.motors import settled, undriven
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -67,8 +68,9 @@ def path(
     branches are preferred, by default the start. speed, accel: fractions of the joints' limits; tool_speed:
     [mm/s]; jerk: [rad/s3 | mm/s3] for all joints or each; hold: how many times max_accel a joint may be asked for
     when the board holds on the path, None: no matter. split: change the branch, by a joint move, where none
-    carries on. Raises UsageError for moves that make no sense, NoSolutionError if some part is not carried:
-    its `plan` then tells how far every branch goes.
+    carries on. Where the moves begin elsewhere than at `start`, the plan's `approach` is the joint move from there to
+    its first posture, and no part of its motion. Raises UsageError for moves that make no sense, NoSolutionError if
+    some part is not carried: its `plan` then tells how far every branch goes.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")
@@ -89,20 +91,17 @@ def path(
             raise UsageError(
                 f"{name} {given:g} is not possible; it is at least {least:g} mm{'/s' * (name == 'tool_speed')}"
             )
-    limit = None if jerk is None else np.broadcast_to(np.asarray(jerk, dtype=float), (arm.n,))
-    if limit is None and np.isfinite(arm.max_jerk).all():
-        limit = arm.max_jerk
-    if limit is not None and not (np.isfinite(limit).all() and (limit > 0).all()):
-        raise UsageError("jerk must be above 0 and finite")
     pace = Pace(
         (file.speed or 100.0) / 100 * speed,
         accel,
         tool_speed if tool_speed is not None else file.tool_speed,
-        limit,
+        check_jerk(arm, jerk),
         hold,
         tolerance or file.tolerance or TOLERANCE,
     )
     here = arm.home if start is None else np.asarray(start, dtype=float)
+    if arm.motors and not undriven(arm):
+        here = settled(arm, here)
     near = None if near is None else np.asarray(near, dtype=float)
     return _Walk(arm, file, pace, here, _Wishes(task, blend, near, branch, split, samples)).walked()
 
@@ -123,12 +122,14 @@ class _Walk:
     """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
 
     _spot: Spot | None = None
+    opening = False  # whether the path's first posture is not chosen yet
+    leads: Move | None = None  # the move of the file that leads to a group's first point
     at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, wishes: _Wishes) -> None:
         self.arm, self.file, self.pace, self.wishes = arm, file, pace, wishes
         with _of_key(file, "task"):
-            self.plan = PathPlan(arm, _task(arm, file, wishes.task or file.task), pace.tolerance)
+            self.plan = PathPlan(arm, _task(arm, file, wishes.task or file.task), pace.tolerance, pace.speed)
         self.blend = file.blend if wishes.blend is None else wishes.blend
         self.q = here  # where the joints are when all so far is done
         self.made: list[Stretch] = []
@@ -157,43 +158,45 @@ class _Walk:
 
     def walked(self) -> PathPlan:
         """The plan of all moves."""
+        here = self.q
         with _of_key(self.file, "start"):
-            start = self._start()
-        if start is not None:
-            self.q = start
-            self._clear(None)
-        self.begun = self.q
+            self._begin()
         for number, move in enumerate(self.file.moves):
             self.at = number, number
             with _of_moves(self):
                 getattr(self, f"_{move.kind}")(move, getattr(move, move.kind))
         with _of_moves(self):
             self._close()
+        self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
         return self.plan.finished(self.begun, self.made, self.markers)
 
-    def _start(self) -> Array | None:
+    def _begin(self) -> None:
+        """Where the path begins: where the arm stands, in a posture, or at a point, which the first moves choose."""
         start = self.file.start
-        if start is None:
-            return None
-        value = start if isinstance(start, str) else start.joints
-        if value is None:
-            return self._reached(self._target(start.point), None)  # type: ignore[union-attr, arg-type]
-        q = path_numbers.joints(self.arm, self.q, value)
-        check_limits(self.arm, q[None])
-        return q
+        value = start if start is None or isinstance(start, str) else start.joints
+        if start is not None and value is None:
+            goal = self._target(start.point)  # type: ignore[union-attr, arg-type]
+            self._reached(goal, None)  # refused here, of this key
+            self._clear(goal)
+            self.opening = True
+        elif value is not None:
+            self.q = path_numbers.joints(self.arm, self.q, value)
+            check_limits(self.arm, self.q[None])
+            self._clear(None)
+        self.begun = self.q
 
     # Moves
 
     def _joint(self, move: Move, value: Any) -> None:
-        goal = path_numbers.joints(self.arm, self.q, value)
         self._close()
+        goal = path_numbers.joints(self.arm, self.q, value)
         self._go(goal, move)
         self._clear(None)
 
     def _point(self, move: Move, value: list[float]) -> None:
         goal = self._target(value)
         self._close()
-        self.approach = move
+        self.leads = move
         self._clear(goal, move.branch)
 
     def _line(self, move: Move, value: list[float]) -> None:
@@ -272,7 +275,7 @@ class _Walk:
     def _plan_group(self) -> None:
         if not self.pieces:
             if self.goal is not None:
-                self._go(self._reached(self.goal, self.goal_branch), self.approach)
+                self._go(self._reached(self.goal, self.goal_branch), self.leads)
                 for kind, value in self.pauses.get(0, ()):
                     self._mark(kind, value)
             self.goal = None
@@ -289,7 +292,7 @@ class _Walk:
             fixed = self.q if not free and k == 0 else None
             curves = stretches(self.arm, route, s, run, near, self.pace, fixed=fixed)
             if free or k:
-                self._go(curves[0].start, self.approach if k == 0 else None)
+                self._go(curves[0].start, self.leads if k == 0 else None)
             self._lay(route, curves, order)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
@@ -331,9 +334,11 @@ class _Walk:
         if len(bad):
             raise NoSolutionError(f"{said(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
         speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)
-        one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
-        if one.duration > 0:
-            self.made.append(one)
+        if self.opening:  # the path begins here, and what leads here is none of its moves
+            self.begun, self.opening = goal, False
+        else:
+            one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
+            self.made += [one] if one.duration > 0 else []
         self.q = goal
 
     def _reached(self, goal: Spot, branch: str | None) -> Array:

@@ -75,6 +75,7 @@ class PathPlan:
     arm: Arm
     task: Task | None  # None: joint moves alone, on an arm that no task fits
     tolerance: float
+    speed: float = 1.0  # fraction of the joints' max_speed, on joint moves
     length: float = 0.0
     samples: int = 0
     complete: bool = True
@@ -85,6 +86,7 @@ class PathPlan:
     nearest_singularity: tuple[float, float, Array] | None = None
     markers: list[Marker] = field(default_factory=list)
     trajectory: Trajectory | None = None
+    approach: Trajectory | None = None  # the joint move from where the arm stands to the start, no part of the motion
     on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
 
     def along(self, number: int, stretch: Stretch, base: float) -> None:
@@ -99,7 +101,7 @@ class PathPlan:
             self.nearest_singularity = (self.length + float(s[k]), float(worst[k]), q[k].copy())
 
     def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
-        """The same with its motion."""
+        """The same with its motion from a posture on."""
         self.trajectory, self.markers = Trajectory(self.arm, start, tuple(made)), markers
         return self
 

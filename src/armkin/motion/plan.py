@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.motion.profile import at_rest, seven_phases, trapezoid
 from armkin.motion.trajectory import Straight, Trajectory
-from armkin.motors import motor_accel
+from armkin.motors import motor_accel, pulses, undriven
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -77,6 +77,32 @@ def straight(
     if jerk is None:
         return Straight(start, end, trapezoid(1.0, top, accel))
     return Straight(start, end, seven_phases(1.0, top, accel, float((jerk[moving] / change[moving]).min())))
+
+
+def approach(
+    arm: Arm, here: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
+) -> Trajectory | None:
+    """The joint move from where an arm stands, (n,), to where a plan starts; None if it stands there.
+
+    An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight`.
+    """
+    near = np.abs(start - here).max() <= 1e-12
+    if near or (arm.motors and not undriven(arm) and np.array_equal(pulses(arm, start), pulses(arm, here))):
+        return None
+    return Trajectory(arm, here, (straight(arm, here, start, speed, share, jerk),))
+
+
+def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
+    """The greatest jerk of every joint, (n,) [rad/s3 | mm/s3]: the one asked for, else the arm's if all have one.
+
+    Raises UsageError for values that are no jerk.
+    """
+    limit = None if jerk is None else np.broadcast_to(np.asarray(jerk, dtype=float), (arm.n,))
+    if limit is None and np.isfinite(arm.max_jerk).all():
+        limit = arm.max_jerk
+    if limit is not None and not (np.isfinite(limit).all() and (limit > 0).all()):
+        raise UsageError("jerk must be above 0 and finite")
+    return limit
 
 
 def missing_rates(arm: Arm) -> dict[str, list[str]]:

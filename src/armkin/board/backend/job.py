@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.starting import Laid
 from armkin.motion.plan import plan
 from armkin.motion.trajectory import brake
 from armkin.motors import joints, pulses
@@ -21,11 +22,9 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Laid):
     """A trajectory that starts at counts `start` (motors,), sent in so many `segments`: lines or positions."""
 
-    trajectory: Trajectory
-    start: NDArray[np.int64]
     segments: int
 
     @property

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, JobMachine, braking
+from armkin.board.backend.starting import from_counts
 from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
 from armkin.errors import LinkError, PositionKnownError, UsageError
@@ -33,6 +34,7 @@ LATE = 0.05  # [s] that one goes on at most: a program that had no time for long
 WATCH = 0.1  # [s] between readings of position and errors in motion
 LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
 SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
+STRAY = 2 * SETTLED  # [counts] that a motion may begin from where the servos stand: they sag a little under load
 SETTLING = 1.0  # [s] that it may take
 EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
 
@@ -92,6 +94,11 @@ class ServoMachine(JobMachine):
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)
+
+    def _measured(self) -> tuple[int, ...]:
+        """Counts of the arm's motors, read now."""
+        self._read()
+        return self.counts()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -157,7 +164,7 @@ class ServoMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = done = 0.0
-        for job in plans:
+        for job in from_counts(plans, self._measured, tolerance=STRAY):
             if job is None:
                 self._heed()
                 self.port.read(PERIOD)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from armkin.board.backend.starting import check_jog
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import DeviceError
@@ -35,7 +36,12 @@ def prepare(machine: Machine) -> None:
 
 
 def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
-    """Counts per second of a joint's motors, by axis; speed: [deg/s | mm/s], signed."""
+    """Counts per second of a joint's motors, by axis; speed: [deg/s | mm/s], signed.
+
+    Raises NoSolutionError if the joint would go farther outside its limits.
+    """
+    if machine.position() != "lost":
+        check_jog(machine.arm, machine.joints(), joint, speed)
     vector = [0.0] * machine.arm.n
     vector[joint] = speed
     exact = machine.arm.motor_gain @ units.joints_in(machine.arm, vector)

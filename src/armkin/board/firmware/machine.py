@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from armkin.board.backend import StoppedError
+from armkin.board.backend.starting import from_counts, is_believable
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
 from armkin.board.firmware.board_status import WHY, told
 from armkin.board.firmware.protocol import Error, Flag, Status
@@ -69,6 +70,8 @@ class Machine:
         """Whether the arm's position is known: a board configured for another arm does not know it."""
         mask = protocol.mask_of(self.configuration.axes)
         if not self.configured or self.status.known & mask != mask:
+            return "lost"
+        if not is_believable(self.arm, self.counts()):
             return "lost"
         return "retained" if self.status.flags & Flag.RETAINED else "known"
 
@@ -207,7 +210,9 @@ class Machine:
         Returns the status at the end, where the last plan ends, or raises LinkError.
         """
         try:
-            self.status, end = streaming.carry_out(self.session, plans, self.configuration.axes, progress)
+            self.status, end = streaming.carry_out(
+                self.session, from_counts(plans, self.counts), self.configuration.axes, progress
+            )
         except StoppedError as stopped:
             self.status = stopped.status or self.status
             raise

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.board.backend.starting import Laid
 from armkin.board.firmware.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.curves import CurveSegments, rates
 from armkin.board.firmware.straight_lines import Pieces, along, count
@@ -43,11 +44,9 @@ class RateError(UsageError):
 
 
 @dataclass(frozen=True)
-class Cut:
+class Cut(Laid):
     """A trajectory on this board."""
 
-    trajectory: Trajectory
-    start: Counts  # (motors,)
     ends: Counts  # (stretches, motors) where each stretch ends
     top_rate: Array  # (motors,) [counts/s] greatest rate of every motor
     clock: int

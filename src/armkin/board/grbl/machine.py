@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, JobMachine
+from armkin.board.backend.starting import from_counts, is_believable
 from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.session import GrblError, Session
@@ -61,7 +62,7 @@ class GrblMachine(JobMachine):
 
     def position(self) -> Position:
         """Known since somebody said it or the arm was homed, until a reset or an alarm."""
-        return "lost" if self._offset is None else "known"
+        return "known" if self._offset is not None and is_believable(self.arm, self.counts()) else "lost"
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -150,7 +151,7 @@ class GrblMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
         total = done = 0.0
-        for job in plans:
+        for job in from_counts(plans, self.counts):
             if job is None:
                 if self._stop():
                     self.hold()

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.job import planned
+from armkin.board.backend.starting import check_jog
 from armkin.board_kinds import ForeignBoard
 from armkin.errors import LinkError, UsageError
+from armkin.motors import settled
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
@@ -90,10 +92,10 @@ class Foreign(ABC):
     def jog(self, machine: Backend, joint: int, rate: float, seconds: float) -> None:
         """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most."""
         machine.prepare()
-        arm, q = self.arm, machine.joints()
+        arm, q = self.arm, settled(self.arm, machine.joints())
+        check_jog(arm, q, joint, rate)
         goal = q.copy()
-        goal[joint] += rate * seconds
-        goal = np.clip(goal, arm.lower, arm.upper)  # whole steps may stand half a step outside
+        goal[joint] = np.clip(q[joint] + rate * seconds, *sorted((q[joint], (arm.lower, arm.upper)[rate > 0][joint])))
         share = float(abs(rate) / arm.max_speed[joint])
         machine.run([self.plan(machine.counts(), goal[None], min(share, 1.0))])
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, JobMachine, braking
+from armkin.board.backend.starting import from_counts, is_believable
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
 from armkin.board.klipper.axes import Axis, Difference, axes_of, differences
@@ -64,7 +65,7 @@ class KlipperMachine(JobMachine):
 
     def position(self) -> Position:
         """Known while Klipper is ready, the axes are registered and their motors on."""
-        return "known" if self._known else "lost"
+        return "known" if self._known and is_believable(self.arm, self.counts()) else "lost"
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -131,7 +132,7 @@ class KlipperMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
         total = done = 0.0
-        for one in plans:
+        for one in from_counts(plans, self.counts):
             if one is None:
                 if self._stop():
                     raise StoppedError

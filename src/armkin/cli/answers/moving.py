@@ -76,6 +76,13 @@ class NearestSingularity(TypedDict):
     condition: Annotated[float | None, "of the Jacobian; null: infinite"]
 
 
+class Approach(TypedDict):
+    """The joint move from where the arm stands to where a path starts: in no other field."""
+
+    from_joints: Annotated[list[float], "[deg or mm]"]
+    duration_s: float
+
+
 class Path(Head):
     """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
 
@@ -95,6 +102,7 @@ class Path(Head):
     limits: Annotated[dict[str, dict[str, float]] | None, "speed, accel, jerk: greatest share of each joint's limit"]
     nearest_singularity: NearestSingularity | None
     segments: Annotated[int | None, "that a board is sent; null without drives"]
+    approach: Annotated[NotRequired[Approach], "absent where the arm stands at the path's start"]
     dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]
 
 

@@ -181,9 +181,13 @@ def _carried_out(
             path_run.check_gripper(plan, board)
             laid = path_run.parts(plan, began, machine.lay)
             _files(plan, out, plot)
+        if plan.approach is not None and held is None:
+            output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
         with resuming.under_way(machine, laid, held) as (left, first, note), board_link.told(left, note) as tell:
             path_run.follow(machine, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
+        if held is not None:
+            found.pop("approach", None)  # where it began, that motion is over
     _print(plan, found, json=json, out=out)
     if not json:
         with output.beside(out) as write:
@@ -258,7 +262,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
         return None
     if rehearsal:
         path_run.check_gripper(plan, there)
-    start = pulses(plan.arm, plan.motion.start).tolist()
+    start = pulses(plan.arm, (plan.approach or plan.motion).start).tolist()
     if isinstance(there, Foreign):
         return path_run.parts(plan, start, there.lay)
     board = there.board
@@ -269,7 +273,7 @@ def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
     from armkin.motion.branch_report import answer
 
-    segments = None if laid is None else sum(one.segments for one in laid)
+    segments = None if laid is None else sum(one.segments for one in laid[plan.approach is not None :])
     return {**render.head(plan.arm), **answer(plan), "segments": segments}
 
 
@@ -317,6 +321,8 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         lines[0] += f", {found['duration_s']:.3f} s"
         if found["segments"] is not None:
             lines[0] += f", {found['segments']} segments"
+        if "approach" in found:
+            lines.append(f"  before it {found['approach']['duration_s']:.3f} s from where the arm stands to its start")
     for run in found["runs"]:
         names = ", then ".join(
             f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")

@@ -1,0 +1,113 @@
+"""Where a motion begins: at the counts that the board gave, whatever its kind.
+
+Every trajectory that becomes counts passes through `check_start`, and every plan that a board is about to carry out
+through `from_counts`. What a motion may not do as a whole is refused in `check_start`, too: before anything moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.errors import NoSolutionError, UsageError
+from armkin.model.limits import SLACK, fields, said
+from armkin.motion.trajectory import Straight
+from armkin.motors import joints, pulses, settled
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
+
+_TURN = 2 * np.pi  # [rad] outside its limits at which a revolute joint's position is not believed
+_SAMPLES = 256  # of a curve that begins outside the limits
+
+
+class StartError(RuntimeError):
+    """A plan does not begin where the arm stands: a bug in armkin, found before anything has moved."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A trajectory that begins at counts `start` (motors,) of a board. Raises as `check_start` does."""
+
+    trajectory: Trajectory
+    start: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        check_start(self.trajectory, self.start)
+
+
+def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
+    """Raise if a trajectory may not be carried out from counts (motors,).
+
+    StartError: it begins elsewhere. NoSolutionError, naming joint, value and limit: it begins outside the limits,
+    and takes a joint farther out.
+    """
+    arm = trajectory.arm
+    first = pulses(arm, trajectory.start)
+    # Of more motors than joints the joints are a least squares fit, which may round to the next count.
+    if np.abs(first - start).max(initial=0) > (len(arm.motor_gain) > arm.n):
+        raise StartError(f"a plan that begins at {first.tolist()} counts was made for an arm at {list(start)}")
+    out = beyond(arm, trajectory.start)
+    if not out.any():
+        return
+    for stretch in trajectory.stretches:
+        times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
+        reached = stretch.at(np.asarray(times, dtype=float))
+        farther = beyond(arm, reached).max(axis=0) > out + SLACK
+        if farther.any():
+            raise _farther(arm, int(farther.argmax()), trajectory.start)
+
+
+def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
+    """Raise NoSolutionError if a joint that stands outside its limits, arm at q (n,), is to move farther out."""
+    if beyond(arm, q)[joint] > 0 and (q[joint] > arm.upper[joint]) == (rate > 0):
+        raise _farther(arm, joint, q)
+
+
+def _farther(arm: Arm, joint: int, q: Array) -> NoSolutionError:
+    value = float(q[joint])
+    return NoSolutionError(
+        f"{said(arm, joint, value)}, where the arm stands, and this takes it farther out: nothing was moved",
+        advice=f"move {arm.joint_names[joint]} inside its limits first",
+        **fields(arm, joint, value),
+    )
+
+
+def beyond(arm: Arm, q: Array) -> Array:
+    """How far joints are outside their limits: (..., n) [rad | mm]; 0 inside, and for half a step outside."""
+    values = settled(arm, q)
+    return np.abs(values - np.clip(values, arm.lower, arm.upper))
+
+
+def is_believable(arm: Arm, counts: Sequence[int]) -> bool:
+    """Whether an arm may stand at counts: no joint more than a turn (a slide: its travel) outside its limits."""
+    try:
+        q = joints(arm, counts)
+    except UsageError:  # motors of one joint contradict each other
+        return False
+    most = np.where(arm.prismatic, arm.upper - arm.lower, _TURN)
+    return bool((np.abs(q - np.clip(q, arm.lower, arm.upper)) <= most + SLACK).all())
+
+
+def from_counts(
+    plans: Iterable[Any], counts: Callable[[], Sequence[int]], *, tolerance: int | None = None
+) -> Iterator[Any]:
+    """Pass plans on that begin where the arm stands: the first at `counts()`, each other where the one before it ends.
+
+    tolerance: [counts] of a kind that measures where it stands, and does so before each plan. None in between:
+    nothing to do yet. Raises StartError for a plan that begins elsewhere.
+    """
+    at: NDArray[np.int64] | None = None
+    for plan in plans:
+        if plan is not None:
+            here = np.asarray(counts() if at is None or tolerance is not None else at, dtype=np.int64)
+            if np.abs(plan.start - here).max(initial=0) > (tolerance or 0):
+                raise StartError(f"a plan begins at {plan.start.tolist()} counts, the arm stands at {here.tolist()}")
+            at = plan.end
+        yield plan
