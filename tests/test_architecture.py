@@ -50,7 +50,7 @@ MAY_IMPORT: dict[str, str] = {
     "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
     "board/ports": "errors",
     "board/firmware": "board/backend errors board_kinds formula model forward motors motion board/ports robot_file",
-    "board/backend": "formula model motion motors board/ports",
+    "board/backend": "errors formula model motion motors board/ports",
     "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/klipper": "errors formula model motors motion board/ports board/backend",

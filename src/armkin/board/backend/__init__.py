@@ -1,6 +1,7 @@
 """What every kind of board can do for an arm. Our own firmware is one of several.
 
-job.py  a trajectory for a board that is sent positions, not segments
+starting.py  where a motion begins: what every trajectory that becomes counts is held to
+job.py       a trajectory for a board that is sent positions, not segments
 
 A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
 becomes bytes is its own business.

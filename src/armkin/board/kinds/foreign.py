@@ -14,6 +14,8 @@ from armkin.board.backend.job import planned
 from armkin.board.backend.starting import check_jog
 from armkin.board_kinds import ForeignBoard
 from armkin.errors import LinkError, UsageError
+from armkin.motion.plan import straight
+from armkin.motion.trajectory import Trajectory
 from armkin.motors import settled
 
 if TYPE_CHECKING:
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
     from armkin.robot_file.model import Gripper
 
 
@@ -97,7 +98,8 @@ class Foreign(ABC):
         goal = q.copy()
         goal[joint] = np.clip(q[joint] + rate * seconds, *sorted((q[joint], (arm.lower, arm.upper)[rate > 0][joint])))
         share = float(abs(rate) / arm.max_speed[joint])
-        machine.run([self.plan(machine.counts(), goal[None], min(share, 1.0))])
+        way = Trajectory(arm, machine.joints(), (straight(arm, machine.joints(), goal, min(share, 1.0)),))
+        machine.run([self.lay(way, np.array(machine.counts()))])
 
     def gripper(self) -> Gripper:
         """The arm's gripper. Raises UsageError if it has none that this kind of board moves."""

@@ -1,0 +1,48 @@
+"""A path sent from elsewhere by the command line: every step that the emulated Uno's pins make against the path."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from emulator import EmulatedBoard
+from pins import net
+
+import armkin
+from command_line import THREE_DOF, patiently, run
+from starting_elsewhere import Result, judged
+
+
+def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Sequence[float]) -> Result:
+    """Put the arm into a place [deg], send the path from there, and read the pins while it moves."""
+    arm = armkin.load(THREE_DOF)
+    file = folder / "path.yaml"
+    file.write_text(json.dumps(moves))
+    assume = [] if any(net(board)) else ["--assume-home"]
+    there = patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
+    assert there.code == 0, there.err
+    before, begin = net(board), 0
+
+    def noted(*words: object) -> Any:
+        """The same command, where the motors stand before it: a busy machine may have held the arm on its way."""
+        nonlocal before, begin
+        before, begin = net(board), board.control("cycles")["cycle"]
+        return run(*words)
+
+    done = patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
+    assert done.code == 0, done.err
+    assert net(board) == done.json["pulses"]
+    trace = board.trace()
+    steps = [(when[when > begin], way[when > begin]) for when, way in map(trace.steps, "XYZ")]
+    cycle = np.concatenate([when for when, _ in steps])
+    change = np.zeros((len(cycle), 3), np.int64)
+    at = 0
+    for k, (when, direction) in enumerate(steps):
+        change[at : at + len(when), k] = direction
+        at += len(when)
+    counts = before + np.cumsum(change[np.argsort(cycle, kind="stable")], axis=0)
+    plan = armkin.path(arm, moves, start=armkin.joints(arm, before))
+    return judged(plan, np.vstack([before, counts, net(board)]).astype(float))
