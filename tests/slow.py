@@ -157,6 +157,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_board.py": (),
     "teach/test_teach_browser.py": (),
     "teach/test_teach_flow.py": (),
+    "teach/test_teach_follow.py": (),
     "teach/test_teach_guard.py": ("test_a_thousand_connections_do_not_keep_the_page_out",),
     "teach/test_teach_look.py": ("test_every_robot_has_a_scene_and_a_first_picture",),
     "teach/test_teach_safety.py": (),

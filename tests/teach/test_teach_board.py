@@ -108,7 +108,7 @@ def test_a_jog_that_begins_before_its_request_is_answered_is_one(sim: Page, monk
 
     monkeypatch.setattr(board.thread, "submit", late)
     assert sim.act("jog", joint=0, percent=100)[0] == 200
-    assert sim.idle()["pulses"][0] > 100
+    assert sim.idle()["pulses"][0] > 0  # its button counts as held from its request on
 
 
 def jogged(page: Page, percent: float, there: Callable[[float], bool]) -> None:
@@ -155,22 +155,22 @@ def test_a_program_is_carried_out_with_the_gripper_in_between(sim: Page) -> None
 
 
 def test_nothing_follows_unless_it_is_told_to(sim: Page) -> None:
-    sim.act("look", q=[20, 80, -80])
+    sim.act("look", q=[20, 80, -80], goal=True)
     time.sleep(0.4)
     assert sim.idle()["pulses"] == [0, 0, 0]
     assert sim.act("follow", on=True)[1] == {"on": True}
-    sim.act("look", q=[6, 90, -90])
+    sim.act("look", q=[6, 90, -90], goal=True)
     state = sim.idle()
     assert state["joints"] == pytest.approx([6, 90, -90], abs=0.02)
-    sim.act("look", q=[6, 130, -90])  # outside: not followed
+    sim.act("look", q=[6, 130, -90], goal=True)  # outside: not followed
     time.sleep(0.4)
     assert sim.idle()["joints"] == pytest.approx([6, 90, -90], abs=0.02)
-    sim.act("look", q=[60, 90, -90])
+    sim.act("look", q=[60, 90, -90], goal=True)
     sim.hear("board", lambda state: state["doing"] == "follow" and state["joints"][0] > 8)
     sim.act("stop")
     stopped = sim.idle()["pulses"]
     assert stopped[0] < 60 * 12800 / 360 - 100
-    sim.act("look", q=[0, 90, -90])
+    sim.act("look", q=[0, 90, -90], goal=True)
     time.sleep(0.4)
     assert sim.idle()["pulses"] == stopped  # STOP has switched it off
 

@@ -157,6 +157,11 @@ def test_other_origins_read_nothing(server: Server) -> None:
     assert ask(server, "GET", "/", None, {"Host": "evil.example"})[0] == 403
     assert ask(server, "GET", "/", None, {"Origin": "https://evil.example"})[0] == 403
     assert ask(server, "GET", "/events?tab=x", None, {"Sec-Fetch-Site": "cross-site"})[0] == 403
+    link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+    assert ask(server, "GET", "/", None, link)[0] == 200  # it opens the page, and reads nothing of it
+    assert ask(server, "GET", "/events?tab=x", None, link)[0] == 403
+    assert ask(server, "GET", "/", None, {**link, "Sec-Fetch-Dest": "iframe"})[0] == 403
+    assert ask(server, "GET", "/", None, {**link, "Host": "evil.example"})[0] == 403
     assert ask(server, "GET", "/events?tab=x")[0] == 410
     status, headers, _ = ask(server, "OPTIONS", "/api/stop", None, {"Origin": "https://evil.example"})
     assert status == 501

@@ -54,6 +54,8 @@ class Actions:
         tab = self.tabs.find(tab_id)
         if name == "take":
             self.tabs.take(tab)
+            if self.board is not None:
+                self.board.end_follow()
             return {}
         if name not in self.for_control:
             raise RefusedError(404, f"there is no action {name[:40]!r}")
@@ -82,7 +84,11 @@ class Actions:
         }
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Where a pose or a target is, with all branches; the other pages see it, too."""
+        """Where a pose or a target is, with all branches; the other pages see it, too.
+
+        `goal`: a person drags or types it: an arm that follows goes there. Any other new pose ends following: a drag
+        from there would take the arm along to what nobody dragged.
+        """
         from armkin.teach.pose_answers import Question, look  # the solver: imported while the browser loads the page
 
         arm = self.arm
@@ -105,10 +111,15 @@ class Actions:
         )
         with self._solving:
             answer = look(arm, question)
-        self._shown = answer
+        before, self._shown = self._shown, answer
         self.tabs.tell("look", answer, but=tab)
-        if self.board is not None and not answer["outside"]:
-            self.board.shown(units.joints_in(arm, answer["q"]))
+        if self.board is None:
+            return answer
+        if request_checks.flag(fields, "goal"):
+            if not answer["outside"]:
+                self.board.shown(tab, units.joints_in(arm, answer["q"]))
+        elif not before or answer["q"] != before["q"]:
+            self.board.end_follow()
         return answer
 
     def stands(self) -> tuple[int, ...] | None:

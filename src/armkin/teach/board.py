@@ -16,7 +16,7 @@ from armkin.board import path_run
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.machine import Machine
 from armkin.board.kinds import Foreign
-from armkin.errors import FileError, LinkError, UsageError
+from armkin.errors import ArmkinError, FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.robot_file.catalogue import locate
@@ -43,15 +43,14 @@ class BoardActions:
     def __init__(self, thread: BoardThread, program: Callable[[Array, float], PathPlan]) -> None:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
         self.thread, self.arm, self.program = thread, thread.arm, program
-        self.follows = False
         self._alive = 0.0  # until when a jog goes on
         self._jogging: tuple[int, float] | None = None
         self._goal: Array | None = None
         self._lock = threading.Lock()
 
     def actions(self) -> dict[str, Action]:
-        """Name -> action, for the page in control."""
-        return {
+        """Name -> action, for the page in control. Each but `follow` ends following, also where it is refused."""
+        others = {
             "connect": self.connect,
             "send": self.send,
             "run": self.run_program,
@@ -60,18 +59,27 @@ class BoardActions:
             "jog": self.jog,
             "jog_end": self.jog_end,
             "grip": self.grip,
-            "follow": self.follow,
         }
+        return {"follow": self.follow, **{name: self._unfollowed(action) for name, action in others.items()}}
+
+    def _unfollowed(self, action: Action) -> Action:
+        def act(tab: Tab, fields: Fields) -> dict[str, Any]:
+            self.end_follow()
+            return action(tab, fields)
+
+        return act
 
     def stop(self) -> None:
         """STOP: follows no more, and holds the arm."""
-        self.follows, self._alive = False, 0.0
+        self._alive = 0.0
         self.thread.stop()
+        self.end_follow()
 
     def abandoned(self) -> None:
         """The page in control is gone."""
-        self.follows, self._alive = False, 0.0
+        self._alive = 0.0
         self.thread.abandoned()
+        self.end_follow()
 
     def connect(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Open the port again."""
@@ -155,16 +163,24 @@ class BoardActions:
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Let the arm follow the page's pose, slowly; off at every start."""
-        self.follows = request_checks.flag(fields, "on")
+        """Let the arm follow what is dragged or typed in this page, slowly; off at every start."""
+        on = request_checks.flag(fields, "on")
+        if on and self.thread.stands() is None:
+            raise LinkError("the arm's position is not known: it does not follow from there")
         self._goal = None
-        return {"on": self.follows}
+        self.thread.set_follower(tab.id if on else "")
+        return {"on": on}
 
-    def shown(self, q: Array) -> None:
-        """The page shows a pose within the limits: where the arm goes if it follows."""
-        if not self.follows:
-            return
+    def end_follow(self) -> None:
+        """The arm follows no page; a hop that is under way ends where it was to end."""
+        self._goal = None
+        self.thread.set_follower("")
+
+    def shown(self, tab: Tab, q: Array) -> None:
+        """A person has dragged or typed a pose within the limits: where the arm goes if it follows that page."""
         with self._lock:
+            if self.thread.follower != tab.id:
+                return
             self._goal = q
             if self.thread.doing:
                 return
@@ -252,13 +268,17 @@ class BoardActions:
     def _follow(self, machine: Backend) -> None:
         """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""
         scale = np.where(self.arm.prismatic, 0.5, 180 / np.pi) / FOLLOW_HOP
-        while self.follows and self._goal is not None:
-            here, goal = machine.joints(), self._goal
-            far = float((np.abs(goal - here) * scale).max())
-            self.run(machine, (here + (goal - here) / max(far, 1.0))[None], FOLLOW_SPEED)
-            with self._lock:
-                if far <= 1.0 and goal is self._goal:
-                    self._goal = None
+        try:
+            while (goal := self._goal) is not None and self.thread.follower:
+                here = machine.joints()
+                far = float((np.abs(goal - here) * scale).max())
+                self.run(machine, (here + (goal - here) / max(far, 1.0))[None], FOLLOW_SPEED)
+                with self._lock:
+                    if far <= 1.0 and goal is self._goal:
+                        self._goal = None
+        except ArmkinError:
+            self.end_follow()
+            raise
 
     def _progress(self, done: float, total: float) -> None:
         self.thread.done = (round(done, 1), round(total, 1))

@@ -45,6 +45,7 @@ class BoardThread:
         self.link: Port | None = None
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
+        self.follower = ""  # id of the page that the arm follows; empty: none
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._stop = threading.Event()
@@ -55,6 +56,7 @@ class BoardThread:
         self._ended_jobs = (0, "")  # how many, and the last one's name: a page may miss how a short one began
         self._told: dict[str, Any] = {}
         self._told_at = 0.0
+        self._telling = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="board")
         self._thread.start()
 
@@ -72,6 +74,14 @@ class BoardThread:
         """Stop the arm along its path; returns at once."""
         self._stop.set()
         self._wake.set()
+
+    def set_follower(self, tab: str) -> None:
+        """The arm follows that page, or none; all pages are told."""
+        with self._telling:
+            before, self.follower = self.follower, tab
+            if tab != before and self._told:
+                self._told = {**self._told, "follows": bool(tab)}
+                self.tell(self._told)
 
     def abandoned(self) -> None:
         """The page that held control is gone: what it has started ends."""
@@ -211,6 +221,7 @@ class BoardThread:
         if self.link is not None:
             self.link.close()
         self.link = self.machine = None
+        self.set_follower("")
 
     def _state(self) -> dict[str, Any]:
         machine = self.machine
@@ -220,6 +231,7 @@ class BoardThread:
             "simulated": self.port == SIM,
             "connected": machine is not None,
             "doing": self._doing,
+            "follows": bool(self.follower),
             "ended": {"count": self._ended_jobs[0], "name": self._ended_jobs[1]},
             "done_s": self.done[0],
             "total_s": self.done[1],
@@ -236,7 +248,8 @@ class BoardThread:
         return found
 
     def _publish(self) -> None:
-        state = self._state()
-        if state != self._told:
-            self._told, self._told_at = state, time.monotonic()
-            self.tell(state)
+        with self._telling:
+            state = self._state()
+            if state != self._told:
+                self._told, self._told_at = state, time.monotonic()
+                self.tell(state)

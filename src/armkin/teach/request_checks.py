@@ -31,14 +31,16 @@ class Guard:
         self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
         self._origins = {f"http://{host}" for host in self._hosts}
 
-    def check_read(self, headers: Mapping[str, str]) -> None:
-        """A GET: the Host must be ours (a rebound name is not), and no other origin may ask."""
+    def check_read(self, headers: Mapping[str, str], *, page: bool = False) -> None:
+        """A GET: the Host must be ours (a rebound name is not), and no other origin may ask; page: for the page."""
         if headers.get("Host", "").lower() not in self._hosts:
             raise RefusedError(403, "this server answers to 127.0.0.1 and localhost only")
         if headers.get("Origin", next(iter(self._origins))).lower() not in self._origins:
             raise RefusedError(403, "another origin may not ask")
-        # A form or an image of another site sends no Origin; browsers say this instead.
-        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
+        # A form or an image of another site sends no Origin; browsers say this instead. A link that opens the page
+        # itself, as the file does that `armkin teach` opens, gives its site nothing to read.
+        opens = headers.get("Sec-Fetch-Mode") == "navigate" and headers.get("Sec-Fetch-Dest") == "document"
+        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none") and not (page and opens):
             raise RefusedError(403, "another site may not ask")
 
     def check_action(self, headers: Mapping[str, str]) -> None:

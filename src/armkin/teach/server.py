@@ -113,8 +113,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def _get(self) -> None:
-        self.server.guard.check_read(_headers(self))
         path, _, query = self.path.partition("?")
+        self.server.guard.check_read(_headers(self), page=path == "/")
         if path == "/events":
             self._events(query)
             return

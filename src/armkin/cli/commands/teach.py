@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Annotated
 
 import typer
@@ -38,7 +40,7 @@ def teach(
         check(port)
     actions = Actions(arm, port, baud)
     try:
-        with Server(actions) as server:
+        with Server(actions) as server, ExitStack() as stack:
             with output.destination(None) as write:
                 write(f"{server.address}\n")
             output.note("Ctrl-C ends it" + (", after the arm has been stopped" if port is not None else ""))
@@ -46,7 +48,20 @@ def teach(
             if open:
                 import webbrowser
 
-                webbrowser.open(server.address)
+                webbrowser.open(stack.enter_context(redirection(server.address)))
             server.serve_forever(poll_interval=0.2)
     finally:
         actions.close()  # a moving arm is stopped first
+
+
+@contextmanager
+def redirection(address: str) -> Iterator[str]:
+    """Address of a private file that sends a browser on: `address` has the key, and every user sees command lines."""
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory(prefix="armkin-") as folder:  # for its owner alone
+        file = Path(folder) / "teach.html"
+        file.touch(mode=0o600)
+        file.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">\n', encoding="ascii")
+        yield file.as_uri()

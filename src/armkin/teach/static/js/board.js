@@ -48,9 +48,29 @@ export class Board {
       this.ask("assume_home", { consent: checked("consent") });
       /** @type {HTMLInputElement} */ (get("consent")).checked = false;
     });
-    get("follow").addEventListener("change", () => this.ask("follow", { on: checked("follow") }));
+    get("follow").addEventListener("change", () => (checked("follow") ? this.follow() : this.ask("follow", { on: false })));
     this.dead("jog-down", -1);
     this.dead("jog-up", 1);
+  }
+
+  /** From where it stands: what is shown instead was not dragged. */
+  async follow() {
+    if (this.state?.joints) this.page.show([...this.state.joints]);
+    await this.page.pose();
+    await this.ask("follow", { on: true });
+    this.follows();
+  }
+
+  /** The page shows what nobody has dragged. */
+  unfollow() {
+    if (!this.state?.follows) return;
+    this.state.follows = false; // it is asked for once
+    this.follows();
+    this.ask("follow", { on: false });
+  }
+
+  follows() {
+    /** @type {HTMLInputElement} */ (get("follow")).checked = this.state?.follows ?? false;
   }
 
   /** A dead man's button: by pointer, and by the space bar or Enter. @param {string} id @param {number} sign */
@@ -109,9 +129,8 @@ export class Board {
     this.ask("grip", { value, assume });
   }
 
-  /** STOP was pressed: nothing follows any more. */
+  /** STOP was pressed. */
   stopped() {
-    /** @type {HTMLInputElement} */ (get("follow")).checked = false;
     clearInterval(this.beating);
     this.beating = 0;
   }
@@ -143,6 +162,7 @@ export class Board {
     else if (state.differences.length) get("how-safe").textContent = `${state.differences.join(". ")}. ${stop}`;
     else get("how-safe").textContent = "If this page is closed, its browser ends or armkin teach is paused while the arm moves, the board holds it "
         + "along its path within a second, and its position stays known. " + stop;
+    this.follows();
     this.buttons();
     this.page.moved(state);
   }

@@ -5,7 +5,7 @@ import { fixed, get, make, show, typed } from "./dom.js";
 export class Joints {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {(q: number[]) => void} moved
+   * @param {(q: number[], byHand?: boolean) => void} moved byHand: dragged or typed
    * @param {() => void} locked
    */
   constructor(arm, moved, locked) {
@@ -32,7 +32,7 @@ export class Joints {
       const change = (/** @type {number} */ value) => {
         const q = [...this.q];
         q[i] = value;
-        moved(q);
+        moved(q, true);
       };
       slider.addEventListener("input", () => change(slider.valueAsNumber));
       typed(box, change);

@@ -22,9 +22,9 @@ class Page {
     this.look = look;
     this.q = look.q;
     this.branch = "";
-    this.joints = new Joints(arm, (q) => this.turn(q), () => this.ask({}));
-    this.tip = new Tip((target) => this.aim(target), (branch) => this.choose(branch), (q) => this.turn(q));
-    this.motors = new Motors(arm, () => this.ask({}));
+    this.joints = new Joints(arm, (q, byHand) => this.turn(q, byHand), () => this.refresh());
+    this.tip = new Tip((target) => this.aim(target, { goal: true }), (branch) => this.choose(branch), (q) => this.turn(q));
+    this.motors = new Motors(arm, () => this.refresh());
     /** @type {import("./view.js").View | null} */
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
@@ -38,7 +38,7 @@ class Page {
       pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text) => trouble(text, "board"),
     });
     this.program = new Program(arm, {
-      pose, settled: () => this.ask({}), show: (q) => this.turn(q), played: (q) => this.played(q),
+      pose, settled: () => this.refresh(), show: (q) => this.turn(q), played: (q) => this.played(q),
       trail: (tips) => this.view?.trail(tips),
       trouble: (text) => trouble(text, "program"), mine: () => this.mine,
     });
@@ -53,20 +53,24 @@ class Page {
     this.mine = mine;
     for (const source of ["page", "program", "board"]) trouble("", source);
     this.program.planning.push({});
-    this.ask({});
+    this.refresh();
   }
 
-  /** Turn the joints. @param {number[]} q */
-  turn(q) {
+  /** Turn the joints. @param {number[]} q @param {boolean} [goal] whether a person drags or types: an arm that follows goes there */
+  turn(q, goal = false) {
     this.q = q;
     this.joints.show(q);
     if (!this.moving) this.view?.pose(q);
-    this.ask({});
+    this.ask({ goal });
   }
 
-  /** Aim the tip. @param {number[]} target @param {boolean} [dragging] */
-  aim(target, dragging = false) {
-    this.ask({ target, branch: this.branch, nearest: !dragging });
+  /**
+   * Aim the tip.
+   * @param {number[]} target
+   * @param {{dragging?: boolean, goal?: boolean}} [how] goal: as in `turn`
+   */
+  aim(target, { dragging = false, goal = false } = {}) {
+    this.ask({ target, branch: this.branch, nearest: !dragging, goal });
   }
 
   /** @param {import("./types.js").Branch} branch */
@@ -79,13 +83,20 @@ class Page {
   ask(fields) {
     if (!this.mine) return;
     document.documentElement.dataset.asking = "yes";
-    this.asking.push({ ...fields, held: [...this.joints.held], best: this.motors.best.checked });
+    this.asking.push(fields);
+  }
+
+  /** Ask for the same pose again; what waits to be asked is newer than that. */
+  refresh() {
+    if (this.asking.next === null) this.ask({});
   }
 
   /** @param {any} fields */
   async answer(fields) {
     try {
-      const look = /** @type {Look} */ (await act("look", { q: this.q, ...fields }));
+      const look = /** @type {Look} */ (await act("look", {
+        q: this.q, held: [...this.joints.held], best: this.motors.best.checked, ...fields,
+      }));
       const turned = !fields.target && this.asking.next !== null;
       if (!turned) this.show(look, fields.target !== undefined, this.asking.next !== null);
       trouble("");
@@ -98,6 +109,7 @@ class Page {
   /** The program is played: the arm alone, without asking for every pose. @param {number[]} q */
   played(q) {
     if (this.moving) return;
+    this.board.unfollow();
     this.q = q;
     this.joints.show(q);
     this.view?.pose(q);
@@ -114,7 +126,7 @@ class Page {
       this.view.pose(state.joints);
       this.view.showGhosts([]);
     } else if (ended) {
-      this.ask({});
+      this.refresh();
       this.program.planning.push({}); // it starts where the arm stands
       this.show(this.look);
     } else this.showGhosts();
@@ -180,9 +192,9 @@ class Page {
       const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);
       const flat = isFlat(this.look.task);
       const target = flat ? [...position.slice(0, 2), ...(this.look.target ?? []).slice(2)] : [...position, ...rest];
-      this.aim(target, true);
+      this.aim(target, { dragging: true, goal: true });
     };
-    view.gizmo.dropped = () => this.aim(this.tip.target);
+    view.gizmo.dropped = () => this.aim(this.tip.target, { goal: true });
     for (const button of document.querySelectorAll("[data-view]")) {
       button.addEventListener("click", () => view.look(/** @type {HTMLElement} */ (button).dataset.view ?? ""));
     }

@@ -16,7 +16,7 @@
  *   motors: Motors|null, task: string|null, why?: string, labels?: string[], units?: string[], target?: number[],
  *   status: string|null, complete?: boolean, free?: string[], branches: Branch[], names?: string[],
  *   chosen?: number|null, closest?: {joints: number[], distance_mm: number, angle_deg: number}|null}} Look
- * @typedef {{port: string, board: string, simulated: boolean, connected: boolean, doing: string, ended: {count: number, name: string}, done_s: number,
+ * @typedef {{port: string, board: string, simulated: boolean, connected: boolean, doing: string, follows: boolean, ended: {count: number, name: string}, done_s: number,
  *   total_s: number, position: string, pulses: number[]|null, joints: number[]|null, error: string, differences: string[]}} BoardState
  * @typedef {{kind: string, name: string, said: string, blend: number|null}} ProgramMove
  * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,

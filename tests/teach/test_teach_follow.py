@@ -1,0 +1,234 @@
+"""The arm follows the page only where a person drags or types, and only for the page that asked for it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import chromium, opened, settled, until
+from playwright.sync_api import Browser
+from served import Page, served
+
+from armkin.cli.commands import teach as command
+from armkin.errors import LinkError
+
+HOME = [0, 90, -90]
+NEAR = [6, 90, -90]
+
+
+@pytest.fixture
+def sim() -> Iterator[Page]:
+    with served(board="sim") as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        page.idle()
+        yield page
+        page.close()
+
+
+@pytest.fixture
+def following(sim: Page) -> Page:
+    """A page that the arm follows: it has done so, and stands."""
+    assert sim.act("follow", on=True) == (200, {"on": True})
+    assert sim.act("look", q=NEAR, goal=True)[0] == 200
+    assert sim.idle()["joints"] == pytest.approx(NEAR, abs=0.02)
+    assert sim.state()["follows"]
+    return sim
+
+
+def rests(page: Page) -> bool:
+    """Whether nothing moves the arm: the board has been looked at twice since."""
+    before = page.idle()["pulses"]
+    time.sleep(0.6)
+    return bool(page.idle()["pulses"] == before)
+
+
+ENDS: dict[str, dict[str, Any]] = {
+    "send": {"q": NEAR, "speed": 100},
+    "run": {"speed": 100},
+    "jog": {"joint": 0, "percent": 50},
+    "grip": {"value": "closed"},
+    "assume_home": {"consent": True},
+    "home": {},  # this arm has no switches: what is refused ends it, too
+    "connect": {},
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_what_else_the_board_is_told_ends_following(following: Page, name: str) -> None:
+    following.act(name, **ENDS[name])
+    following.idle()
+    assert not following.state()["follows"]
+    following.act("look", q=[0, 80, -80], goal=True)
+    assert rests(following)
+
+
+def test_a_jog_that_ends_leaves_the_arm_there(following: Page) -> None:
+    end = time.monotonic() + 60
+    while following.state()["joints"][0] < 12:
+        assert time.monotonic() < end
+        following.act("jog", joint=0, percent=50)
+        time.sleep(0.05)
+    following.act("jog_end")
+    following.idle()
+    following.act("look", q=NEAR)  # as the page asks for its numbers when a job has ended
+    assert rests(following)
+    assert following.state()["joints"][0] > 12
+
+
+def test_only_what_is_dragged_or_typed_is_a_goal(following: Page) -> None:
+    following.act("look", q=NEAR, best=True)  # a setting
+    following.act("plan")
+    assert rests(following)
+    assert following.state()["follows"]
+    following.act("look", q=[40, 60, -60])  # the page shows another posture: a preview, a branch, a named pose
+    assert rests(following)
+    assert not following.state()["follows"]  # a drag from there would take the whole arm along
+
+
+def test_a_take_over_ends_following(following: Page) -> None:
+    watcher = Page(following.server)
+    assert watcher.opened["board"]["follows"]
+    assert watcher.act("take")[0] == 200
+    assert watcher.hear("board", lambda state: not state["follows"])
+    assert watcher.act("look", q=HOME, goal=True)[0] == 200
+    assert rests(watcher)
+    watcher.close()
+
+
+def test_it_follows_the_page_that_switched_it_on_alone(following: Page) -> None:
+    """A drag that is still being solved for while another page takes over and follows moves nothing."""
+    board = following.server.actions.board
+    assert board is not None
+    watcher = Page(following.server)
+    late = following.server.actions.tabs.find(following.id)
+    assert watcher.act("take")[0] == 200
+    assert watcher.act("follow", on=True) == (200, {"on": True})
+    board.shown(late, following.server.actions.arm.home)
+    assert rests(watcher)
+    watcher.close()
+
+
+def test_a_line_that_breaks_ends_following(following: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    board = following.server.actions.board
+    assert board is not None
+
+    def broken() -> None:
+        raise LinkError("unplugged")
+
+    monkeypatch.setattr(board.thread.machine, "refresh", broken)
+    assert following.hear("board", lambda state: "unplugged" in state["error"])["follows"] is False
+    following.act("look", q=HOME, goal=True)
+    assert following.idle()["connected"] is False  # nothing has opened the port again, either
+
+
+def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sim.server.actions, "stands", lambda: None)
+    board = sim.server.actions.board
+    assert board is not None
+    monkeypatch.setattr(board.thread, "stands", lambda: None)
+    status, answer = sim.act("follow", on=True)
+    assert (status, "position" in answer["error"]) == (502, True)
+    assert not sim.state()["follows"]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as one:
+        yield one
+
+
+def test_the_page_s_follow(browser: Browser) -> None:
+    with served(board="sim") as server, opened(browser, server.address) as page:
+        other = Page(server)
+        stands = "document.querySelector('#position').textContent.includes(argument)"
+
+        def follow() -> None:
+            page.click("#follow")
+            until(page, "document.querySelector('#follow').checked && document.documentElement.dataset.asking === 'no'")
+            assert other.hear("board", lambda state: state["follows"])
+
+        def drag(slider: int, value: int) -> None:
+            page.locator("#sliders input[type=range]").nth(slider).fill(str(value))
+            settled(page)
+
+        def unfollowed() -> None:
+            until(page, "!document.querySelector('#follow').checked")
+
+        def still(counts: object) -> bool:
+            page.wait_for_timeout(500)
+            return bool(server.actions.stands() == counts)
+
+        # A drag is followed; what has been shown before it is not.
+        page.fill("#box-1", "60")
+        page.keyboard.press("Tab")
+        settled(page)
+        follow()
+        assert page.input_value("#box-1") == "90.0000"  # where the arm stands
+        assert still((0, 0, 0))
+        drag(0, 6)
+        until(page, stands, "q1 5.99")
+        page.fill("#box-0", "3")
+        page.keyboard.press("Tab")
+        until(page, stands, "q1 3.01")
+        # A setting is no goal; a branch, a named pose, a preview and its pause end it.
+        page.check("#best")
+        settled(page)
+        assert page.is_checked("#follow")
+        at = server.actions.stands()
+        for button in ("#branch-0", "#branch-1"):
+            page.click(button)
+            settled(page)
+        unfollowed()
+        follow()
+        page.get_by_role("button", name="home", exact=True).click()
+        settled(page)
+        unfollowed()
+        page.click("#record")
+        page.wait_for_selector("#player:not([hidden])")
+        follow()
+        page.click("#play")
+        until(page, "document.querySelector('#play').textContent === 'Pause'")
+        unfollowed()
+        page.click("#play")
+        settled(page)
+        assert still(at)
+        # A jog ends it, and leaves the arm where the button was let go.
+        follow()
+        page.hover("#jog-up")
+        page.mouse.down()
+        until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
+        page.mouse.up()
+        until(page, "document.querySelector('#arrived').textContent.includes('jog')")
+        settled(page)
+        unfollowed()
+        assert still(server.actions.stands())
+        # A page that takes over has it off, and its own drag moves nothing.
+        follow()
+        assert other.act("take")[0] == 200
+        unfollowed()
+        other.close()
+        page.click("#take")
+        until(page, "!document.querySelector('#panels').inert")
+        at = server.actions.stands()
+        drag(0, 40)
+        assert still(at)
+
+
+def test_the_key_is_on_no_command_line(browser: Browser) -> None:
+    """Every user of a machine sees the words that a program was started with, and a browser is one."""
+    with served() as server:
+        with command.redirection(server.address) as file:
+            assert server.guard.key not in file
+            path = Path(file.removeprefix("file://"))
+            assert path.stat().st_mode & 0o077 == path.parent.stat().st_mode & 0o077 == 0
+            assert server.guard.key in path.read_text()
+            page = browser.new_page()
+            page.goto(file)
+            page.wait_for_selector("html[data-ready]")
+            assert page.url == server.address
+            page.close()
+        assert not path.parent.exists()
