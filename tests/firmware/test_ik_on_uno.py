@@ -13,7 +13,7 @@ from emulator import EmulatedBoard
 
 import armkin
 from armkin.export.c.program import identifier, program
-from armkin.formula.c_code import number
+from armkin.formula.c_and_js_code import number
 
 HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"

@@ -7,9 +7,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from armkin.export.c import elimination, kernel, program
+from armkin.export.c import elimination, formulas, kernel, program
 from armkin.export.c.text import part
-from armkin.formula.c_code import number
+from armkin.formula.c_and_js_code import number
 from armkin.inverse.near_itself import room
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, THERE
 from armkin.inverse.tasks.task import LARGEST
@@ -79,7 +79,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
     return {
         "branches": str(branches),
         "target": str(program.target_size(task)),
-        "goal": str(kernel.goal_size(task)),
+        "goal": str(formulas.goal_size(task)),
         "accepted": number(accepted),
         "room": number(room(arm)),
         "close": ", ".join(number(THERE * unit) for unit in radian_or_reach(arm).tolist()),

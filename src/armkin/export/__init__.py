@@ -4,4 +4,5 @@ tables.py   robot files in another convention: screws, DH standard or modified
 urdf.py     URDF, with limits, speeds and visuals
 numbers.py  plain numbers for JSON
 c/          C99 that needs nothing but libm
+js/         an ES module without imports
 """

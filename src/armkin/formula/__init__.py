@@ -5,6 +5,6 @@ pose.py         transforms as twelve entries
 recording.py    a formula run once on symbols, its operations kept as a list
 numpy_code.py   that list as numpy calls, for batches
 python_code.py  as plain Python, for one pose
-c_code.py       as C99
+c_and_js_code.py  as C99 or JavaScript
 trace.py        a formula with its numpy and its Python code
 """

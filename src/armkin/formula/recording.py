@@ -4,7 +4,7 @@ The closed forms and the forward kinematics are written as ordinary functions of
 Called on arrays they spend much of their time in Python: one call for every product of two
 numbers of which one is a known zero. Called once on `Node` symbols they leave behind the
 list of what really has to be computed, equal operations once. `numpy_code`, `python_code` and
-`c_code` write that list as programs.
+`c_and_js_code` write that list as programs.
 """
 
 from __future__ import annotations

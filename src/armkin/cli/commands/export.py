@@ -31,11 +31,14 @@ def export(
     c: Annotated[
         bool, typer.Option("--c", help="C99: fk, Jacobian, all branches; a header and a test program.")
     ] = False,
+    js: Annotated[
+        bool, typer.Option("--js", help="An ES module without imports: all branches in a browser or in node.")
+    ] = False,
     single: Annotated[bool, typer.Option("--float", help="With --c: 32-bit numbers, for microcontrollers.")] = False,
     task: TaskName = None,
     out: Out = None,
 ) -> None:
-    """The arm in other words: URDF, DH tables, screws, JSON, C99.
+    """The arm in other words: URDF, DH tables, screws, JSON, C99, JavaScript.
 
     All but --c go to stdout, or to the file that --out names. --dh, --mdh and --screws give a robot file: the
     same arm, the same poses.
@@ -47,6 +50,7 @@ def export(
         "--screws": (screws, lambda arm: _table(arm, "screws", out)),
         "--json": (json, lambda arm: _json(arm, out)),
         "--c": (c, lambda arm: _c(arm, task, single, out)),
+        "--js": (js, lambda arm: _js(arm, task, out)),
     }
     asked = [name for name, (wanted, _) in kinds.items() if wanted]
     if len(asked) != 1:
@@ -85,6 +89,17 @@ def _json(arm: Arm, out: str | None) -> None:
 
     with output.destination(out) as write:
         write(f"{render.to_json({**render.head(arm), **numbers(arm)})}\n")
+
+
+def _js(arm: Arm, task: str | None, out: str | None) -> None:
+    from armkin.export.js.program import module
+
+    try:
+        text = module(arm, task)
+    except RedundantArmError as error:  # ik's advice is --lock, which a module cannot take
+        raise UsageError(f"{error.message}: no JavaScript for that; armkin.lock in Python holds joints") from None
+    with output.destination(out) as write:
+        write(text)
 
 
 def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:

@@ -1,6 +1,7 @@
 """An arm as C99 that needs nothing but libm.
 
 program.py      the files: header, source, test program
+formulas.py     recorded formulas of an arm's candidates and targets
 kernel.py       recorded formulas as functions of C
 elimination.py  the general elimination: constants as data
 golden.py       what the test program compares with

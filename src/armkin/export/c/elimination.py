@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.export.c.text import part
-from armkin.formula import c_code, recording
+from armkin.formula import c_and_js_code, recording
 from armkin.inverse import tool_axis
-from armkin.inverse.elimination.merge import _WEIGHTS as WEIGHTS
-from armkin.inverse.elimination.merge import MOST
+from armkin.inverse.elimination.merge import _WEIGHTS, MOST
 from armkin.inverse.elimination.method import SHAKES, Elimination, _shaken
 from armkin.model.rotation import inverse
 
@@ -51,16 +50,16 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
     }
     numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2}
     lines = [f"#define ARM_{name} {value}" for name, value in sizes.items()]
-    lines += [f"#define ARM_{name} {c_code.number(value)}" for name, value in numbers.items()]
-    moves = np.concatenate([_frame(_shaken(np.eye(4), shake)) for shake in SHAKES[: len(plans)]])
+    lines += [f"#define ARM_{name} {c_and_js_code.number(value)}" for name, value in numbers.items()]
+    moves = np.concatenate(moves_of(len(plans)))
     lines += [
         "",
         "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
-        _array("from_base", _frame(inverse(loop.base))),
-        _array("from_tool", _frame(inverse(loop.tool))),
-        _array("loop_links", np.concatenate([_frame(link) for link in loop.links])),
+        _array("from_base", frame(inverse(loop.base))),
+        _array("from_tool", frame(inverse(loop.tool))),
+        _array("loop_links", np.concatenate([frame(link) for link in loop.links])),
         _flags("loop_slides", loop.prismatic),
-        _array("weights", WEIGHTS),
+        _array("weights", _WEIGHTS),
         _array("shakes", SHAKES[: len(plans)]),
         _array("shaking", moves),
         "",
@@ -75,11 +74,11 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
     return text
 
 
-def _pencil(number: int, pencil: Pencil) -> str:
-    """One pencil's arrays, and the macro that initialises its struct."""
+def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
+    """A pencil's numbers, rows of fifteen sixteen apart; None for those that its slot has not."""
     slot, ends = pencil.role.slot, pencil.ends
-    arrays = {
-        "links": np.concatenate([_frame(link) for link in pencil.links]),
+    return {
+        "links": np.concatenate([frame(link) for link in pencil.links]),
         "first": _first(slot, ends.factors) if slot != 1 else None,
         "second": _by_fours(ends.factors[1]) if slot == 0 else None,
         "N": _by_fours(ends.N) if slot == 1 else None,
@@ -90,11 +89,21 @@ def _pencil(number: int, pencil: Pencil) -> str:
         "K_im": pencil.K_im if pencil.K_re.size else None,
         "W": pencil.W,
     }
+
+
+def moves_of(passes: int) -> list[Array]:
+    """How each pass moves the pose, as frames."""
+    return [frame(_shaken(np.eye(4), shake)) for shake in SHAKES[:passes]]
+
+
+def _pencil(number: int, pencil: Pencil) -> str:
+    """One pencil's arrays, and the macro that initialises its struct."""
+    slot, ends, arrays = pencil.role.slot, pencil.ends, pencil_arrays(pencil)
     texts = [_array(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     role = pencil.role
     fields = [
-        c_code.number(float(pencil.psi)),
+        c_and_js_code.number(float(pencil.psi)),
         *map(str, (slot, int(role.backward), role.hidden, role.dialytic, 15 - ends.rank, r, w, pencil.size)),
         f"{{{', '.join(map(str, role.order))}}}",
         f"{{{', '.join(str(int(p)) for p in pencil.prismatic)}}}",
@@ -118,18 +127,18 @@ def _by_fours(rows: Array) -> Array:
 
 def _with_virtual_joint() -> str:
     """`arm_candidates` of five joints and the tool's axis, by way of the pose that `armkin.inverse.tool_axis` makes."""
-    code = c_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k}]" for k in range(6)])
+    code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k}]" for k in range(6)])
     lines = [*code.lines, *(f"goal[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
     return part("virtual_joint").replace("@lines@", "\n    ".join(lines))
 
 
-def _frame(motion: ArrayLike) -> np.ndarray:
+def frame(motion: ArrayLike) -> np.ndarray:
     """The upper three rows of a motion (4, 4), flat."""
     return np.asarray(motion, dtype=float)[:3].ravel()
 
 
 def _array(name: str, values: ArrayLike) -> str:
-    flat = [c_code.number(float(v)) for v in np.asarray(values, dtype=float).ravel()]
+    flat = [c_and_js_code.number(float(v)) for v in np.asarray(values, dtype=float).ravel()]
     rows = [", ".join(flat[k : k + 5]) for k in range(0, len(flat), 5)]
     return f"static const double arm_{name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};"
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.c_code import number
+from armkin.formula.c_and_js_code import number
 from armkin.forward import fk
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.task import targets_of
@@ -27,7 +27,7 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
     """
     q = _postures(arm, task, POSTURES)
     T = fk(arm, q)
-    target = targets_of(task, T, q)
+    target = targets_of(task, T, q * arm.ratio)
     found = ik(arm, target, task.name)
     rows = [(found.q[i, b], found.branch[i, b]) for i, b in np.argwhere(found.valid)]
     fields = {
@@ -42,12 +42,18 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
         "turns": ", ".join(number(float(v), single) for v in np.where(arm.prismatic, 0.0, arm.ratio**2)),
         "home": ", ".join(number(float(v), single) for v in arm.home),
         # millimetres of a pose or a slide, and everything else
+        "lengths": ", ".join("1" if k in _lengths(task) else "0" for k in range(target[0].size)),
         "length": number((1e-5 if single else 1e-10) * arm.reach, single),
         "angle": number(2e-3 if single else 1e-7, single),
     }
     for name, value in fields.items():
         text = text.replace(f"@{name}@", value)
     return text
+
+
+def _lengths(task: Task) -> tuple[int, ...]:
+    """Which numbers of a target are millimetres."""
+    return (3, 7, 11) if task.orientation == "full" else tuple(range(task.position))
 
 
 def _postures(arm: Arm, task: Task, count: int) -> Array:

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from armkin import forward
-from armkin.formula import c_code, recording
-from armkin.inverse.closed.candidates import Recorded
-from armkin.inverse.closed.subproblems import Pair
+from armkin.export.c import formulas
+from armkin.formula import c_and_js_code, recording
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -23,38 +20,21 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def goal_size(task: Task) -> int:
-    """Numbers of a target as the formulas take them."""
-    return 12 if task.orientation == "full" else len(task.labels)
-
-
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
     """`arm_candidates` of a closed form, and how many branches it has.
 
     prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt.
     """
-    recorded, n, entries = Recorded(arm, task, geometry), arm.n, goal_size(task)
-
-    def formula(inputs: list[Any]) -> list[Any]:
-        held: list[Pair | None] = [None] * n
-        if prefer:
-            at = entries
-            for j in range(n):
-                held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
-                at += 1 if arm.prismatic[j] else 2
-        return recorded.candidates(inputs[:entries], held)[:-1]  # which joints are free is of no use here
-
+    n, entries = arm.n, formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(entries)]
     if prefer:
         for j in range(n):
             near = f"near[{j} * ARM_LANES + i]"
             ways = [("c", f"ARM_COS({near})"), ("s", f"ARM_SIN({near})")]
             declared += [(f"p{j}", near)] if arm.prismatic[j] else [(f"{w}{j}", text) for w, text in ways]
-    recorded_code = recording.record(formula, len(declared))
-    code = c_code.write(recorded_code, [name for name, _ in declared], single)
-    shape = np.broadcast_shapes((1, 1, 1), *(recording.axes_of(x) for x in recorded_code.outputs))
-    every = [_spread(x, texts, shape) for x, texts in zip(recorded_code.outputs, code.outputs, strict=True)]
-    *values, miss, _ = every
+    recorded = formulas.candidates(arm, task, geometry, prefer)
+    code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
+    *values, miss, _ = formulas.by_branch(recorded, code)
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
     doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
@@ -82,13 +62,25 @@ def jacobian(arm: Arm, single: bool = False) -> str:
     return _of_joints(arm, "arm_slope", forward.jacobian_formula, "J", single)
 
 
+def target(arm: Arm, task: Task, single: bool = False) -> str:
+    """`arm_goal`, the target that joint values answer."""
+    return _recorded(formulas.target(arm, task), "arm_goal", "target", single)
+
+
 def _of_joints(arm: Arm, name: str, formula: forward.Formula, out: str, single: bool) -> str:
-    recorded = recording.record(lambda q: formula(arm, q), arm.n)
-    declared = [(f"q{j}", f"q[{j} * ARM_LANES + i]") for j in range(arm.n)]
-    code = c_code.write(recorded, [name for name, _ in declared], single)
+    return _recorded(recording.record(lambda q: formula(arm, q), arm.n), name, out, single)
+
+
+def _recorded(recorded: recording.Recording, name: str, out: str, single: bool) -> str:
+    declared = [(f"q{j}", f"q[{j} * ARM_LANES + i]") for j in range(len(recorded.inputs))]
+    code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
     stores = [f"{out}[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs)]
     head = f"static void {name}(const arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT {out}, int count)"
     return _loop(head, declared, [*code.lines, *stores])
+
+
+def _language(single: bool) -> c_and_js_code.Language:
+    return c_and_js_code.C_SINGLE if single else c_and_js_code.C
 
 
 def _loop(head: str, declared: Sequence[tuple[str, str]], lines: Sequence[str]) -> str:
@@ -97,9 +89,3 @@ def _loop(head: str, declared: Sequence[tuple[str, str]], lines: Sequence[str]) 
     inputs = [f"const arm_real {name} = {text};" for name, text in declared if name in read]
     body = "\n".join(f"        {line}" for line in [*inputs, *lines])
     return f"{head}\n{{\n    int i;\n    for (i = 0; i < count; i++) {{\n{body}\n    }}\n}}\n"
-
-
-def _spread(node: Any, texts: list[str], shape: tuple[int, ...]) -> list[str]:
-    """An output's expressions for every branch of all branch axes."""
-    index = np.arange(len(texts)).reshape(recording.axes_of(node) or (1,))
-    return [texts[k] for k in np.broadcast_to(index, shape).ravel()]

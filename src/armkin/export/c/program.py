@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from armkin import __version__
 from armkin.errors import UsageError
-from armkin.export.c import elimination, kernel
+from armkin.export.c import elimination, formulas, kernel
 from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
-from armkin.formula.c_code import number
+from armkin.formula.c_and_js_code import number
 from armkin.inverse import general
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.numeric.tolerances import HAIR
@@ -46,7 +46,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
     task, named = solver(turned, task_name)
-    geometry = _plain(turned, task, named)
+    geometry = plain_form(turned, task, named)
     solve, branches = candidates(turned, task, geometry, single)
     names = branch_names(turned, task, geometry, branches)
     prefix = identifier(arm.name)
@@ -63,7 +63,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "joints": str(arm.n),
         "branches": str(branches),
         "target": str(target_size(task)),
-        "goal": str(kernel.goal_size(task)),
+        "goal": str(formulas.goal_size(task)),
         "target_is": _target_is(task),
         "names": ",\n    ".join(f'"{name}"' for name in names),
         "position": str(task.position),
@@ -85,6 +85,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         settings(single),
         kernel.forward_kinematics(arm, single),
         kernel.jacobian(arm, single),
+        kernel.target(arm, task, single),
         solve,
         part("copies"),
         part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
@@ -104,15 +105,15 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
         return kernel.candidates(arm, task, geometry, single, prefer)
     if not has_form(geometry):
         raise UsageError(
-            f"{arm.name}: {geometry.name} has no form in C: {_why_not(arm, geometry)}; task {task.name} is solved in "
-            "Python alone"
+            f"{arm.name}: {geometry.name} has no form in C: {why_no_form(arm, geometry)}; task {task.name} is solved "
+            "in Python alone"
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
     return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
 
 
-def _plain(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
+def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
     """The class itself; for an arm off its class that the elimination solves, the elimination: branches by number."""
     if has_form(geometry) or not geometry.complete or task.name != "pose" or arm.n != 6:
         return geometry
@@ -120,7 +121,7 @@ def _plain(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
     return geometry if found is None or not has_form(found) else found
 
 
-def _why_not(arm: Arm, geometry: Geometry) -> str:
+def why_no_form(arm: Arm, geometry: Geometry) -> str:
     """Why a class of arms cannot be written in C."""
     if geometry.elimination is None and geometry.name.startswith("near "):
         return "its branches are corrected ones of the class that it nearly fits, as many rounds as each needs"
@@ -166,7 +167,7 @@ def filled(text: str, fields: dict[str, str]) -> str:
 
 def _named(text: str, prefix: str) -> str:
     """Public names begin with the robot's, so that two arms fit into one program."""
-    text = re.sub(r"\barm_(fk|jacobian|ik|best|names|real|solution)\b", rf"{prefix}_\1", text)
+    text = re.sub(r"\barm_(fk|jacobian|target|ik|best|names|real|solution)\b", rf"{prefix}_\1", text)
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
 
 

@@ -26,6 +26,9 @@ void arm_fk(const arm_real *q, arm_real *pose);
 /* The geometric Jacobian in the base's axes, 6 x ARM_JOINTS row by row, linear rows first. */
 void arm_jacobian(const arm_real *q, arm_real *jacobian);
 
+/* The target that joint values answer, as arm_ik takes it. */
+void arm_target(const arm_real *q, arm_real *target);
+
 /* All branches that reach a target, at most ARM_BRANCHES. target: @target_is@.
    near: joint values to stay close to, finite; where they are within limits and solve the target themselves, they are one
    of the branches. found: room for ARM_BRANCHES.

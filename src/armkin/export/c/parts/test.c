@@ -31,13 +31,17 @@ int main(void)
     static const int slides[ARM_JOINTS] = {@slides@};
     static const arm_real turns[ARM_JOINTS] = {@turns@}; /* square of a joint's turn per commanded turn, 0: it slides */
     arm_solution found[ARM_BRANCHES];
-    arm_real pose[16], jacobian[6 * ARM_JOINTS];
+    static const int lengths[ARM_TARGET] = {@lengths@}; /* which numbers of a target are mm */
+    arm_real pose[16], target[ARM_TARGET], jacobian[6 * ARM_JOINTS];
     int i, j, b, k, row = 0, failed = 0;
     for (i = 0; i < POSTURES; i++) {
         int edge, count, good = 1;
         arm_fk(joints[i], pose);
         for (k = 0; k < 16; k++)
             good &= close_to(pose[k], poses[i][k], k % 4 == 3 ? length : angle);
+        arm_target(joints[i], target);
+        for (k = 0; k < ARM_TARGET; k++)
+            good &= close_to(target[k], targets[i][k], lengths[k] ? length : angle);
         arm_jacobian(joints[i], jacobian);
         for (j = 0; j < ARM_JOINTS; j++) { /* the last rows: the axis of a joint that turns */
             const double x = (double)jacobian[3 * ARM_JOINTS + j], y = (double)jacobian[4 * ARM_JOINTS + j];

@@ -1,4 +1,4 @@
-"""A recording as C99: one assignment a line, branch axes unrolled, equal values once.
+"""A recording as C99 or JavaScript: one assignment a line, branch axes unrolled, equal values once.
 
 The lines are plain expressions without branches or memory, so that compilers turn a loop around them into
 vector instructions.
@@ -7,6 +7,8 @@ vector instructions.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +42,21 @@ _C = {
     "minimum": "{1} < {0} ? {1} : {0}",
 }
 SMALLEST = 1e-30  # constants of a formula that stand for "next to nothing", in single precision
+
+
+_COMPARISONS = {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==="}
+# The same in JavaScript, where 1 and 0 are truth; `rint` and `copysign` are functions of the module with the lines.
+_JAVASCRIPT = _C | {
+    "absolute": "Math.abs({})",
+    "sqrt": "Math.sqrt({})",
+    "cbrt": "Math.cbrt({})",
+    "tan": "Math.tan({})",
+    "arctan2": "Math.atan2({}, {})",
+    "rint": "rint({})",
+    "sign": "Math.sign({})",
+    "copysign": "copysign({}, {})",
+    **{op: f"{{}} {sign} {{}} ? 1 : 0" for op, sign in _COMPARISONS.items()},
+}
 
 
 class Value(NamedTuple):
@@ -76,11 +93,25 @@ def number(value: float, single: bool = False) -> str:
     return f"{text}f"
 
 
+class Language(NamedTuple):
+    """How one language says a line: its operations, the words before a name, constants."""
+
+    operations: dict[str, str]
+    real: str
+    boolean: str
+    number: Callable[[float], str]
+
+
+C = Language(_C, "const arm_real", "const int", number)
+C_SINGLE = Language(_C, "const arm_real", "const int", partial(number, single=True))
+JAVASCRIPT = Language(_JAVASCRIPT, "const", "const", lambda value: number(value).replace("ARM_INFINITY", "Infinity"))
+
+
 class _Writer:
     """Lines written so far; a value that is known already is not computed again."""
 
-    def __init__(self, single: bool) -> None:
-        self.single = single
+    def __init__(self, language: Language) -> None:
+        self.language = language
         self.lines: list[str] = []
         self.known: dict[tuple[Any, ...], Value] = {}
 
@@ -88,7 +119,7 @@ class _Writer:
         """A number, its sign apart."""
         value = float(value)
         minus = math.copysign(1.0, value) < 0
-        return Value(number(abs(value), self.single), minus, abs(value))
+        return Value(self.language.number(abs(value)), minus, abs(value))
 
     def apply(self, op: str, args: list[Value]) -> Value:
         """The value of an operation: no factors of one, signs moved outwards, equal operations once."""
@@ -139,9 +170,9 @@ class _Writer:
         key = (op, *args)
         if key not in self.known:
             name = f"t{len(self.lines)}"
-            kind = "int" if op in BOOLEAN else "arm_real"
+            kind = self.language.boolean if op in BOOLEAN else self.language.real
             plain = [f"({x})" if x.minus and k else str(x) for k, x in enumerate(args)]
-            self.lines.append(f"const {kind} {name} = {_C[op].format(*plain)};")
+            self.lines.append(f"{kind} {name} = {self.language.operations[op].format(*plain)};")
             self.known[key] = Value(name)
         return self.known[key]
 
@@ -150,9 +181,9 @@ def _flipped(x: Value, minus: bool) -> Value:
     return x._replace(minus=x.minus != minus)
 
 
-def write(recording: Recording, inputs: list[str], single: bool = False) -> Code:
-    """The lines that compute a recording; inputs: the C expressions of its inputs; single: for 32-bit numbers."""
-    writer = _Writer(single)
+def write(recording: Recording, inputs: list[str], language: Language = C) -> Code:
+    """The lines that compute a recording; inputs: the expressions of its inputs."""
+    writer = _Writer(language)
     values: dict[int, dict[tuple[int, ...], Value]] = {
         id(node): {(): Value(text)} for node, text in zip(recording.inputs, inputs, strict=True)
     }

@@ -1,0 +1,70 @@
+"""An arm's formulas, recorded for languages that have one number a variable: candidates, targets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin import forward
+from armkin.formula import arrays, recording
+from armkin.inverse.closed.candidates import Recorded
+from armkin.inverse.closed.subproblems import Pair
+
+if TYPE_CHECKING:
+    from armkin.formula.c_and_js_code import Code
+    from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+
+def goal_size(task: Task) -> int:
+    """Numbers of a target as the formulas take them."""
+    return 12 if task.orientation == "full" else len(task.labels)
+
+
+def candidates(arm: Arm, task: Task, geometry: Geometry, prefer: bool = True) -> recording.Recording:
+    """A closed form's candidates: joint values, their squared residual, doubt.
+
+    Inputs: the target's numbers; with `prefer` also what a free joint is given: a cosine and a sine for each joint, or
+    the value of a slide.
+    """
+    recorded, n, entries = Recorded(arm, task, geometry), arm.n, goal_size(task)
+
+    def formula(inputs: list[Any]) -> list[Any]:
+        held: list[Pair | None] = [None] * n
+        if prefer:
+            at = entries
+            for j in range(n):
+                held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
+                at += 1 if arm.prismatic[j] else 2
+        return recorded.candidates(inputs[:entries], held)[:-1]  # which joints are free is of no use here
+
+    return recording.record(formula, entries + (sum(1 if p else 2 for p in arm.prismatic) if prefer else 0))
+
+
+def target(arm: Arm, task: Task) -> recording.Recording:
+    """The target that joint values answer, as people give it: a pose row by row, or the task's numbers."""
+
+    def formula(q: list[Any]) -> list[Any]:
+        T = forward.tip_formula(arm, q)
+        if task.orientation == "full":
+            return T
+        goal = [T[4 * k + 3] for k in range(task.position)]
+        for row, offset in zip(task.sums * arm.ratio, task.offsets, strict=True):
+            goal.append(arrays.add(arrays.dot([float(v) for v in row], q), float(offset)))
+        return goal + ([T[2], T[6], T[10]] if task.orientation == "axis" else [])
+
+    return recording.record(formula, arm.n)
+
+
+def by_branch(recorded: recording.Recording, code: Code) -> list[list[str]]:
+    """The expressions of every output, one for every branch of all branch axes."""
+    shape = np.broadcast_shapes((1, 1, 1), *(recording.axes_of(x) for x in recorded.outputs))
+    return [_spread(x, texts, shape) for x, texts in zip(recorded.outputs, code.outputs, strict=True)]
+
+
+def _spread(node: Any, texts: list[str], shape: tuple[int, ...]) -> list[str]:
+    """An output's expressions for every branch of all branch axes."""
+    index = np.arange(len(texts)).reshape(recording.axes_of(node) or (1,))
+    return [texts[k] for k in np.broadcast_to(index, shape).ravel()]

@@ -1,0 +1,92 @@
+"""The general elimination as JavaScript: the method is the same for all arms, its constants are data.
+
+See `armkin.inverse.elimination.method` for the method and why it is complete.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays
+from armkin.formula import c_and_js_code, recording
+from armkin.inverse import tool_axis
+from armkin.inverse.elimination.merge import _WEIGHTS
+from armkin.inverse.elimination.method import SHAKES, Elimination
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from armkin.inverse.elimination.pencil import Pencil
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+__all__ = ["BRANCHES", "METHOD", "candidates"]
+METHOD = ("eigenvalues", "frames", "roots", "elimination")
+
+
+def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
+    """The constants of an arm that the elimination solves, and its `candidates`; `METHOD` has the functions."""
+    plans = elimination.plans[: len(SHAKES)]
+    pencils = list({id(plan): plan for plan in plans}.values())
+    place = {id(pencil): k for k, pencil in enumerate(pencils)}
+    loop = elimination.loop
+    fields = {
+        "length": repr(loop.length),
+        "residual": repr((loop.length / arm.reach) ** 2),
+        "fromBase": _array(frame(inverse(loop.base))),
+        "fromTool": _array(frame(inverse(loop.tool))),
+        "links": _arrays([frame(link) for link in loop.links]),
+        "slides": _flags(loop.prismatic),
+        "weights": _array(_WEIGHTS),
+        "shakes": _array(SHAKES[: len(plans)]),
+        "shaking": _arrays(moves_of(len(plans))),
+        "plan": repr([place[id(plan)] for plan in plans]),
+    }
+    lines = ["const LOOP = {", *(f"  {name}: {text}," for name, text in fields.items()), "};"]
+    lines += ["/** @type {Pencil[]} */", "const PENCILS = [", *map(_pencil, pencils), "];"]
+    head = (
+        "/** @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss */\n"
+        "function candidates(goal, near, q, miss) {"
+    )
+    pose = "goal"
+    if task.orientation == "axis":  # by way of a pose with that z axis and a joint more
+        made = recording.record(tool_axis.pose_of, 6)
+        code = c_and_js_code.write(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
+        head = "\n".join([head, *(f"  {line}" for line in code.lines)])
+        pose = f"[{', '.join(text[0] for text in code.outputs)}]"
+    return "\n".join([*lines, head, f"  return candidatesOfPose({pose}, near, q, miss);", "}", ""])
+
+
+def _pencil(pencil: Pencil) -> str:
+    role = pencil.role
+    fields = {
+        "psi": repr(float(pencil.psi)),
+        "slot": str(role.slot),
+        "backward": "true" if role.backward else "false",
+        "hidden": str(role.hidden),
+        "dialytic": str(role.dialytic),
+        "rows": str(15 - pencil.ends.rank),
+        "r": str(pencil.K_re.shape[1]),
+        "w": str(pencil.W.shape[1]),
+        "size": str(pencil.size),
+        "order": repr([int(k) for k in role.order]),
+        "slides": _flags(pencil.prismatic),
+        **{name: "null" if values is None else _array(values) for name, values in pencil_arrays(pencil).items()},
+    }
+    return "\n".join(["  {", *(f"    {name}: {text}," for name, text in fields.items()), "  },"])
+
+
+def _array(values: ArrayLike) -> str:
+    flat = np.asarray(values, dtype=float).ravel().tolist()
+    return f"Float64Array.of({', '.join(str(int(v)) if v == int(v) else repr(v) for v in flat)})"
+
+
+def _arrays(rows: list[np.ndarray]) -> str:
+    return f"[{', '.join(map(_array, rows))}]"
+
+
+def _flags(values: ArrayLike) -> str:
+    return f"[{', '.join('true' if v else 'false' for v in np.asarray(values).ravel())}]"

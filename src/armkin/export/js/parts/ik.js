@@ -1,0 +1,256 @@
+const ACCEPTED = 1e-24; // squared residual of a candidate that needs no correction
+const NEARBY = 1e-12; // and of one that is worth correcting
+const LARGEST = 1e15; // mm, rad: of a target; its powers in polynomials stay finite
+const DEGREES = 180 / Math.PI;
+
+/**
+ * A target's numbers as the formulas take them: the columns x, y, z of a pose and its position; an axis of length one.
+ * @param {Target} target @returns {{goal: Float64Array, rounding: number}}
+ */
+function read(target) {
+  const wanted = ARM.orientation === 'full' ? 16 : ARM.labels.length;
+  /** @type {number[]} */
+  const flat = [];
+  for (let i = 0; i < target.length; i++) {
+    const row = target[i];
+    if (typeof row === 'number') flat.push(row);
+    else for (let j = 0; j < row.length; j++) flat.push(row[j]);
+  }
+  if (flat.length !== wanted)
+    throw new RangeError(`a target is ${wanted === 16 ? 'a pose, four rows of four' : ARM.labels.join(' ')}: ${wanted} numbers, got ${flat.length}`);
+  for (const x of flat)
+    if (!(Math.abs(x) <= LARGEST)) throw new RangeError('a target holds a number that is not finite, or beyond 1e15');
+  if (ARM.orientation === 'axis') {
+    const length = Math.hypot(flat[3], flat[4], flat[5]);
+    if (!(length > 1e-12)) throw new RangeError("a target's axis ax ay az has no length; give the direction of the tool's z axis");
+    for (let k = 3; k < 6; k++) flat[k] /= length;
+  }
+  if (ARM.orientation !== 'full') return { goal: Float64Array.from(flat), rounding: 0 };
+  const goal = new Float64Array(12);
+  for (let k = 0; k < 12; k++) goal[k] = flat[4 * (k % 3) + ((k / 3) | 0)];
+  let rounding = orthonormalised(goal);
+  const given = rounding;
+  for (let round = 0; round < 2 && rounding > 1e-15 && rounding <= ROTATION; round++) rounding = orthonormalised(goal);
+  const [x, y, z] = [0, 1, 2].map((i) => goal[3 + ((i + 1) % 3)] * goal[6 + ((i + 2) % 3)] - goal[3 + ((i + 2) % 3)] * goal[6 + ((i + 1) % 3)]);
+  if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
+    throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
+  return { goal, rounding: given };
+}
+
+/** R (3 - R'R) / 2, which squares the distance from a rotation; the largest entry of R'R - 1 before. @param {Float64Array} R */
+function orthonormalised(R) {
+  const xx = R[0] * R[0] + R[1] * R[1] + R[2] * R[2] - 1;
+  const yy = R[3] * R[3] + R[4] * R[4] + R[5] * R[5] - 1;
+  const zz = R[6] * R[6] + R[7] * R[7] + R[8] * R[8] - 1;
+  const xy = R[0] * R[3] + R[1] * R[4] + R[2] * R[5];
+  const yz = R[3] * R[6] + R[4] * R[7] + R[5] * R[8];
+  const zx = R[6] * R[0] + R[7] * R[1] + R[8] * R[2];
+  const off = Math.max(Math.abs(xx), Math.abs(yy), Math.abs(zz), Math.abs(xy), Math.abs(yz), Math.abs(zx));
+  if (off <= 1e-15) return off;
+  for (let k = 0; k < 3; k++) {
+    const [x, y, z] = [R[k], R[3 + k], R[6 + k]];
+    R[k] = x - 0.5 * (x * xx + y * xy + z * zx);
+    R[3 + k] = y - 0.5 * (x * xy + y * yy + z * yz);
+    R[6 + k] = z - 0.5 * (x * zx + y * yz + z * zz);
+  }
+  return off;
+}
+
+const allJoints = new Float64Array(ARM.branches * ARM.joints);
+const allMisses = new Float64Array(ARM.branches);
+
+/**
+ * @typedef {object} Row
+ * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
+ */
+
+/**
+ * One row for each solution of a target.
+ * @param {Float64Array} goal @param {Numbers} near actual joint values
+ */
+function solutions(goal, near) {
+  const n = ARM.joints;
+  const row = (/** @type {number} */ b) => {
+    const q = [];
+    for (let j = 0; j < n; j++) q.push(allJoints[b * n + j]);
+    return q;
+  };
+  let edge = candidates(goal, near, allJoints, allMisses);
+  /** @type {Row[]} */
+  const rows = [];
+  for (let b = 0; b < ARM.branches; b++) {
+    const miss = allMisses[b];
+    edge = edge || (!(miss <= ACCEPTED) && !(miss > NEARBY));
+    if (miss <= SOLUTION * SOLUTION) rows.push({ q: row(b), branch: b, path: undefined });
+  }
+  const status = /** @type {Status} */ (rows.length ? 'exact' : 'unreachable');
+  if (!edge) return { rows, status, complete: true, free: /** @type {number[]} */ ([]) };
+  /** @type {Row[]} */
+  const seeds = [...rows];
+  const seed = (/** @type {Numbers} */ at, /** @type {Numbers} */ prefer, /** @type {number} */ most) => {
+    const doubt = candidates(at, prefer, allJoints, allMisses);
+    for (let b = 0; b < ARM.branches; b++) {
+      if (!(allMisses[b] <= most) || seeds.some((one) => apart(one.q, row(b)) < 1e-7)) continue;
+      const found = newton(row(b), goal, 40);
+      const known = seeds.some((one) => apart(one.q, found.q) < 1e-7);
+      if (found.missed <= SOLUTION && !known) seeds.push({ q: found.q, branch: b, path: undefined });
+    }
+    return doubt;
+  };
+  // joints that a target leaves free may be out of reach where `near` has them: ask elsewhere, too
+  for (let k = 0; CLOSED_FORM && k <= 24; k++)
+    seed(goal, Array.from(near, (x, j) => x + (k && ((k - 0.63) / 12 - 1) * Math.PI * ARM.unit[j])), 1e-6);
+  // of two roots in one an elimination may see none: beside the target both are real on one side
+  let sure = true;
+  for (let k = 0; !CLOSED_FORM && k < 8; k++) sure = !seed(beside(goal, k), near, Infinity) && sure;
+  const found = components(seeds, goal);
+  return { ...found, complete: found.complete && (CLOSED_FORM || (sure && found.status === 'exact')) };
+}
+
+/** A target 1e-4 beside another one, the k-th and its opposite in turn. @param {Float64Array} goal @param {number} k */
+function beside(goal, k) {
+  const out = Float64Array.from(goal);
+  const by = [0, 1, 2, 3, 4, 5].map((i) => (k % 2 ? -1e-4 : 1e-4) * Math.sin(1 + 12.9898 * (6 * (k >> 1) + i)));
+  const first = ARM.orientation === 'full' ? 9 : 0;
+  for (let i = 0; i < ARM.position; i++) out[first + i] += by[i] * ARM.reach;
+  if (ARM.orientation === 'none') for (let i = ARM.position; i < out.length; i++) out[i] += by[i];
+  else
+    for (const at of ARM.orientation === 'full' ? [0, 3, 6] : [3]) {
+      const v = [out[at], out[at + 1], out[at + 2]];
+      cross(by.slice(3), v).forEach((x, i) => (out[at + i] += x));
+    }
+  if (ARM.orientation === 'full') for (let round = 0; round < 3; round++) orthonormalised(out);
+  return out;
+}
+
+/** Postures that solve a target, one of each component. @param {Row[]} seeds @param {Float64Array} goal */
+function components(seeds, goal) {
+  /** @type {Row[]} */
+  const rows = [];
+  let status = /** @type {Status} */ (seeds.length ? 'exact' : 'unreachable');
+  let complete = true;
+  const moves = new Array(ARM.joints).fill(false);
+  // regular points of a self-motion first: its singular ones are met on the way
+  const ranked = seeds.map((seed) => ({ seed, count: lost(seed.q, SPLIT).V.length })).sort((a, b) => a.count - b.count);
+  for (const { seed } of ranked) {
+    if (rows.some((row) => (row.path ? onPath(seed.q, row.path, goal) : joined(row.q, seed.q, goal)))) continue;
+    const { kind, paths, crossed, moves: along } = structure(seed.q, goal);
+    along?.forEach((x, j) => (moves[j] = moves[j] || x > FREE));
+    if (kind === 'boundary' && status === 'exact') status = kind;
+    if (kind === 'curve' || kind === 'surface') status = 'singular';
+    complete = complete && !crossed;
+    if (kind !== 'curve') {
+      if (kind === 'surface' && rows.some((row) => row.branch === seed.branch)) continue;
+      rows.push(seed);
+      continue;
+    }
+    for (const path of paths) {
+      if (rows.some((row) => row.path && oneCurve(path, row.path, goal))) continue;
+      rows.push({ ...seed, path });
+      spread(path).forEach((x, j) => (moves[j] = moves[j] || x > FREE * 1000));
+    }
+  }
+  return { rows, status, complete, free: moves.flatMap((yes, j) => (yes ? [j] : [])) };
+}
+
+/** Whether two postures are in one component: so is the way between them. @param {Numbers} a @param {Numbers} b @param {Float64Array} goal */
+function joined(a, b, goal) {
+  const away = apart(a, b);
+  if (away < 1e-7) return true;
+  if (away > REACH) return false;
+  const way = between(b, a);
+  return [0.25, 0.5, 0.75].every((t) => newton(stepped(a, way, t), goal, 3, SPLIT).missed <= SOLUTION);
+}
+
+let copyInside = true;
+let copyMotion = 0; // in degrees and mm
+
+/** Turns a posture into its legal copy nearest to `near`; `copyInside` and `copyMotion` tell of it. @param {number[]} q @param {Numbers} near */
+function legal(q, near) {
+  copyInside = true;
+  copyMotion = 0;
+  for (let j = 0; j < ARM.joints; j++) {
+    const value = nearestCopy(q[j], near[j], ARM.lower[j], ARM.upper[j], ARM.slides[j]);
+    q[j] = value;
+    copyInside = copyInside && value >= ARM.lower[j] - SLACK && value <= ARM.upper[j] + SLACK;
+    copyMotion += (Math.abs(value - near[j]) / ARM.ratio[j]) * (ARM.slides[j] ? 1 : DEGREES);
+  }
+  return q;
+}
+
+/** Of a self-motion the posture within limits that is nearest. @param {Row} row @param {Numbers} near @param {Float64Array} goal */
+function nearest(row, near, goal) {
+  let best = { q: row.q, inside: false, motion: Infinity };
+  const take = (/** @type {number[]} */ posture) => {
+    const q = legal(posture.slice(), near);
+    const better = copyInside !== best.inside ? copyInside : copyMotion < best.motion - 1 / EQUAL;
+    if (better) best = { q, inside: copyInside, motion: copyMotion };
+    return better;
+  };
+  take(row.q);
+  const path = row.path ?? [];
+  let at = -1;
+  path.forEach((q, k) => {
+    if (take(q)) at = k;
+  });
+  for (const other of at < 0 ? [] : [at - 1, at + 1]) {
+    if (!path[other]) continue;
+    const way = between(path[other], path[at]);
+    for (let step = 1; step < 32; step++) {
+      const one = newton(stepped(path[at], way, step / 32), goal, 6, SPLIT / 10);
+      if (one.missed <= SOLUTION) take(one.q);
+    }
+  }
+  return legal(best.q, near);
+}
+
+/**
+ * `near` itself, where it is within limits and solves the target: the arm that stands there stays.
+ * @param {Found[]} found @param {Numbers} near @param {Float64Array} goal @param {number} rounding
+ */
+function stay(found, near, goal, rounding) {
+  for (let j = 0; j < ARM.joints; j++) if (!(near[j] >= ARM.lower[j] - SLACK && near[j] <= ARM.upper[j] + SLACK)) return;
+  misses(near, goal);
+  if (!(missedLength * missedLength + missedAngle * missedAngle <= (SOLUTION + rounding) ** 2)) return;
+  const stand = Array.from(near);
+  const own = found.findIndex((one) => {
+    if (one.path) return onPath(stand, one.path, goal);
+    return joined(one.q, near, goal) || (rounding > 0 && apart(one.q, near) < Math.sqrt(rounding));
+  });
+  const away = found.map((one) => apart(one.q, near));
+  const like = found[own < 0 ? away.indexOf(Math.min(...away)) : own];
+  const one = { ...placed({ q: stand, branch: like?.branch ?? 0 }, near, goal), path: like?.path };
+  if (own < 0) found.push(one);
+  else found[own] = one;
+}
+
+/** @typedef {Row & {rank: number, row: Branch}} Found a row at its nearest legal copy; rank: its motion in degrees and mm */
+
+/** @param {Row} solution @param {Numbers} near @param {Float64Array} goal @returns {Found} */
+function placed(solution, near, goal) {
+  const q = solution.path ? nearest(solution, near, goal) : legal(solution.q, near);
+  misses(q, goal);
+  let joints = q;
+  let motion = 0;
+  if (CALIBRATED) joints = q.map((x, j) => x / ARM.ratio[j]);
+  for (let j = 0; j < ARM.joints; j++) motion += Math.abs(q[j] - near[j]) / ARM.ratio[j];
+  const row = {
+    joints,
+    name: ARM.names[solution.branch],
+    within_limits: copyInside,
+    violations: copyInside ? [] : violations(q),
+    residual_mm: missedLength * ARM.reach,
+    residual_deg: missedAngle * DEGREES,
+    motion,
+  };
+  return { q, branch: solution.branch, path: solution.path, rank: copyMotion, row };
+}
+
+/** The joints outside their limits. @param {Numbers} q @returns {Violation[]} */
+function violations(q) {
+  return names.flatMap((joint, j) =>
+    q[j] < ARM.lower[j] - SLACK || q[j] > ARM.upper[j] + SLACK
+      ? [{ joint, value: q[j] / ARM.ratio[j], lower: limits[j]?.[0] ?? null, upper: limits[j]?.[1] ?? null }]
+      : [],
+  );
+}

@@ -1,0 +1,94 @@
+/**
+ * Singular value decomposition A = U S V' of a small matrix by rotations of its columns (Hestenes 1958).
+ * @param {number[][]} A m rows of n
+ * @returns {{U: number[][], S: number[], V: number[][]}} columns of U and V, largest singular value first
+ */
+function decompose(A) {
+  const n = A[0].length;
+  const U = Array.from({ length: n }, (_, j) => A.map((row) => row[j]));
+  const V = Array.from({ length: n }, (_, j) => Array.from({ length: n }, (_, i) => (i === j ? 1 : 0)));
+  for (let sweep = 0, rotated = true; rotated && sweep < 40; sweep++) {
+    rotated = false;
+    for (let j = 0; j < n; j++)
+      for (let k = j + 1; k < n; k++) {
+        const a = dot(U[j], U[j]);
+        const b = dot(U[k], U[k]);
+        const c = dot(U[j], U[k]);
+        if (Math.abs(c) <= 1e-16 * Math.sqrt(a * b) || c * c < 1e-300) continue;
+        rotated = true;
+        const z = (b - a) / (2 * c);
+        const t = (z < 0 ? -1 : 1) / (Math.abs(z) + Math.sqrt(1 + z * z));
+        const cosine = 1 / Math.sqrt(1 + t * t);
+        for (const W of [U, V])
+          for (let i = 0; i < W[j].length; i++) {
+            const x = W[j][i];
+            const y = W[k][i];
+            W[j][i] = cosine * (x - t * y);
+            W[k][i] = cosine * (y + t * x);
+          }
+      }
+  }
+  const size = U.map((u) => Math.sqrt(dot(u, u)));
+  const order = size.map((_, j) => j).sort((a, b) => size[b] - size[a]);
+  return {
+    U: order.map((j) => U[j].map((x) => (size[j] > 0 ? x / size[j] : 0))),
+    S: order.map((j) => size[j]),
+    V: order.map((j) => V[j]),
+  };
+}
+
+/** @param {Numbers} a @param {Numbers} b */
+function dot(a, b) {
+  let sum = 0;
+  for (let i = 0; i < a.length; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+/** to -= factor what, n numbers from these places on.
+ * @param {Float64Array} to @param {number} at @param {Numbers} what @param {number} from @param {number} factor @param {number} n */
+function subtract(to, at, what, from, factor, n) {
+  for (let j = 0; j < n; j++) to[at + j] -= factor * what[from + j];
+}
+
+/** Exchange n numbers of two rows. @param {Float64Array} a @param {number} one @param {number} other @param {number} n */
+function swap(a, one, other, n) {
+  for (let j = 0; j < n; j++) {
+    const kept = a[one + j];
+    a[one + j] = a[other + j];
+    a[other + j] = kept;
+  }
+}
+
+/** The row from k to n with the largest entry in a column; rows m long.
+ * @param {Float64Array} a @param {number} k @param {number} column @param {number} n @param {number} m */
+function pivot(a, k, column, n, m) {
+  let most = Math.abs(a[k * m + column]);
+  let best = k;
+  for (let i = k + 1; i < n; i++) {
+    const size = Math.abs(a[i * m + column]);
+    if (size > most) [most, best] = [size, i];
+  }
+  return best;
+}
+
+/** Gaussian elimination with row pivots of an n x n system whose right sides stand from the column `right` on, rows m
+ * long. Afterwards the right sides hold the solution. False if a pivot vanishes.
+ * @param {Float64Array} a @param {number} n @param {number} right @param {number} m */
+function reduce(a, n, right, m) {
+  for (let k = 0; k < n; k++) {
+    const best = pivot(a, k, k, n, m);
+    if (!(Math.abs(a[best * m + k]) > 1e-300)) return false;
+    if (best !== k) swap(a, k * m, best * m, m);
+    const over = 1 / a[k * m + k];
+    for (let i = k + 1; i < n; i++) {
+      const factor = a[i * m + k] * over;
+      if (factor !== 0) subtract(a, i * m + k, a, k * m + k, factor, m - k);
+    }
+  }
+  for (let k = n - 1; k >= 0; k--) {
+    const over = 1 / a[k * m + k];
+    for (let j = right; j < m; j++) a[k * m + j] *= over;
+    for (let i = 0; i < k; i++) subtract(a, i * m + right, a, k * m + right, a[i * m + k], m - right);
+  }
+  return true;
+}

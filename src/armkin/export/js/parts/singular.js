@@ -1,0 +1,152 @@
+// A solution is a connected component of the postures that miss the target by at most SOLUTION. Where the Jacobian loses
+// a direction, what the component is follows from the residual along that direction: long, a self-motion manifold;
+// short with a turning point, a boundary; short without, an isolated solution.
+const SOLUTION = 1e-9; // of the reach, rad
+const REACH = 0.1; // rad or reaches: a component in which a joint moves so far is a self-motion
+const SPLIT = 1e-3; // singular value below which a direction is nearly lost; a turning point within SOLUTION needs 1e-4
+const STRIDE = 0.05; // rad or reaches between neighbouring postures of a self-motion
+const FREE = 1e-5; // joints that a self-motion holds move by less
+
+/** @param {Numbers} q @param {Numbers} v @param {number} by [rad, reaches] */
+const stepped = (q, v, by) => Array.from(q, (x, j) => x + by * v[j] * ARM.unit[j]);
+
+/** @param {Numbers} a @param {Numbers} b @returns {number[]} from b to a [rad, reaches] */
+const between = (a, b) => Array.from(a, (x, j) => less(x, b[j], ARM.slides[j]) / ARM.unit[j]);
+
+/** The directions that the Jacobian loses at q, or nearly. @param {Numbers} q @param {number} most */
+function lost(q, most) {
+  const { U, S, V } = decompose(slope(q));
+  const rank = S.findIndex((s, k) => !(s > most) || k >= U[k].length);
+  const from = rank < 0 ? S.length : rank;
+  return { V: V.slice(from), S: S.slice(from) };
+}
+
+/**
+ * A self-motion of one dimension, or as much of it as REACH needs to be one: from a posture both ways.
+ * @param {number[]} q @param {number[]} v the direction that is lost there @param {Numbers} goal
+ * @returns {{path: number[][], extent: number, crossed: boolean}} crossed: another self-motion may meet it
+ */
+function follow(q, v, goal) {
+  /** @type {number[][][]} */
+  const halves = [];
+  let closed = false;
+  let crossed = false;
+  for (const sign of [1, -1]) {
+    const path = [q];
+    halves.push(path);
+    let [here, way, stride, gone] = [q, v.map((x) => sign * x), STRIDE, 0];
+    while (stride > 1e-4 && gone < 4 * TURN && path.length < 1000) {
+      const next = newton(stepped(here, way, stride), goal, 6, SPLIT / 10);
+      const move = between(next.q, here);
+      const size = Math.sqrt(dot(move, move));
+      if (!(next.missed <= SOLUTION) || !(dot(move, way) > 0.5 * stride) || size > 1.5 * stride) {
+        stride /= 2;
+        continue;
+      }
+      gone += size;
+      path.push(next.q);
+      if (gone > 3 * STRIDE && apart(next.q, q) < 0.75 * STRIDE) {
+        closed = true;
+        break;
+      }
+      const { V, S } = lost(next.q, STRIDE);
+      crossed = crossed || S.length > 1;
+      const along = V.map((u) => dot(u, move) / size);
+      const turned = next.q.map((_, j) => V.reduce((sum, u, k) => sum + along[k] * u[j], 0));
+      const length = Math.sqrt(dot(turned, turned));
+      if (!(length > 0.5)) break; // the manifold ends where nothing is lost
+      way = turned.map((x) => x / length);
+      here = next.q;
+      stride = Math.min(STRIDE, 2 * stride);
+    }
+    if (closed) break;
+  }
+  const path = closed ? halves[halves.length - 1] : [...halves[1].slice(1).reverse(), ...halves[0]];
+  return { path, extent: Math.max(...spread(path)), crossed };
+}
+
+/** How far each joint moves along a path [rad, reaches], whole turns included. @param {number[][]} path */
+function spread(path) {
+  /** @type {number[][]} */
+  const [low, high, at] = [0, 0, 0].map(() => new Array(ARM.joints).fill(0));
+  for (let k = 1; k < path.length; k++)
+    between(path[k], path[k - 1]).forEach((d, j) => {
+      at[j] += d;
+      low[j] = Math.min(low[j], at[j]);
+      high[j] = Math.max(high[j], at[j]);
+    });
+  return high.map((x, j) => x - low[j]);
+}
+
+/** Whether two roots, or one and its turning point, lie so close that rounding could part or join them.
+ * @param {number[]} q @param {number[]} v @param {Numbers} goal */
+function folds(q, v, goal) {
+  const h = 1e-3; // beside the posture, corrected in the directions that are not lost: what is left of the residual
+  const [ahead, behind] = [h, -h].map((t) => residual(newton(stepped(q, v, t), goal, 3, SPLIT).q, goal));
+  const here = residual(q, goal);
+  const bend = Math.hypot(...here.map((x, i) => (ahead[i] + behind[i] - 2 * x) / (2 * h * h)));
+  const rise = Math.hypot(...here.map((_, i) => (ahead[i] - behind[i]) / (2 * h)));
+  return rise * rise <= 4 * bend * SOLUTION;
+}
+
+/**
+ * What the solution set is around a posture that solves the target.
+ * @param {number[]} q @param {Numbers} goal
+ * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossed: boolean, moves?: number[]}} paths of the
+ *   self-motions through it; of a surface, how far each joint moves along it
+ */
+function structure(q, goal) {
+  const { V } = lost(q, SPLIT);
+  if (!V.length) return { kind: 'exact', paths: [], crossed: false };
+  if (V.length === 1) {
+    const { path, extent, crossed } = follow(q, V[0], goal);
+    if (extent >= REACH) return { kind: 'curve', paths: [path], crossed };
+    return { kind: folds(q, V[0], goal) ? 'boundary' : 'exact', paths: [], crossed: false };
+  }
+  // several directions: self-motions that cross here are met again beside it
+  const count = V.length === 2 ? 24 : 64;
+  /** @type {number[][][]} */
+  const paths = [];
+  /** @type {number[][]} */
+  const wide = []; // ways to postures that lose several directions, too
+  let solved = 0;
+  for (let k = 0; k < count; k++) {
+    const turn = (Math.PI * (k + 0.5)) / count;
+    const mix = V.length === 2 ? [Math.cos(turn), Math.sin(turn)] : V.map((_, i) => Math.cos((k + 1) * (i + 1.618) * 2.4));
+    const size = Math.sqrt(dot(mix, mix));
+    const way = q.map((_, j) => V.reduce((sum, v, i) => sum + (mix[i] / size) * v[j], 0));
+    const there = newton(stepped(q, way, 2 * STRIDE), goal, 12);
+    const away = apart(there.q, q);
+    if (!(there.missed <= SOLUTION) || !(away > STRIDE / 2 && away < 8 * STRIDE)) continue;
+    solved++;
+    const beside = lost(there.q, SPLIT / 10).V;
+    if (beside.length > 1) wide.push(between(there.q, q));
+    if (beside.length !== 1 || paths.some((path) => onPath(there.q, path, goal))) continue;
+    const { path, extent } = follow(there.q, beside[0], goal);
+    if (extent >= REACH && !paths.some((other) => oneCurve(path, other, goal))) paths.push(path);
+  }
+  if (wide.length > 0.7 * count && !paths.length) {
+    const ways = decompose(wide);
+    if (!(ways.S[1] > 0.1 * ways.S[0])) paths.push(follow(q, ways.V[0], goal).path); // along one of them, the other stays lost
+    else return { kind: 'surface', paths: [], crossed: true, moves: q.map((_, j) => Math.hypot(...V.map((v) => v[j]))) };
+  }
+  return { kind: paths.length ? 'curve' : solved ? 'exact' : 'boundary', paths, crossed: true };
+}
+
+/** Whether a posture lies on a self-motion. @param {number[]} q @param {number[][]} path @param {Numbers} goal */
+function onPath(q, path, goal) {
+  return path.some((p, k) => {
+    const away = apart(q, p);
+    if (away > STRIDE || k + 1 === path.length) return away < 1e-6;
+    const way = between(path[k + 1], p);
+    const share = Math.min(Math.max(dot(between(q, p), way) / Math.max(dot(way, way), 1e-300), 0), 1);
+    return apart(q, newton(stepped(p, way, share), goal, 4, SPLIT / 10).q) < 1e-4;
+  });
+}
+
+/** Whether two paths follow one self-motion: those through a crossing may leave it by either way.
+ * @param {number[][]} a @param {number[][]} b @param {Numbers} goal */
+function oneCurve(a, b, goal) {
+  const shared = [0.07, 0.31, 0.52, 0.74, 0.93].filter((share) => onPath(a[Math.floor(share * a.length)], b, goal));
+  return shared.length > 1;
+}

@@ -1,0 +1,185 @@
+"""The ES module of an arm: every branch in a browser or in node, in double precision."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin import __version__, forward, motors
+from armkin.errors import UsageError
+from armkin.export.c import formulas
+from armkin.export.c.program import has_form, plain_form, why_no_form
+from armkin.export.js import elimination
+from armkin.formula import c_and_js_code, recording
+from armkin.inverse.branches.names import branch_names
+from armkin.inverse.recognise import solver
+from armkin.model.arm import actual
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+_PARTS = Path(__file__).parent / "parts"
+_ROUNDED = 5e-6  # how far a pose of six printed digits may be from orthonormal
+_ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
+ *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
+ *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
+_SOLVER = ("numbers", "linear_algebra", "residual", "singular", "ik", "closest")
+
+
+def module(arm: Arm, task_name: str | None = None) -> str:
+    """An arm as the text of an ES module: names, limits, home, fk, jacobian, target, ik, pulses, joints.
+
+    Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.
+    """
+    turned = actual(arm)  # branches are found, and limits hold, in actual joint values
+    task, named = solver(turned, task_name)
+    geometry = plain_form(turned, task, named)
+    if not has_form(geometry):
+        raise UsageError(
+            f"{arm.name}: {geometry.name} has no form in JavaScript: {why_no_form(arm, geometry)}; task {task.name} is "
+            "solved in Python alone"
+        )
+    solve, branches = candidates(turned, task, geometry)
+    parts = [
+        f"// {_about(arm, task, geometry)}",
+        part("head"),
+        *_exported(arm, task),
+        *_data(arm, turned, task, geometry, branches),
+        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
+        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
+        _of_joints("targetOf", formulas.target(turned, task)),
+        *map(part, _SOLVER),
+        *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
+        solve,
+        part("module").replace("@TARGET@", _target_is(task)),
+        *([part("pulses")] if _driven(arm) else []),
+    ]
+    return "\n".join(parts)
+
+
+def part(name: str) -> str:
+    """A part's text."""
+    return (_PARTS / f"{name}.js").read_text(encoding="utf-8")
+
+
+def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
+    """The function `candidates` of an arm's class, and how many branches it has."""
+    if geometry.pairs is None:
+        return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
+    n, entries = arm.n, formulas.goal_size(task)
+    declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
+    for j in range(n):
+        turn = [(f"c{j}", f"Math.cos(near[{j}])"), (f"s{j}", f"Math.sin(near[{j}])")]
+        declared += [(f"p{j}", f"near[{j}]")] if arm.prismatic[j] else turn
+    recorded = formulas.candidates(arm, task, geometry)
+    code = c_and_js_code.write(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
+    *values, miss, _ = formulas.by_branch(recorded, code)
+    stores = [f"q[{b * n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
+    stores += [f"miss[{b}] = {miss[b]};" for b in range(len(miss))]
+    doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
+    lines = [*(f"const {name} = {text};" for name, text in declared), *code.lines, *stores]
+    lines.append(f"return Boolean({' | '.join(doubts) or 0});")
+    head = (
+        "/** Candidate branches, and their squared residual; whether the target is at an edge.\n"
+        " * @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss */\n"
+        "function candidates(goal, near, q, miss)"
+    )
+    return _function(head, lines), len(miss)
+
+
+def _of_joints(name: str, recorded: recording.Recording) -> str:
+    inputs = [f"q{j}" for j in range(len(recorded.inputs))]
+    code = c_and_js_code.write(recorded, inputs, c_and_js_code.JAVASCRIPT)
+    lines = [f"const {q} = q[{j}];" for j, q in enumerate(inputs)]
+    lines += [*code.lines, *(f"out[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
+    return _function(f"/** @param {{Numbers}} q @param {{Float64Array}} out */\nfunction {name}(q, out)", lines)
+
+
+def _function(head: str, lines: list[str]) -> str:
+    body = "\n".join(f"  {line}" for line in lines)
+    return f"{head} {{\n{body}\n}}\n"
+
+
+def _exported(arm: Arm, task: Task) -> list[str]:
+    limits = [[None if np.isinf(v) else v for v in row] for row in np.stack([arm.lower, arm.upper], axis=1).tolist()]
+    return [
+        "/** The joints. */",
+        f"export const names = {_text(arm.joint_names)};",
+        "/** [low, high] of each joint [rad | mm], null: unlimited. @type {((number | null)[] | null)[]} */",
+        f"export const limits = {_text([None if row == [None, None] else row for row in limits])};",
+        "/** Joint values at home [rad | mm]. */",
+        f"export const home = {_text(arm.home.tolist())};",
+        "/** What a target holds. */",
+        f"export const labels = {_text(list(task.labels))};",
+    ]
+
+
+def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int) -> list[str]:
+    """What the parts read of the arm."""
+    fields: dict[str, Any] = {
+        "name": arm.name,
+        "joints": arm.n,
+        "branches": branches,
+        "names": branch_names(turned, task, geometry, branches),
+        "method": geometry.name,
+        "slides": turned.prismatic.tolist(),
+        "lower": turned.lower.tolist(),
+        "upper": turned.upper.tolist(),
+        "home": turned.home.tolist(),
+        "ratio": arm.ratio.tolist(),
+        "unit": radian_or_reach(turned).tolist(),
+        "reach": turned.reach,
+        "position": task.position,
+        "sums": task.sums.tolist(),
+        "offsets": task.offsets.tolist(),
+        "orientation": task.orientation,
+        "labels": list(task.labels),
+    }
+    lines = [f"  {name}: {_text(value)}," for name, value in fields.items()]
+    data = [_ARM_IS, "const ARM = {", *lines, "};", f"const ROTATION = {_ROUNDED!r};"]
+    data.append(f"const CLOSED_FORM = {_text(geometry.pairs is not None)};")
+    data.append(f"const CALIBRATED = {_text(bool((arm.ratio != 1.0).any()))};")
+    if _driven(arm):
+        values = {
+            "gain": arm.motor_gain.tolist(),
+            "bias": arm.motor_bias.tolist(),
+            "inverse": motors.joints_per_pulse(arm).tolist(),
+        }
+        data += ["const MOTORS = {", *(f"  {name}: {_text(value)}," for name, value in values.items()), "};"]
+    return [*data, ""]
+
+
+def _driven(arm: Arm) -> bool:
+    return not motors.undriven(arm)
+
+
+def _text(value: Any) -> str:
+    """A value as JavaScript: JSON, and infinity; no text in it ends a script element or a line."""
+    escaped = {"<": "\\u003c", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+    text = json.dumps(value, ensure_ascii=False)
+    for letter, code in escaped.items():
+        text = text.replace(letter, code)
+    return text
+
+
+def _about(arm: Arm, task: Task, geometry: Geometry) -> str:
+    lines = [
+        f"{arm.name}: kinematics in JavaScript, double precision. Generated, do not edit.",
+        f"By armkin {__version__} from {Path(arm.path).name if arm.path else 'an arm made in Python'}, "
+        f"sha256 {arm.sha256 or 'unknown'}.",
+        f"Task {task.name}; {geometry.name}: {geometry.why}.",
+        "Lengths in mm, angles in rad.",
+    ]
+    return "\n// ".join(" ".join(line.split()).replace("<", "\\u003c") for line in lines)
+
+
+def _target_is(task: Task) -> str:
+    if task.orientation == "full":
+        return "the tool's pose, four rows of four [mm]"
+    return f"{' '.join(task.labels)} [mm, rad]"

@@ -1,0 +1,91 @@
+"""What `armkin export --js` writes, asked in node: does it say what Python says?"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import armkin
+from armkin.export.js.program import module
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.residuals import residual
+from armkin.inverse.tasks.task import targets_of
+from armkin.model.arm import actual
+
+_ASK = """
+import * as arm from './arm.mjs';
+import { readFileSync, writeFileSync } from 'node:fs';
+const asked = JSON.parse(readFileSync('asked.json', 'utf8'));
+const began = process.hrtime.bigint();
+const ik = asked.targets.map((target, k) => arm.ik(target, asked.near[k]));
+const seconds = Number(process.hrtime.bigint() - began) / 1e9;
+const told = { ik, seconds };
+for (const name of ['fk', 'jacobian', 'target', 'pulses']) if (arm[name]) told[name] = asked.q.map(arm[name]);
+if (arm.joints) told.joints = told.pulses.map(arm.joints);
+writeFileSync('told.json', JSON.stringify(told));
+"""
+
+
+def ask(
+    arm: armkin.Arm, folder: Path, q: np.ndarray, near: np.ndarray | None = None, targets: np.ndarray | None = None
+) -> dict[str, Any]:
+    """What the exported module says of postures (N, n): fk, jacobian, target, pulses, and ik of targets."""
+    node = shutil.which("node")
+    assert node, "node runs the module; README.md names the package"
+    goals = goals_of(arm, q) if targets is None else targets
+    close = np.broadcast_to(arm.home, q.shape) if near is None else near
+    asked = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
+    (folder / "arm.mjs").write_text(module(arm), encoding="utf-8")
+    (folder / "asked.json").write_text(json.dumps(asked))
+    (folder / "ask.mjs").write_text(_ASK)
+    subprocess.run([node, "ask.mjs"], cwd=folder, check=True, timeout=300)
+    told: dict[str, Any] = json.loads((folder / "told.json").read_text())
+    return told
+
+
+def goals_of(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
+    """The targets that postures (N, n) answer."""
+    task, _ = solver(actual(arm), None)
+    return targets_of(task, armkin.fk(arm, q), q * arm.ratio)
+
+
+def differences(arm: armkin.Arm, told: list[dict[str, Any]], s: armkin.Solutions) -> list[str]:
+    """What differs between the module's answers and Python's (N,): a line for each target that is not the same."""
+    return [line for k, one in enumerate(told) if (line := _differs(arm, one, s, k))]
+
+
+def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int) -> str:
+    status = armkin.Status(s.status[k]).name.lower()
+    if told["status"] != status:
+        return f"target {k}: {told['status']}, Python {status}"
+    order = [b for b in s.order[k] if s.valid[k, b]]
+    own, theirs = s.q[k][order], np.array([row["joints"] for row in told["branches"]]).reshape(-1, arm.n)
+    if len(own) != len(theirs):
+        return f"target {k} ({status}): {len(theirs)} branches, Python {len(own)}"
+    names, free = [s.names[i] for i in s.branch[k][order]], [arm.joint_names[j] for j in np.flatnonzero(s.free[k])]
+    if told["free_joints"] != free:
+        return f"target {k}: free {told['free_joints']}, Python {free}"
+    if status == "singular":  # a posture of each self-motion: which one is a matter of the way there
+        target = np.repeat(s.target[k][None], len(theirs), axis=0)
+        off = residual(s.task, armkin.fk(arm, theirs), theirs * arm.ratio, target)
+        off[:, : s.task.position] /= arm.reach
+        worst = float(np.abs(off).max(initial=0.0))
+        return f"target {k}: a row misses by {worst:.1e}" if worst > 2e-9 else ""
+    if sorted(row["name"] for row in told["branches"]) != sorted(names) and status == "exact":
+        return f"target {k}: names"
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    between = theirs[:, None] - own[None]
+    if status == "boundary":  # a double root moves by the root of what rounding moves it
+        between -= np.where(arm.prismatic, 0.0, 2 * np.pi) * np.round(between / (2 * np.pi))
+    apart = np.abs(between / unit).max(axis=2)
+    if (worst := float(apart.min(axis=0).max(initial=0.0))) > (2e-11 if status == "exact" else 1e-4):
+        return f"target {k} ({status}): joint values {worst:.1e} apart"
+    if status == "exact" and s.within_limits[k][order].tolist() != [row["within_limits"] for row in told["branches"]]:
+        return f"target {k}: limits"
+    best = None if s.best[k] < 0 else 0
+    return "" if told["best"] == best or status != "exact" else f"target {k}: best {told['best']}, Python {best}"

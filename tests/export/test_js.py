@@ -1,0 +1,133 @@
+"""The exported ES module answers as Python does: in node, on random and on typed poses of every class of arms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exported_js import ask, differences, goals_of
+
+import armkin
+from armkin.errors import UsageError
+from armkin.export.js.program import module
+from armkin.inverse.recognise import solver
+from armkin.inverse.tasks.residuals import residual
+from armkin.inverse.tasks.task import nearest_rotation
+
+# a robot of every class that a module can hold, and how many random and typed postures it is asked
+ARMS = (
+    "three_dof",
+    "planar_3dof",
+    "yaw_two_link",
+    "cobra600",
+    "labvolt_5150",
+    "so101",
+    "stanford",
+    "puma560",
+    "ur5e",
+    "ar4",
+)
+
+
+def _random(arm: armkin.Arm, count: int) -> np.ndarray:
+    turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
+    return np.random.default_rng(5).uniform(-turn, turn, (count, arm.n))
+
+
+def _typed(arm: armkin.Arm, count: int) -> np.ndarray:
+    """Multiples of 15, 30, 45 and 90 degrees, slides a little out: where people ask, and where arms are singular."""
+    rng = np.random.default_rng(6)
+    step = rng.choice([15.0, 30.0, 45.0, 90.0], (count, 1))
+    values = np.round(rng.uniform(-180, 180, (count, arm.n)) / step) * step
+    typed: np.ndarray = np.where(arm.prismatic, 120.0 + values / 4, np.deg2rad(values))
+    return typed
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_module_answers_as_python_does(name: str, tmp_path: Path) -> None:
+    arm = armkin.load(name)
+    q = np.concatenate([_random(arm, 60), _typed(arm, 30)])
+    told = ask(arm, tmp_path, q)
+    assert not differences(arm, told["ik"], armkin.ik(arm, goals_of(arm, q)))
+    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(told["jacobian"]) - armkin.jacobian(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(told["target"]) - goals_of(arm, q)).max() < 1e-9
+    assert ("pulses" in told) == (arm.motor_gain.size > 0)
+    if "pulses" in told:
+        whole = armkin.pulses(arm, q)
+        assert (np.array(told["pulses"]) == whole).all()
+        assert np.abs(np.array(told["joints"]) - armkin.joints(arm, whole)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["jaco_j2n6s300", "moveo"])
+def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Path) -> None:
+    arm = armkin.load(name)
+    q = np.concatenate([_random(arm, 30), _typed(arm, 6)])
+    assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+
+
+def test_a_calibrated_arm_is_commanded_in_its_own_values(tmp_path: Path) -> None:
+    arm = armkin.load(Path(__file__).parents[1] / "robots" / "ratio_arm.yaml")
+    q = _random(arm, 40)
+    told = ask(arm, tmp_path, q)
+    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert not differences(arm, told["ik"], armkin.ik(arm, goals_of(arm, q)))
+
+
+@pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof"])
+def test_the_arm_that_stands_at_its_target_stays(name: str, tmp_path: Path) -> None:
+    """Singular postures too, asked for in the six digits that a pose is printed with."""
+    arm = armkin.load(name)
+    typed = np.clip(_typed(arm, 40), arm.lower, arm.upper)
+    rounded = goals_of(arm, typed).round(6)
+    if name == "three_dof":
+        rounded, defect = goals_of(arm, typed), np.zeros(len(typed))
+    else:
+        R = rounded[:, :3, :3]
+        defect = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2))
+    told = ask(arm, tmp_path, typed, near=typed, targets=rounded)
+    stood = 0
+    for q, target, rounding, answer in zip(typed, rounded, defect, told["ik"], strict=True):
+        task, _ = solver(arm, None)
+        goal = nearest_rotation(target[None, :3, :3])[0] if target.ndim == 2 else target
+        off = residual(task, armkin.fk(arm, q[None]), q[None], _with_rotation(target, goal)[None])[0]
+        off[: task.position] /= arm.reach
+        if np.linalg.norm(off) > 1e-9 + rounding:
+            continue  # rounding has turned the pose by more than its columns tell
+        stood += 1
+        assert answer["best"] == 0
+        assert np.abs(np.array(answer["branches"][0]["joints"]) - q).max() == 0.0
+    assert stood >= 30
+
+
+def _with_rotation(target: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """A target whose rotation is made orthonormal, as the module reads it."""
+    if target.ndim != 2:
+        return target
+    out = target.copy()
+    out[:3, :3] = goal
+    return out
+
+
+def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: Path) -> None:
+    arm = armkin.load("three_dof")
+    targets = np.array([[900.0, 0.0, 100.0], [10.0, 20.0, 900.0], [0.0, -400.0, -300.0]])
+    told = ask(arm, tmp_path, np.zeros((3, 3)), targets=targets)
+    for target, answer in zip(targets, told["ik"], strict=True):
+        assert answer["best"] is None
+        mine = armkin.closest(arm, target)
+        assert abs(answer["closest"]["distance_mm"] - mine.distance) < 1e-6
+
+
+def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
+    arm = armkin.load("three_dof")
+    object.__setattr__(arm, "name", "</script><script>alert(1)//\u2028throw 1")
+    text = module(arm)
+    assert "</script" not in text
+    assert "\u2028" not in text
+
+
+def test_an_arm_that_only_python_solves_has_no_module() -> None:
+    with pytest.raises(UsageError, match="7 joints"):
+        module(armkin.load("panda"))
