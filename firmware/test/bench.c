@@ -130,7 +130,7 @@ void bench_run(uint32_t us) {
 void bench_reset(uint8_t cause) {
     timer_on = false;
     sent_tail = sent_head;
-    protocol_byte(0);
+    bench_wire((const uint8_t[]){0}, 1);
     link_bad = 0;
     next_millisecond = bench_cycles + CLOCK / 1000;
     protocol_start(cause);
@@ -148,8 +148,9 @@ void bench_power(void) {
 }
 
 void bench_wire(const uint8_t *bytes, size_t length) {
-    for (size_t i = 0; i < length; i++) {
-        protocol_byte(bytes[i]);
+    for (size_t i = 0; i < length;) {
+        i += link_bytes(bytes + i, length - i < 255 ? length - i : 255);
+        protocol_frame();
     }
 }
 

@@ -30,10 +30,10 @@ from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
 
 
-def first_steps(runs: int) -> tuple[list[float], float, list[float]]:
-    """To the first step of a move, of that the law's own, and how long the arm was told to stand [ms]."""
+def first_steps(runs: int) -> tuple[list[float], float]:
+    """To the first step of a move, and of that the law's own [ms]."""
     arm = armkin.load("three_dof")
-    out, leads, own = [], [], 0.0
+    out, own = [], 0.0
     for _ in range(runs):
         with EmulatedBoard(trace=True, reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
@@ -42,7 +42,6 @@ def first_steps(runs: int) -> tuple[list[float], float, list[float]]:
             plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
             law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
             own = 1e3 * math.sqrt(law.length / law.accel / int(np.abs(plan.end - plan.start).max()))
-            leads.append(1e3 * streaming.lead(machine.session))
             time.sleep(0.03)
             begin = board.control("cycles")["cycle"]
             try:
@@ -56,7 +55,7 @@ def first_steps(runs: int) -> tuple[list[float], float, list[float]]:
             arrived, _ = trace.edges("uart.in")
             step = min(int(trace.rises(f"{axis}.STEP")[0]) for axis in "XYZ")
             out.append(float(step - arrived[arrived > begin][0]) / 16e3)
-    return out, own, leads
+    return out, own
 
 
 def short_moves(moves: int, load: int) -> tuple[int, int, float]:
@@ -108,12 +107,10 @@ def main() -> None:
         streaming._load = lambda session: 0.0
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     if given.runs:
-        got, own, leads = first_steps(given.runs)
+        got, own = first_steps(given.runs)
         figures = " / ".join(f"{np.quantile(got, q):.1f}" for q in (0.0, 0.5, 0.9, 1.0))
         print(f"first step after the first byte of MOTION, {given.runs} runs: {figures} ms (least, median, 90 %, most)")
-        print(
-            f"  of these the law's own {own:.1f} ms; the arm was told to stand {min(leads):.1f} to {max(leads):.1f} ms"
-        )
+        print(f"  of these the law's own {own:.1f} ms")
     if given.moves:
         arrived, held, seconds = short_moves(given.moves, given.load)
         print(

@@ -100,19 +100,23 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
     machine = machine_on(SimPort(SimBoard(BOARDS["uno_cnc_shield"])))
     session = machine.session
     found = []
+    frames = [(0.01, 2, 70), (0.01, 3, 90), (0.02, 6, 140), (0.04, 6, 140), (0.08, 6, 140)]
     for slowest in (0.0005, 0.002, 0.016, 0.2):
         session.line.slowest = slowest
-        found.append(streaming.lead(session))
-    assert found == pytest.approx([0.00525, 0.012, 0.075, 0.6])
-    assert streaming.lead(session, 0.7) == 0.7
+        found.append(streaming.lead(session, frames))
+    assert found == sorted(found)
+    assert found[-1] - found[-2] > 0.3  # two answers are waited for
+    session.line.slowest = 1.0
+    assert streaming.lead(session, frames) == 0.6
+    assert streaming.lead(session, frames, 0.7) == 0.7
     session.port.simulated, session.line.slowest = False, 0.0
     cores = os.cpu_count() or 1
-    for mean, now, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.003), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
+    for mean, now, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.0015), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
         monkeypatch.setattr("os.getloadavg", lambda mean=mean: (mean * cores, 0.0, 0.0))
         monkeypatch.setattr(streaming, "_others_running", lambda now=now: now * cores)
-        assert streaming.lead(session) == seconds
+        assert streaming.lead(session, []) == seconds
     session.line.resent = 1
-    assert streaming.lead(session) > 0.5
+    assert streaming.lead(session, []) > 0.5
 
 
 @pytest.mark.parametrize("bad", [0, 1])

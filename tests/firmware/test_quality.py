@@ -13,7 +13,7 @@ def test_25_khz_on_every_stepper_with_every_feature_on(board: str) -> None:
     assert (got.error, got.overruns, got.violations) == (0, 0, 0)
     assert abs(got.rate - 25_000) < 100
     assert got.jitter_us <= 10
-    assert got.stack_free >= 200
+    assert got.stack_free >= 128
 
 
 def test_the_shortest_interval_that_the_board_accepts_is_kept() -> None:

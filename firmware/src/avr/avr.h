@@ -8,7 +8,8 @@
 void stepper_setup(void);
 
 void serial_setup(void);
-bool serial_get(uint8_t *byte);
+uint8_t serial_waiting(const uint8_t **bytes);  // so many that came, in a row
+void serial_taken(uint8_t count);
 
 void servo_setup(void);
 void servo_frame(void);  // every 20 ms: one pulse each

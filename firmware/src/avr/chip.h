@@ -19,7 +19,7 @@
 #define HAL_NOINIT __attribute__((section(".noinit")))
 #define HAL_TABLE PROGMEM
 #define HAL_READ32(p) pgm_read_dword_near(p)
-#define HAL_RECEIVE (RAMEND > 4096 ? 255 : 127)
+#define HAL_RECEIVE RECEIVE
 
 typedef __uint24 fine_t;
 typedef __int24 sfine_t;

@@ -5,24 +5,25 @@
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
 
+#include "../core/link.h"
 #include "../core/protocol.h"
 #include "avr.h"
 
-enum { SERVO_PERIOD_MS = 20, BYTES_AT_ONCE = 64 };
+enum { SERVO_PERIOD_MS = 20, AT_ONCE = 16 };
 
-// Timer 0 counts units of 16 µs and is looked at, not interrupted by: milliseconds are not lost if a look comes 4 ms late.
-static uint8_t elapsed(void) {
-    static uint8_t before, eighths;  // of a millisecond's 62.5 units: 125 halves
+// Timer 0 counts units of 64 µs and is looked at, not interrupted by: no millisecond is lost if a look comes 16 ms late.
+// True once for each millisecond; those that are late come one a turn, and bytes between them.
+static bool millisecond_due(void) {
+    static uint8_t before;
+    static uint16_t eighths;  // of a millisecond's 15.625 units: 125
     const uint8_t now = TCNT0;
-    uint16_t halves = eighths + 2 * (uint8_t)(now - before);
-    uint8_t milliseconds = 0;
+    eighths += 8 * (uint8_t)(now - before);
     before = now;
-    while (halves >= 125) {
-        halves -= 125;
-        milliseconds++;
+    if (eighths < 125) {
+        return false;
     }
-    eighths = halves;
-    return milliseconds;
+    eighths -= 125;
+    return true;
 }
 
 static void millisecond(void) {
@@ -36,24 +37,31 @@ static void millisecond(void) {
     }
 }
 
+// All that waits, to the end of a frame: as soon as the frame before it was answered, the host may send more.
+static void take_bytes(void) {
+    const uint8_t *bytes;
+    uint8_t waiting;
+    while (!link_length && (waiting = serial_waiting(&bytes))) {
+        serial_taken(link_bytes(bytes, waiting < AT_ONCE ? waiting : AT_ONCE));
+    }
+}
+
 int main(void) {
     pins_setup();
     stepper_setup();
     servo_setup();
     serial_setup();
-    TCCR0B = 1 << CS02;  // clock / 256
+    TCCR0B = 1 << CS02 | 1 << CS00;  // clock / 1024
     protocol_start(reset_cause());
     wdt_enable(WDTO_250MS);  // for hangs only: the loop turns in well under 5 ms
     sei();
     for (;;) {
-        uint8_t byte;
         wdt_reset();
-        for (uint8_t n = 0; n < BYTES_AT_ONCE && serial_get(&byte); n++) {
-            protocol_byte(byte);
-        }
-        for (uint8_t n = elapsed(); n; n--) {
+        take_bytes();
+        if (millisecond_due()) {
             millisecond();
         }
         protocol_poll();
+        protocol_frame();
     }
 }

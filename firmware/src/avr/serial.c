@@ -4,6 +4,7 @@
 
 #include "../chip.h"
 #include "../core/hal.h"
+#include "../core/protocol.h"
 #include "avr.h"
 
 #ifndef BAUD
@@ -15,21 +16,62 @@
 #define USART_UDRE_vect USART0_UDRE_vect
 #endif
 
-enum { RING = HAL_RECEIVE + 1, MASK = RING - 1, SENDING = RING / 2, SENDING_MASK = SENDING - 1 };
-_Static_assert((RING & MASK) == 0, "powers of two");
+enum { RING = HAL_RECEIVE + 1, SENDING = AXES > 8 ? 128 : 64, SENDING_MASK = SENDING - 1 };
+_Static_assert(RING <= 256, "8 bits count it");
+_Static_assert(SENDING_MASK >= (int)LARGEST_REPLY, "an answer fits");
 
 static uint8_t received[RING], sending[SENDING];
 static volatile uint8_t received_head, received_tail, sending_head, sending_tail;
 
-ISR(USART_RX_vect) {
-    const uint8_t byte = UDR0;
-    const uint8_t head = received_head, next = (head + 1) & MASK;
-    if (next != received_tail) {
-        received[head] = byte;
-        received_head = next;
-    } else {
-        hal_spilled = true;  // it is lost
-    }
+#if RECEIVE == 255
+#define WRAP  // 8 bits do so by themselves
+#else
+#define WRAP                 \
+    "cpi r24, %[ring]\n\t" \
+    "brne 1f\n\t"          \
+    "ldi r24, 0\n"          \
+    "1:"
+#endif
+
+// By hand, as a tick may come while it runs: 17 cycles shorter than gcc's.
+ISR(USART_RX_vect, ISR_NAKED) {
+    __asm__ volatile(
+        "push r24\n\t"
+        "in r24, __SREG__\n\t"
+        "push r24\n\t"
+        "push r25\n\t"
+        "push r30\n\t"
+        "push r31\n\t"
+        "lds r24, %[status]\n\t"
+        "sbrc r24, %[overrun]\n\t"  // a byte was lost before this one: this interrupt came too late
+        "sts %[spilled], r24\n\t"
+        "lds r25, %[data]\n\t"
+        "lds r30, %[head]\n\t"
+        "mov r24, r30\n\t"
+        "inc r24\n\t" WRAP
+        "lds r31, %[tail]\n\t"
+        "cp r24, r31\n\t"
+        "breq 2f\n\t"
+        "sts %[head], r24\n\t"
+        "ldi r31, 0\n\t"
+        "subi r30, lo8(-(%[ring_]))\n\t"
+        "sbci r31, hi8(-(%[ring_]))\n\t"
+        "st Z, r25\n"
+        "3:\n\t"
+        "pop r31\n\t"
+        "pop r30\n\t"
+        "pop r25\n\t"
+        "pop r24\n\t"
+        "out __SREG__, r24\n\t"
+        "pop r24\n\t"
+        "reti\n"
+        "2:\n\t"
+        "ldi r24, 1\n\t"  // it is lost
+        "sts %[spilled], r24\n\t"
+        "rjmp 3b\n"
+        :
+        : [status] "n"(_SFR_MEM_ADDR(UCSR0A)), [overrun] "n"(DOR0), [data] "n"(_SFR_MEM_ADDR(UDR0)), [head] "i"(&received_head), [spilled] "i"(&hal_spilled),
+          [tail] "i"(&received_tail), [ring_] "i"(received), [ring] "n"(RING));
 }
 
 ISR(USART_UDRE_vect) {
@@ -42,14 +84,15 @@ ISR(USART_UDRE_vect) {
     }
 }
 
-bool serial_get(uint8_t *byte) {
-    const uint8_t tail = received_tail;
-    if (tail == received_head) {
-        return false;
-    }
-    *byte = received[tail];
-    received_tail = (tail + 1) & MASK;
-    return true;
+uint8_t serial_waiting(const uint8_t **bytes) {
+    const uint8_t tail = received_tail, head = received_head;
+    *bytes = &received[tail];
+    return head >= tail ? head - tail : RING - tail;
+}
+
+void serial_taken(uint8_t count) {
+    const uint16_t tail = received_tail + count;
+    received_tail = tail == RING ? 0 : tail;
 }
 
 uint8_t hal_send_room(void) {

@@ -8,6 +8,7 @@
 #define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 128  // a power of two
 #define FRAME_MAX 240
+#define RECEIVE 255       // bytes
 #define MIN_INTERVAL 576  // cycles between ticks: 27.8 kHz
 
 // axis, STEP port and bit, DIR port and bit: D54/D55, D60/D61, D46/D48, D26/D28, D36/D34

@@ -1,7 +1,5 @@
 #include "crc.h"
 
-#include "../chip.h"
-
 // The table is linear over XOR, so the entries of the eight single bits make all others.
 #define BIT(n, b, k) ((n) & (1 << (b)) ? k##UL : 0UL)
 #define ENTRY(n)                                                                                              \
@@ -11,11 +9,7 @@
 #define SIXTEEN(n) FOUR(n), FOUR(n + 4), FOUR(n + 8), FOUR(n + 12)
 #define SIXTY_FOUR(n) SIXTEEN(n), SIXTEEN(n + 16), SIXTEEN(n + 32), SIXTEEN(n + 48)
 
-static const uint32_t table[256] HAL_TABLE = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_FOUR(128), SIXTY_FOUR(192)};
-
-uint32_t crc_byte(uint32_t crc, uint8_t byte) {
-    return HAL_READ32(&table[(uint8_t)crc ^ byte]) ^ (crc >> 8);
-}
+const uint32_t crc_table[256] HAL_TABLE = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_FOUR(128), SIXTY_FOUR(192)};
 
 uint32_t crc_block(const void *data, uint16_t length) {
     const uint8_t *byte = data;

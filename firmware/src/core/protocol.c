@@ -18,7 +18,7 @@ enum { SILENCE_MS = 500 };
 enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32, CUT = 64 };  // flags
 
 struct session session;
-volatile bool hal_spilled;
+volatile uint8_t hal_spilled;
 
 static uint32_t nonce;
 static bool greeted;  // `nonce` is of a HELLO
@@ -26,10 +26,7 @@ static uint8_t cause;
 static uint8_t told_free;  // credit that the host knows of
 
 // Ends the session (the first cause stays) and brings the board to rest.
-static void end(enum error error, uint8_t detail) {
-    if (!error) {
-        return;
-    }
+APART static void fail(enum error error, uint8_t detail) {
     if (!session.error) {
         session.error = error;
         session.detail = detail;
@@ -42,6 +39,12 @@ static void end(enum error error, uint8_t detail) {
     } else if (motion.state == HOMING || motion.state == JOGGING) {
         motion.state = HOLDING;
         cruise.target = 0;
+    }
+}
+
+static inline void end(enum error error, uint8_t detail) {
+    if (error) {
+        fail(error, detail);
     }
 }
 
@@ -118,6 +121,11 @@ APART static void send_status(uint8_t tag, uint8_t page) {
     link_send(reply, 18 + 4 * AXES);
 }
 
+// Whether an answer fits the line out: until then a frame waits, so that every one is answered.
+static bool answer_fits(void) {
+    return hal_send_room() >= LARGEST_REPLY;
+}
+
 // ---- frames in sequence
 
 static void in_sequence(const uint8_t *p, uint8_t length) {
@@ -164,9 +172,10 @@ static void frame_received(const uint8_t *payload, uint8_t length) {
     }
 }
 
-APART void protocol_byte(uint8_t byte) {
-    const uint8_t length = link_byte(byte);
-    if (length) {
+APART void protocol_frame(void) {
+    const uint8_t length = link_length;
+    if (length && answer_fits()) {
+        link_length = 0;
         frame_received(link_frame(), length);
     }
 }
@@ -191,7 +200,7 @@ APART void protocol_millisecond(void) {
 
 // Bytes were lost because more of them waited than the host may send: it hears of it at once, and goes back.
 static void watch_line(void) {
-    if (!hal_spilled) {
+    if (!hal_spilled || !answer_fits()) {
         return;
     }
     hal_spilled = false;
@@ -205,7 +214,7 @@ static void watch_line(void) {
 APART void protocol_poll(void) {
     watch_line();
     end(motion_poll(), 0);
-    if (motion.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4) {
+    if (motion.state == MOVING && (uint8_t)(motion_free() - told_free) >= QUEUE_SLOTS / 4 && answer_fits()) {
         send_ack(CREDIT);
     }
     if (motion.state == HOMING) {

@@ -1,6 +1,9 @@
 // The frames' meaning: sessions, sequence, and what each of them does (PROTOCOL.md).
 #pragma once
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "../board.h"
 
 #define PROTOCOL_VERSION 2
 #define FIRMWARE_MAJOR 2
@@ -16,7 +19,9 @@ struct session {
 };
 extern struct session session;
 
+enum { LARGEST_REPLY = 18 + 4 * AXES + 6 > 41 ? 18 + 4 * AXES + 6 : 41 };  // STATUS or INFO on the line
+
 void protocol_start(uint8_t cause);  // MCUSR of the reset, 0: hidden
-void protocol_byte(uint8_t byte);    // from the line
+void protocol_frame(void);           // does what link_bytes() has found to be whole, once there is room for its answer
 void protocol_poll(void);            // as often as possible
 void protocol_millisecond(void);

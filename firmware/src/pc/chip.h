@@ -10,8 +10,4 @@
 #define HAL_NOINIT
 #define HAL_TABLE
 #define HAL_READ32(p) (*(p))
-#ifdef RECEIVE
 #define HAL_RECEIVE RECEIVE
-#else
-#define HAL_RECEIVE 127
-#endif

@@ -2,6 +2,7 @@
 #ifdef __arm__
 #include "../chip.h"
 #include "../core/hal.h"
+#include "../core/link.h"
 #include "../core/protocol.h"
 #include "pico.h"
 
@@ -37,8 +38,9 @@ __attribute__((noinline)) int main(void) {  // not into start(), which stays in 
         awake = false;
         watchdog_feed();
         const uint8_t count = serial_get(&bytes);
-        for (uint8_t n = 0; n < count; n++) {
-            protocol_byte(bytes[n]);
+        for (uint8_t n = 0; n < count;) {
+            n += link_bytes(bytes + n, count - n);
+            protocol_frame();
         }
         milliseconds();
         protocol_poll();

@@ -1,6 +1,7 @@
 // The serial line: UART 0 on GP0 and GP1, or the USB. Both listen; answers go where the last byte came from.
 #ifdef __arm__
 #include "../core/hal.h"
+#include "../core/protocol.h"
 #include "pico.h"
 
 #ifndef BAUD
@@ -43,8 +44,22 @@ static void speak(bool usb) {
     }
 }
 
+static uint16_t send_room(void) {
+    return SENDING_MASK - ((sending_head - sending_tail) & SENDING_MASK);
+}
+
+// Bytes of the line that answers go to wait until there is room for the answers to all of them.
+static bool must_wait(bool usb) {
+    enum { SHORTEST = 8, ANSWERS = AT_ONCE / SHORTEST * LARGEST_REPLY };
+    _Static_assert((int)ANSWERS < (int)SENDING, "there is room for them");
+    return by_usb == usb && send_room() < ANSWERS;
+}
+
 uint8_t serial_get(const uint8_t **bytes) {
     const uint16_t tail = received_tail, head = received_head;
+    if (must_wait(tail == head)) {
+        return 0;
+    }
     if (tail == head) {
         const uint8_t count = usb_get(bytes);
         if (count) {
@@ -65,7 +80,7 @@ uint8_t serial_get(const uint8_t **bytes) {
 }
 
 uint8_t hal_send_room(void) {
-    const uint16_t room = SENDING_MASK - ((sending_head - sending_tail) & SENDING_MASK);
+    const uint16_t room = send_room();
     return room < 255 ? room : 255;
 }
 

@@ -14,7 +14,7 @@ from armkin.board.firmware import protocol, reply_checks
 from armkin.board.firmware.protocol import Ack, Error, Info, Status
 from armkin.board.firmware.serial_line import Line
 
-_RESEND = 0.03  # [s] without progress
+_RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
 _GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 16  # frames
@@ -80,7 +80,7 @@ class Window:
         """Send new frames as far as credit and window allow, and all of them again when nothing has come for long."""
         begun = self._line.port.now()
         self._fill()
-        patience = _EAGER if self._line.noisy else _GAP if self._gap else _RESEND
+        patience = _EAGER if self._line.noisy else self._line.slowest + (_GAP if self._gap else _RESEND)
         if self._sent and begun - self._line.clear > patience:
             self._again()
 

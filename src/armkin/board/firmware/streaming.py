@@ -22,15 +22,19 @@ if TYPE_CHECKING:
     from armkin.board.firmware.session import Session
     from armkin.board.firmware.trajectory_to_counts import Cut
 
-# [s] that the arm stands while the queue begins to fill: what the frames of a ramp's first 10 ms take, and 4.5 times
-# the slowest answer, in which all of a queue is sent, two frames at a time; at most; on a bad line.
-_LEAD, _LEAD_ANSWERS, _LEAD_MOST, _LEAD_BAD = 0.003, 4.5, 0.6, 0.51
+# [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
+_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.51
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
-_BEGUN = 0.1  # [s] after its pause, until which a motion that has made no step may begin again
-_FULL = 12  # segments of room: a frame of 6 would wait for as many, and leave the queue short of a ramp's end
+_TWICE = 1 + 33 / 32  # [s] of motion that each second since rest wants in the queue
+_FIRST = 0.01  # [s] of a motion in its first frame, at least
+_SEEN = 24  # segments of a beginning, whose way to the board is reckoned
+_STARTING = (2, 3, 4)  # segments of its first frames: a short one is there soon
+_BUSY = 0.0005  # [s] that a board is busy with a segment
+_ACK = 16  # [bytes] of an answer
+_BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made no step may begin again
 
 
 def carry_out(
@@ -65,11 +69,11 @@ def carry_out(
         done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
         progress(done, total)
 
-    since, pause = session.port.now(), lead(session)
+    since = session.port.now()
     try:
         return stream(session, frames(source, 0.0), tell), end
     except DeviceError as error:
-        if error.error != Error.DRY or session.port.now() - since > pause + _BEGUN or len(first) != 1:
+        if error.error != Error.DRY or session.port.now() - since > _LEAD_MOST + _BEGUN or len(first) != 1:
             raise
         status = session.rest()
         if any(status.counts[axis] != count for axis, count in zip(axes, first[0].start.tolist(), strict=True)):
@@ -138,12 +142,36 @@ def _others_running() -> int:
         return 0
 
 
-def lead(session: Session, least: float = 0.0) -> float:
-    """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry."""
+def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0) -> float:
+    """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry.
+
+    frames: the first of the motion: seconds, segments and bytes on the line of each.
+    """
     if session.line.damaged:
         return _LEAD_BAD
     busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
-    return max(least, busy, min(_LEAD + _LEAD_ANSWERS * session.line.slowest, _LEAD_MOST))
+    return max(least, busy, min(_LEAD + _behind(session, frames), _LEAD_MOST))
+
+
+def _behind(session: Session, frames: Sequence[tuple[float, int, int]]) -> float:
+    """Seconds by which a frame would come too late, at most, if the motion began with the first.
+
+    Two frames are on their way at a time; the board's queue holds the time to a stop at any moment (section 7), which
+    from rest is at most the time since then.
+    """
+    bit = 10 / session.port.baud
+    free = behind = 0.0  # free: when the line is
+    there: list[float] = []  # when the board has them
+    done = 0.0  # [s] of motion in all before a frame
+    for k, (seconds, segments, size) in enumerate(frames):
+        may = there[k - 2] + session.line.slowest + _ACK * bit if k > 1 else 0.0
+        free = max(free, may) + size * bit
+        there.append(max(free, there[-1] if there else 0.0) + segments * _BUSY)
+        if k:
+            spare = done - _SPARE
+            behind = max(behind, there[k] - there[0] - (spare / _TWICE if spare > 0 else spare))
+        done += seconds
+    return behind
 
 
 def _left(session: Session) -> float:
@@ -164,22 +192,20 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     room = min(session.info.frame - 4, session.info.receive - QUESTION - 6)
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
-    todo: list[Segment] = []
-    pause = lead(session, least)
-    stands = line.damaged or _left(session) < pause
-    if move.segments and stands:
-        todo.append(Segment(math.ceil(pause * clock / _TICK), _TICK, 0, (0,) * len(moving)))
-    begins = not stands  # behind a rest, which may wait for room
-    while todo := todo + list(islice(source, _BATCH[1] + 1 - len(todo))):
-        full = session.pending[1] < _FULL and not begins
-        most = _BATCH[0] if stands or line.noisy or full else _BATCH[1]
-        n, begins, stands = 1, False, False
-        while (
-            n < min(most, len(todo))
-            and todo[n].narrow == todo[0].narrow
-            and motion_size(len(moving), todo[: n + 1]) <= room
-        ):
-            n += 1
+    todo: list[Segment] = list(islice(source, _SEEN))
+    sizes = [_BATCH[0]] if line.noisy else list(_STARTING)  # of the first frames of a motion from rest
+    pause = lead(session, _first_frames(todo, sizes, room, clock), least)
+    begins = not line.damaged and _left(session) >= pause  # behind a rest, which may wait for room
+    if todo and not begins:
+        pause = max(pause, _FIRST - _seconds(todo[: sizes[0] - 1], clock))
+        todo.insert(0, Segment(math.ceil(pause * clock / _TICK), _TICK, 0, (0,) * len(moving)))
+    else:
+        sizes = []
+    while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
+        fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
+        most = sizes.pop(0) if sizes else _BATCH[0] if line.noisy else min(fits, _BATCH[1])
+        begins = False
+        n = _fit(todo, most, room)
         part, todo = todo[:n], todo[n:]
         if not todo:
             todo = list(islice(source, 1))
@@ -187,3 +213,32 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         end = [p // protocol.STEP for p in places]
         yield Batch([axes[k] for k in moving], at, end, part, not todo, clock, move.brake)
         at = end
+
+
+def _seconds(segments: Sequence[Segment], clock: int) -> float:
+    return sum(s.units() for s in segments) * 256 / clock
+
+
+def _fit(todo: Sequence[Segment], most: int, room: int) -> int:
+    """How many of these segments go into the next frame: `most`, `room` bytes, and of one form behind a pause."""
+    n = 1
+    while (
+        n < min(most, len(todo))
+        and (todo[n].narrow == todo[0].narrow or not any(todo[0].rates))
+        and motion_size(len(todo[0].rates), todo[: n + 1]) <= room
+    ):
+        n += 1
+    return n
+
+
+def _first_frames(todo: Sequence[Segment], sizes: Sequence[int], room: int, clock: int) -> list[tuple[float, int, int]]:
+    """The first frames of a motion from rest, behind a pause: seconds, segments and bytes of each."""
+    frames, at = list[tuple[float, int, int]](), 0
+    while at < len(todo):
+        most = sizes[len(frames)] if len(frames) < len(sizes) else _BATCH[1]
+        n = max(1, _fit(todo[at:], most - (at == 0), room))
+        part = todo[at : at + n]
+        size = motion_size(len(part[0].rates), part) + 6 + (at == 0) * 17
+        frames.append((_seconds(part, clock), n + (at == 0), size))
+        at += n
+    return frames
