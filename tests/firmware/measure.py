@@ -243,10 +243,10 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             host.hello(1000 * (seed + 1) + sessions)
             left = (end[0] - at[0]) // share[0]
             work = [whole(12, 16_000, 0, share)] * left
-            # what a hold in mid-segment left over of the one step ratio
+            # first what a hold in mid-segment, and the rounding of rates, left over of the one step ratio
             rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
             if any(rest):
-                work.append(whole(20, 16_000, 0, rest))
+                work.insert(0, whole(20, 16_000, 0, rest))
             status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
             at = (status.counts[0], status.counts[1], status.counts[2])
         emulated.control("restore")
