@@ -222,8 +222,9 @@ def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
         lose = 0
 
         def _say(self, text: str) -> None:
-            self.lose -= text == "ok"
-            if text != "ok" or self.lose != 0:
+            if text == "ok" and self.lose and self._blocks:
+                self.lose -= 1
+            else:
                 super()._say(text)
 
     port = Deaf(axes=4, settings=FITS)

@@ -82,7 +82,9 @@ def test_a_reset_in_motion_is_an_alarm() -> None:
         session.ask("G53G1X0F100")
 
 
-@pytest.mark.parametrize(("line", "number"), [("$77=1", 3), ("G53G1X1", 22), ("G53G1X1..2F5", 2), ("$H", 5)])
+@pytest.mark.parametrize(
+    ("line", "number"), [("$77=1", 3), ("G53G1X1", 22), ("G53G1X1..2F5", 1), ("G53G1XF5", 2), ("$H", 5)]
+)
 def test_what_grbl_refuses_is_told_with_its_line(line: str, number: int) -> None:
     with pytest.raises(GrblError, match=rf"GRBL refused '{line.replace('$', '.')}'.*error {number}\)"):
         opened(Grbl()).ask(line)

@@ -7,10 +7,8 @@ the robot file's digest, the counts where it began, a digest of the plan; and wh
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from types import TracebackType
@@ -22,7 +20,7 @@ from armkin.board.backend import StoppedError
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import STEP
 from armkin.board.firmware.trajectory_to_counts import Cut
-from armkin.board.ports import note_path
+from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
 from armkin.motion.remainder import remainder
 from armkin.motion.trajectory import Trajectory
@@ -83,7 +81,7 @@ class Trip:
 
     def __enter__(self) -> Self:
         if self._kept:
-            _write(self._file, self._note)
+            write_note(self._file, asdict(self._note))
         return self
 
     def progress(self, seconds: float) -> None:
@@ -92,7 +90,7 @@ class Trip:
         if done - self._note.seconds >= _NOTED:
             self._note = replace(self._note, seconds=done)
             if self._kept:
-                _write(self._file, self._note)
+                write_note(self._file, asdict(self._note))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         if not self._kept:
@@ -101,10 +99,9 @@ class Trip:
             self._machine.status = error.status
         known = self._machine.position() != "lost"
         if kind is None or not known:
-            with suppress(OSError):
-                os.unlink(self._file)
+            remove_note(self._file)
         elif isinstance(error, HeldError | StoppedError):
-            _write(self._file, replace(self._note, stands=list(self._machine.counts())))
+            write_note(self._file, asdict(replace(self._note, stands=list(self._machine.counts()))))
             self._machine.resumable = True
             if isinstance(error, HeldError):
                 error.fields["resumable"] = True
@@ -215,30 +212,16 @@ def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
     return t
 
 
-def _write(path: str, note: Note) -> None:
-    """Replace the note as a whole; a full disk costs the note, not the motion."""
-    new = f"{path}.{os.getpid()}"
-    with suppress(OSError):
-        with suppress(FileNotFoundError):
-            os.unlink(new)
-        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(handle, "w", encoding="ascii") as file:
-            json.dump(asdict(note), file)
-        os.replace(new, path)  # a link of that name is replaced, not followed
-
-
 def _read(path: str) -> Note | None:
     """The note, if there is one that this user wrote."""
+    told = read_note(path, _MOST)
+    if told is None:
+        return None
     try:
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
-        with os.fdopen(handle, encoding="ascii") as file:
-            if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
-                return None
-            told = json.loads(file.read(_MOST))
         start, stands = told["start"], told["stands"]
         counts = [start] if stands is None else [start, stands]
         if not all(type(x) is int for row in counts for x in row) or len(counts[-1]) != len(start):
             return None
         return Note(str(told["robot"]), str(told["plan"]), start, float(told["seconds"]), stands)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         return None

@@ -190,7 +190,8 @@ def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
     from armkin.motors import motor_names, pulse_units
 
     if found["joints"] is None:
-        return f"{arm.name}: its position is lost\n"
+        why = found.get("lost_because")
+        return f"{arm.name}: its position is lost{f' ({why})' if why else ''}\n"
     rows = [["", *render.joint_headings(arm)], ["joints", *map(render.fixed, found["joints"])]]
     head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
     pulses = [["", *head], ["pulses", *map(str, found["pulses"])]]

@@ -2,6 +2,7 @@
 
 starting.py  where a motion begins: what every trajectory that becomes counts is held to
 job.py       a trajectory for a board that is sent positions, not segments
+record.py    what armkin last left on a board that other programs write to
 
 A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
 becomes bytes is its own business.

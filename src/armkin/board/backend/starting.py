@@ -87,12 +87,19 @@ def beyond(arm: Arm, q: Array) -> Array:
 
 def is_believable(arm: Arm, counts: Sequence[int]) -> bool:
     """Whether an arm may stand at counts: no joint more than a turn (a slide: its travel) outside its limits."""
+    return unbelievable(arm, counts) is None
+
+
+def unbelievable(arm: Arm, counts: Sequence[int]) -> str | None:
+    """Why an arm cannot stand at counts, in words; None: it can."""
     try:
         q = joints(arm, counts)
-    except UsageError:  # motors of one joint contradict each other
-        return False
+    except UsageError as error:  # motors of one joint contradict each other
+        return error.message
     most = np.where(arm.prismatic, arm.upper - arm.lower, _TURN)
-    return bool((np.abs(q - np.clip(q, arm.lower, arm.upper)) <= most + SLACK).all())
+    for k in np.flatnonzero(np.abs(q - np.clip(q, arm.lower, arm.upper)) > most + SLACK):
+        return f"{said(arm, int(k), float(q[k]))} by more than {'its travel' if arm.prismatic[k] else 'a whole turn'}"
+    return None
 
 
 def from_counts(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from armkin.motion.trajectory import Stretch, Trajectory
 
 PIECE = 0.04  # [s] of a curved stretch in one line: 25 lines a second
+HEAD = "G21G94"  # in every line: another program may have left, or set between two, inches or inverse time
 SLOWEST = 0.01  # [units/min] of a feed: GRBL refuses 0
 
 
@@ -42,7 +43,7 @@ def lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator
                     for axis, value, moves in zip(axes, (goal + offset) / steps, goal != at, strict=True)
                     if moves
                 )
-                yield f"G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
+                yield f"{HEAD}G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
             else:
                 idle += t - before
             at, before = goal, t

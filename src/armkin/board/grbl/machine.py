@@ -1,12 +1,9 @@
-"""An arm on a GRBL board.
-
-GRBL counts steps from its last reset. Where the arm stands is kept in its volatile offset G92, shifted by `MARK`:
-a reset clears it, and a position that was lost is never taken for zero.
-"""
+"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by place.py."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +12,10 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, JobMachine
-from armkin.board.backend.starting import from_counts, is_believable
+from armkin.board.backend.starting import from_counts
 from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.place import Place
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
 from armkin.board.grbl.watch import Watch
@@ -26,15 +24,12 @@ from armkin.model.units import joints_out
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
-    from armkin.board.grbl.replies import Report
-    from armkin.board.grbl.settings import Axis
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
     from armkin.robot_file.model import Gripper
 
-MARK = 1000.0  # [units] added to G92: an offset of 0 means that nobody has said where the arm stands
 _REST = 30.0  # [s] that a hold may take
 _FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second
 
@@ -53,7 +48,7 @@ class GrblMachine(JobMachine):
         self.axes = axes_of(arm)
         self.session = Session(port)
         self.session.open()
-        self._offset: np.ndarray[Any, np.dtype[np.int64]] | None = None  # machine steps less counts
+        self._place = Place(self.session, arm, self.axes)
         self.settings, self.told = self.session.settings(), port.now()  # when they were read
         self._spindle = Spindle(self.session)
         self._read()
@@ -61,18 +56,22 @@ class GrblMachine(JobMachine):
     # Where it stands
 
     def position(self) -> Position:
-        """Known since somebody said it or the arm was homed, until a reset or an alarm."""
-        return "known" if self._offset is not None and is_believable(self.arm, self.counts()) else "lost"
+        """Known while all that GRBL keeps is what armkin left there."""
+        return "lost" if self._place.why else "known"
+
+    @property
+    def why(self) -> str:
+        """Why the position is lost, in words; empty while it is known."""
+        return self._place.why
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
-        offset = np.zeros(len(self.axes), dtype=np.int64) if self._offset is None else self._offset
-        return tuple(int(steps) for steps in _steps(self.session.report, self.axes) - offset)
+        return self._place.counts()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
-        if self._offset is None:
-            return "the arm's position is lost: home it, or put it in its home pose and say so"
+        if self.why:
+            return f"the arm's position is lost ({self.why}): home it, or put it in its home pose and say so"
         where = _listed(self.arm, joints_out(self.arm, self.joints()).tolist())
         return f"the arm stands at {where}, its position is known: the next command starts there"
 
@@ -84,13 +83,14 @@ class GrblMachine(JobMachine):
             "state": status.state.lower(),
             "inputs": status.pins,
             "settings": [str(difference) for difference in self.wrong()],
+            "lost_because": self.why or None,
         }
 
     # Getting ready
 
     def wrong(self) -> list[settings.Difference]:
         """Settings that are not as the robot file wants them."""
-        return settings.differences(self.axes, self.settings)
+        return settings.differences(self.axes, self.settings, hal=self.session.hal)
 
     def setup(self) -> list[settings.Difference]:
         """Write the settings that differ, read them back, and return what was written.
@@ -99,10 +99,12 @@ class GrblMachine(JobMachine):
         """
         before = self.wrong()
         for difference in before:
-            self.session.ask(f"${difference.number}={difference.wanted:.3f}")
+            self.session.ask(difference.line())
         self.settings = self.session.settings()
         if before:
-            self._forget()
+            self._place.forget("its settings were written")
+            with suppress(LinkError):  # in an alarm, or gone: forgotten all the same
+                self._reset()
         left = self.wrong()
         if left:
             raise LinkError(f"GRBL did not keep what was written: {left[0]}")
@@ -110,23 +112,24 @@ class GrblMachine(JobMachine):
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
-        state = self.session.status().state
+        report = self.session.status()
+        self.session.demand_rest(report)
         serious = _serious(self)
         if serious:
             more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
             raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
-        if state not in ("Idle", "Jog"):
-            raise LinkError(f"GRBL is in state {state}, not Idle: home it, or unlock it once you know why")
+        if report.state != "Idle":
+            raise LinkError(f"GRBL is in state {report.state}, not Idle: home it, or unlock it once you know why")
         self.session.was_reset = False  # what a reset has taken from it is read now
         self._read()
-        if assume is not None and self._offset is not None:
+        if assume is not None and not self.why:
             joints = joints_out(self.arm, self.joints()).tolist()
             raise PositionKnownError(f"the position is known ({_listed(self.arm, joints)})", joints=joints)
-        if self._offset is not None:
+        if not self.why:
             return False
         if assume is None and not self.port.simulated:
             raise PositionLostError(
-                "the arm's position is lost",
+                f"the arm's position is lost: {self.why}",
                 robot_file=self.arm.path,
                 port=self.port.name,
                 homing=all(self.arm.homing),
@@ -136,11 +139,7 @@ class GrblMachine(JobMachine):
 
     def vouch(self, counts: Any) -> None:
         """Take somebody's word that the motors stand at these counts."""
-        self._offset = _steps(self.session.report, self.axes) - np.asarray(counts, dtype=np.int64)
-        words = "".join(
-            f"{axis.letter}{count / axis.steps - MARK:.5f}" for axis, count in zip(self.axes, counts, strict=True)
-        )
-        self.session.ask(f"G92{words}")
+        self._place.vouch(np.asarray(counts, dtype=np.int64))
 
     # Moving
 
@@ -151,17 +150,19 @@ class GrblMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
         total = done = 0.0
+        seen = False  # where the arm stands was read just now
         for job in from_counts(plans, self.counts):
             if job is None:
                 if self._stop():
                     self.hold()
                     raise StoppedError
                 self.port.read(0.01)
+                seen = False
                 continue
-            assert self._offset is not None
+            self._begin(job, seen=seen)
             total += job.duration
             began = self.port.now()
-            watch = Watch(job, self.axes, self._offset)
+            watch = Watch(job, self.axes, self._place.offset)
 
             def tick(done: float = done, total: float = total, began: float = began, watch: Watch = watch) -> bool:
                 progress(min(done + self.port.now() - began, total), total)
@@ -170,15 +171,28 @@ class GrblMachine(JobMachine):
 
             try:
                 # the dwell is answered when all before it has been carried out
-                whole = self.session.stream(chain(gcode.lines(job, self.axes, self._offset), ["G4P0.01"]), tick)
+                whole = self.session.stream(chain(gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick)
             except LinkError as error:
                 raise self._explain(error) from None
             if not whole:
                 self.hold()
                 raise StoppedError
             self._compare(job)
-            done = total
+            done, seen = total, True
             progress(done, total)
+
+    def _begin(self, job: Job, *, seen: bool) -> None:
+        """Make sure that the arm stands where a job starts, at its own feed; record the motion."""
+        if not seen:
+            self.session.realtime(replies.PLAIN_FEED)
+            self._read()
+        if self.why:
+            raise LinkError(self.standing())
+        if self.counts() != tuple(job.start.tolist()):
+            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
+        if self.session.feed != 100:
+            raise LinkError(f"GRBL overrides feeds by {self.session.feed} %, and does not take that back")
+        self._place.record.moves(job, gcode.PIECE)
 
     def hold(self) -> None:
         """Stop along the path and clear what is queued; the position stays known."""
@@ -190,12 +204,10 @@ class GrblMachine(JobMachine):
             if self.port.now() > end:
                 raise LinkError(f"GRBL does not come to rest: it says {status.state}; cut the motors' power")
             self.port.read(0.02)
-        status = self.session.sure_status()
-        counts = None if self._offset is None or status.state == "Alarm" else self.counts()
+        alarm = self.session.sure_status().state == "Alarm"
+        counts = self.counts()
         self._reset()
-        self._read()
-        if counts is not None:
-            self.vouch(counts)  # the reset has cleared it, at a standstill
+        self._place.after_reset(counts, "GRBL is in an alarm" if alarm else self.why)
 
     def grip(self, gripper: Gripper, value: float) -> float:
         """Set the M3 output that the gripper hangs on, and return the S word: GRBL measures nothing."""
@@ -209,12 +221,16 @@ class GrblMachine(JobMachine):
         self._spindle.again()
 
     def _compare(self, job: Job) -> None:
+        """Make sure that a job has ended where it should, and record that. Raises LinkError."""
+        if self.session.status().state in ("Run", "Jog"):
+            raise self._explain(LinkError("the arm moves on after its plan: another program drives it"))
         self._read()
-        if self._offset is None or self.counts() != tuple(job.end.tolist()):
+        if self.why or self.counts() != tuple(job.end.tolist()):
             raise LinkError(
                 f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}: a line was "
-                f"damaged on its way\n{self.standing()}"
+                f"damaged on its way, or another program has moved the arm\n{self.standing()}"
             )
+        self._place.arrived()
 
     def _explain(self, error: LinkError) -> LinkError:
         if not isinstance(error, GrblError) or error.error:  # what is queued must not go on by itself
@@ -224,7 +240,7 @@ class GrblMachine(JobMachine):
                 return error
             return LinkError(f"{error}; the arm was stopped\n{self.standing()}")
         if error.alarm == 0 or error.alarm in replies.LOSES_POSITION:
-            self._forget()
+            self._place.forget(str(error))
         return LinkError(f"{error}\n{self.standing()}")
 
     def home(self, at: Sequence[float]) -> None:
@@ -235,38 +251,17 @@ class GrblMachine(JobMachine):
         wrong = [one for one in self.wrong() if one.number in settings.HOMING and one.found is not None]
         if wrong:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
+        self._place.forget("its homing was interrupted")
         try:
             self.session.ask("$H", patience=180.0)
         except GrblError as error:
             raise self._explain(error) from None
         pull = self.settings.get(27, 0.0)
         away = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
-        self.vouch(np.rint(np.asarray(at) - away).astype(np.int64))
-        self._read()
-
-    # What GRBL says
+        self.vouch(np.rint(np.asarray(at) - away))
 
     def _read(self) -> None:
-        """Read position and offset: what stands in G92 since the last reset tells where the arm stands."""
-        status = self.session.sure_status()
-        if status.position is None:
-            raise LinkError("GRBL reports no machine position: armkin setup writes $10, which asks for it")
-        if max(axis.index for axis in self.axes) >= len(status.position):
-            raise LinkError(f"GRBL has {len(status.position)} axes; {self.arm.name} needs {self.axes[-1].letter}, too")
-        found = self.session.offsets()
-        g92, g54 = found.get("G92", ()), found.get("G54", ())
-        if status.state == "Alarm" or not g92 or all(g92[axis.index] == 0.0 for axis in self.axes):
-            self._offset = None
-            return
-        shift = [(g92[axis.index] + (g54[axis.index] if g54 else 0.0) - MARK) * axis.steps for axis in self.axes]
-        self._offset = np.rint(shift).astype(np.int64)
-
-    def _forget(self) -> None:
-        self._offset = None
-        try:
-            self._reset()
-        except LinkError:
-            return  # in an alarm, or gone: forgotten all the same
+        self._place.read()
 
 
 def _serious(machine: GrblMachine) -> list[settings.Difference]:
@@ -280,13 +275,6 @@ def _serious(machine: GrblMachine) -> list[settings.Difference]:
         if not any(difference.serious for difference in machine.wrong()):
             break
     return [difference for difference in machine.wrong() if difference.serious]
-
-
-def _steps(report: Report | None, axes: Sequence[Axis]) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """GRBL's machine position in steps, as it was reported."""
-    assert report is not None
-    assert report.position is not None
-    return np.rint([report.position[axis.index] * axis.steps for axis in axes]).astype(np.int64)
 
 
 def _listed(arm: Arm, joints: list[float]) -> str:

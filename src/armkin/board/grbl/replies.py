@@ -7,9 +7,10 @@ settings.md and the CSV tables of alarms and errors). grblHAL and FluidNC speak 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 STATUS, HOLD, RESUME, RESET, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x85"  # commands that pass every queue
+PLAIN_FEED = b"\x90"  # feeds as the lines say them, no override
 LETTERS = "XYZABC"
 RX_BUFFER = 128  # [bytes] of GRBL on an Uno; one stays free
 
@@ -36,6 +37,7 @@ ERRORS = {
     22: "no feed rate",
     24: "two commands want the axis words",
     33: "the target is invalid",
+    52: "the value is out of range, or no whole number",
 }
 LOSES_POSITION = {1, 3, 6, 7, 8, 9}  # alarms after which counted steps mean nothing
 
@@ -51,6 +53,9 @@ class Report:
     position: tuple[float, ...] | None  # machine position
     free: tuple[int, int] | None  # planner blocks and receive bytes
     pins: str  # inputs that are active: limits X Y Z A B C, probe P, door D, hold H, reset R, start S
+    feed: int | None = field(
+        default=None, compare=False
+    )  # [%] that feeds are overridden by, which one report in some tells
 
 
 def report(line: str) -> Report | None:
@@ -68,7 +73,8 @@ def report(line: str) -> Report | None:
         position = _values(found["MPos"]) if "MPos" in found else None
         free = [int(value) for value in _values(found["Bf"])] if "Bf" in found else None
         room = (free[0], free[1]) if free else None
-        return Report(state, int(_value(detail or "0")), position, room, found.get("Pn", ""))
+        feed = int(_values(found["Ov"])[0]) if "Ov" in found else None
+        return Report(state, int(_value(detail or "0")), position, room, found.get("Pn", ""), feed)
     except (ValueError, IndexError):
         return None
 
@@ -89,7 +95,7 @@ def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
     >>> offset("[G92:1000.000,0.000,0.000]")
     ('G92', (1000.0, 0.0, 0.0))
     """
-    match = re.fullmatch(r"\[(G5[4-9]|G28|G30|G92):([-\d.,]+)\]", line)
+    match = re.fullmatch(r"\[(G5[4-9]|G92|TLO):([-\d.,]+)(?::[-\d.]+)?\]", line)
     if match is None:
         return None
     try:
@@ -98,13 +104,22 @@ def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
         return None
 
 
+def modes(line: str) -> list[str]:
+    """The words of the answer to ``$G``; none in other lines.
+
+    >>> modes("[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]")[1]
+    'G54'
+    """
+    return line[4:-1].split() if line.startswith("[GC:") and line.endswith("]") else []
+
+
 def spindle(line: str) -> float | None:
     """The S word in force, of the answer to ``$G``; None while the spindle is off or in other lines.
 
     >>> spindle("[GC:G0 G54 G17 G21 G90 G94 M3 M9 T0 F0 S120]")
     120.0
     """
-    words = line[4:-1].split() if line.startswith("[GC:") and line.endswith("]") else []
+    words = modes(line)
     speeds = [word[1:] for word in words if re.fullmatch(f"S{_NUMBER}", word)]
     return float(speeds[0]) if "M3" in words and speeds else None
 

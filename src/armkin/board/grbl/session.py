@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
-from contextlib import suppress
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from armkin.board.grbl import replies
 from armkin.board.grbl.replies import Report
@@ -25,7 +24,10 @@ _ANSWER = 2.0  # [s] a line may take that moves nothing
 _POLL = 0.1  # [s] between status requests in motion
 _SILENCE = 2.0  # [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
 _HELD = 15.0  # [s] the same while it holds: somebody may have pressed its button, or a byte was damaged into a hold
-_SHORT = 0.25  # [s] that an empty line may take
+_NONSENSE = ")&"  # no line, whatever it is the end of
+_KEPT = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
+_READINGS = 13  # of an answer, until three in a row agree
+_UNCLEAR = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
 _REPORT = 0.5  # [s] a status report may take
 _LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
 
@@ -46,40 +48,77 @@ class Session:
 
     def __init__(self, port: Port) -> None:
         self.port = port
-        self.version = ""
+        self.version, self.hal = "", False  # hal: it is grblHAL
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
         self._unseen: Report | None = None
+        self.feed = 100  # [%] of feeds, as last told
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
         self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
         self._other: list[str] = []  # what came between: settings, offsets, messages
 
     def open(self) -> None:
-        """Wait until GRBL answers a status request. Raises LinkError if it does not."""
-        end = self.port.now() + _BOOT
-        while self.port.now() < end:
-            self.port.write(replies.STATUS)
-            if self._wait(lambda: self.report is not None, 0.25):
-                break
-        else:
-            raise LinkError(
-                f"{self.port.name} does not answer as GRBL does: is it the right port, and its rate {self.port.baud}?"
-            )
+        """Wait until GRBL answers a status request. Raises LinkError if it does not, or does not stand still."""
+        self.demand_rest(self.wake())
         self._end_line()
         for line in self.ask("$I"):
             if match := re.match(r"\[VER:([^:\]]*)", line):
                 self.version = match[1]
             if match := re.match(r"\[OPT:[^,\]]*,(\d+),(\d+)", line):
                 self.buffer = max(32, min(int(match[2]), 4096))
+            self.hal = self.hal or line == "[FIRMWARE:grblHAL]"
         self.was_reset = False
 
+    def wake(self) -> Report:
+        """A first status report. Raises LinkError if none comes."""
+        end = self.port.now() + _BOOT
+        while self.port.now() < end:
+            self.port.write(replies.STATUS)
+            if self._wait(lambda: self.report is not None, 0.25):
+                assert self.report is not None
+                return self.report
+            self.port.write(b")")  # grblHAL hears no `?` in a comment that nobody has ended
+            self._pump(0.01)
+        raise LinkError(
+            f"{self.port.name} does not answer as GRBL does: is it the right port, and its rate {self.port.baud}?"
+        )
+
+    def demand_rest(self, report: Report) -> None:
+        """Raise LinkError unless GRBL stands still and takes lines: a motion that goes on is another program's."""
+        if report.state in ("Run", "Jog", "Home"):
+            raise LinkError(
+                f"GRBL on {self.port.name} moves (state {report.state}): another program drives it, or what is left of "
+                "a command that was killed; wait until it stands"
+            )
+        if report.state not in ("Idle", "Alarm"):
+            raise LinkError(
+                f"GRBL on {self.port.name} is in state {report.state}, not Idle: end that first (~ goes on, a reset "
+                "ends it)"
+            )
+
     def _end_line(self) -> None:
-        """End what another program may have left of a line: GRBL answers it, and an empty line, too."""
-        self._send("")
-        with suppress(GrblError):
-            self._wait(lambda: not self._sent, _SHORT)
-        self._sent.clear()
+        """Make an error of what another program may have left of a line: whatever it was, GRBL then does not obey it.
+
+        `)` ends a comment, `&` begins no word. A comment from `;` on ends with the line alone, which GRBL then obeys.
+        """
+        self.realtime(replies.JOG_CANCEL)  # grblHAL drops an open line
+        self._send(_NONSENSE)
+        try:
+            obeyed = self._wait(lambda: not self._sent, _ANSWER)
+        except GrblError as error:
+            if error.error:
+                return
+            raise
+        if not obeyed:
+            raise LinkError(f"GRBL on {self.port.name} takes no lines: does it dwell for another program?")
+        self.realtime(replies.HOLD)
+        self._wait(lambda: self.status().state not in ("Run", "Jog"), _SILENCE)
+        self.reset()
+        raise LinkError(
+            f"another program had left a line open on {self.port.name}, in a comment, and GRBL obeyed it; it was "
+            "stopped"
+        )
 
     def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
         """Send one line, wait for its ``ok``, and return what came before it."""
@@ -109,14 +148,19 @@ class Session:
         """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
         return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
 
-    def offsets(self) -> dict[str, tuple[float, ...]]:
-        """Work offsets by name (G54, G92, ...), as three whole readings in a row agree on."""
-
-        def read() -> dict[str, tuple[float, ...]]:
-            found = dict(pair for line in self.ask("$#") if (pair := replies.offset(line)) is not None)
-            return found if found.keys() >= {"G54", "G92"} else {}
-
-        return _agreed(read, self.port.name)
+    def kept(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
+        """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
+        seen: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
+        for _ in range(_READINGS):
+            found: dict[str, Any] = dict(pair for line in self.ask("$#") if (pair := replies.offset(line)) is not None)
+            words = [words for line in self.ask("$G") if (words := replies.modes(line))]
+            found |= {"$G": tuple(words[-1])} if words else {}
+            for name, value in found.items():
+                last, count = seen.get(name, (None, 0))
+                seen[name] = value, count + 1 if value == last else 1
+            if all(seen.get(name, (None, 0))[1] >= 3 for name in _KEPT):
+                return {name: seen[name][0] for name in _KEPT[1:]}, seen["$G"][0]
+        raise LinkError(_UNCLEAR.format(port=self.port.name))
 
     def settings(self) -> dict[int, float]:
         """The answer to ``$$``: number -> value."""
@@ -214,23 +258,22 @@ class Session:
             self._sent.clear()
         elif (found := replies.report(line)) is not None:
             self.report = self._unseen = found
+            self.feed = self.feed if found.feed is None else found.feed
             self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself
         elif line:
             self._other.append(line)
             del self._other[:-400]
 
 
-def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool] = lambda found: False) -> T:
+def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool]) -> T:
     """What three readings in a row agree on, or one that is enough. Raises LinkError if none do.
 
     Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.
     """
     last, same = read(), 1
-    for _ in range(12):
+    for _ in range(_READINGS):
         before, last = last, read()
         same = same + 1 if last and last == before else 1
         if same == 3 or (enough(before) and enough(last)):
             return last
-    raise LinkError(
-        f"{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
-    )
+    raise LinkError(_UNCLEAR.format(port=port))

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 from armkin.board.grbl.replies import LETTERS
 
+_WHOLE = (1, 3, 10, 13, 20, 22, 23, 32, 384)  # settings of whole numbers
 HOMING = (22, 23)  # settings that only homing needs
+G92_VOLATILE = 384  # grblHAL: 1 clears G92 when the board loses its power
 COARSE = 500.0  # [steps a unit] beyond which GRBL's three decimals do not tell every step
 
 
@@ -45,9 +47,13 @@ class Difference:
         found = "is not there" if self.found is None else f"is {self.found:g}"
         return f"${self.number} ({self.what}) {found}: the robot file wants ${self.number}={self.wanted:g}"
 
+    def line(self) -> str:
+        """The line that mends it; grblHAL takes no 255.000 where it wants a whole number."""
+        return f"${self.number}={self.wanted:.0f}" if self.number in _WHOLE else f"${self.number}={self.wanted:.3f}"
 
-def wanted(axes: Sequence[Axis]) -> dict[int, tuple[str, float]]:
-    """GRBL's settings for an arm: number -> what it is, value."""
+
+def wanted(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
+    """GRBL's settings for an arm: number -> what it is, value; hal: of grblHAL."""
     found: dict[int, tuple[str, float]] = {
         1: ("keep the motors on at rest", 255),
         3: ("inverted directions", sum(1 << axis.index for axis in axes if axis.invert)),
@@ -59,6 +65,8 @@ def wanted(axes: Sequence[Axis]) -> dict[int, tuple[str, float]]:
     if all(axis.upward is not None for axis in axes):
         found[22] = ("homing", 1)
         found[23] = ("homing downwards", sum(1 << axis.index for axis in axes if not axis.upward))
+    if hal:
+        found[G92_VOLATILE] = ("forget G92 with the power, as GRBL does", 1)
     for axis in axes:
         found[100 + axis.index] = (f"{axis.name}: steps a unit", round(axis.steps, 3))
     for axis in axes:
@@ -68,31 +76,33 @@ def wanted(axes: Sequence[Axis]) -> dict[int, tuple[str, float]]:
     return found
 
 
-def differences(axes: Sequence[Axis], found: Mapping[int, float]) -> list[Difference]:
-    """What is not as the robot file wants it.
+def differences(axes: Sequence[Axis], found: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
+    """What is not as the robot file wants it; hal: of grblHAL.
 
     A greatest speed or acceleration below the robot file's is not serious: GRBL is slower than planned, no more.
     """
     result = []
-    for number, (what, value) in wanted(axes).items():
-        there = found.get(number)
-        if there is not None and _same(number, there, value, axes):
+    for number, (what, value) in wanted(axes, hal=hal or G92_VOLATILE in found).items():
+        there, bits = found.get(number), _bits(number, axes)
+        if there is not None and bits is not None:
+            value = int(there) & ~bits | int(value) & bits  # the other bits are not ours
+        if there is not None and _same(number, there, value):
             continue
         slower = number // 10 in (11, 12) and there is not None and there < value
         result.append(Difference(number, what, there, value, serious=not slower and number not in (1, *HOMING)))
     return result
 
 
-def _same(number: int, found: float, value: float, axes: Sequence[Axis]) -> bool:
-    if number in (3, 23):  # other axes' directions are not ours
-        ours = sum(1 << axis.index for axis in axes)
-        return int(found) & ours == int(value) & ours
-    if number == 22:  # grblHAL keeps more in its other bits
-        return int(found) & 1 == 1
+def _bits(number: int, axes: Sequence[Axis]) -> int | None:
+    """The bits of a setting that are armkin's; None: all of it is, or it has none."""
+    if number in (3, 23):
+        return sum(1 << axis.index for axis in axes)
+    return {10: 3, 22: 1}.get(number)
+
+
+def _same(number: int, found: float, value: float) -> bool:
     if number == 10:
         return int(found) & 1 == 1  # machine position; the buffer is good to know, no more
-    if number == 1:
-        return found == 255
     return math.isclose(found, value, rel_tol=0, abs_tol=0.0006)
 
 

@@ -41,10 +41,15 @@ class Watch:
         self._pause = 0.0  # [s] that the arm may stand there by the plan
 
     def heed(self, report: Report | None, elapsed: float) -> None:
-        """Raise LinkError if a report, where there is one, tells that a line was damaged."""
+        """Raise LinkError if a report, where there is one, tells of a damaged line, or of another program's."""
+        if report is not None and report.feed is not None and report.feed > 100:
+            raise LinkError(f"another program has set feeds to {report.feed} %")
         wrong = None if report is None else self.see(report, elapsed)
         if wrong:
-            raise LinkError(f"the arm is not where its plan is: {wrong}; a line was damaged on its way")
+            raise LinkError(
+                f"the arm is not where its plan is: {wrong}; a line was damaged on its way, or another program has "
+                "sent one"
+            )
 
     def see(self, report: Report, elapsed: float) -> str | None:
         """What is wrong with a report that came so many seconds after the start; None while nothing is."""

@@ -52,7 +52,7 @@ class GrblBoard(Foreign):
 
     def replies(self, link: Port, stop: Callable[[], bool]) -> bool:
         """Whether GRBL answers a question for its status. Raises LinkError if it does not."""
-        Session(link).open()
+        Session(link).wake()
         return True
 
     def home(self, machine: Backend) -> None:

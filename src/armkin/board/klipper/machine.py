@@ -82,7 +82,13 @@ class KlipperMachine(JobMachine):
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
         settings = [str(difference) for difference in self.wrong()]
-        return {"firmware": f"Klipper {self.version}", "state": self.state, "inputs": "", "settings": settings}
+        return {
+            "firmware": f"Klipper {self.version}",
+            "state": self.state,
+            "inputs": "",
+            "settings": settings,
+            "lost_because": None,
+        }
 
     def wrong(self) -> list[Difference]:
         """Options of printer.cfg that are not as the robot file wants them."""

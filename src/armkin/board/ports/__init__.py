@@ -2,12 +2,14 @@
 
 port.py         what every port can do
 port_lock.py    the lock that keeps two programs from one arm
+notes.py        small files beside it
 serial_port.py  serial ports
 socket_port.py  the Unix socket of a program on this computer
 """
 
+from armkin.board.ports.notes import read_note, remove_note, write_note
 from armkin.board.ports.port import BAUD, SIM, Port
-from armkin.board.ports.port_lock import holder, holder_rate, note_path
+from armkin.board.ports.port_lock import holder, holder_rate, note_path, record_path
 from armkin.board.ports.serial_port import Found, SerialPort, list_ports
 from armkin.board.ports.socket_port import SocketPort, is_socket
 
@@ -23,4 +25,8 @@ __all__ = [
     "is_socket",
     "list_ports",
     "note_path",
+    "read_note",
+    "record_path",
+    "remove_note",
+    "write_note",
 ]

@@ -75,6 +75,11 @@ def note_path(name: str) -> str:
     return _path(name, "motion")
 
 
+def record_path(name: str) -> str:
+    """The file beside a port's lock that records what was last left on the board behind it."""
+    return _path(name, "board")
+
+
 def _acquired(name: str) -> BaseFileLock | None:
     """The lock of a port, or None if another has it. (flock on POSIX, msvcrt.locking on Windows.)"""
     from filelock import FileLock, Timeout
@@ -88,7 +93,8 @@ def _acquired(name: str) -> BaseFileLock | None:
 
 
 def _path(name: str, end: str) -> str:
-    key = hashlib.sha256(os.path.realpath(name).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    real = name if "://" in name else os.path.realpath(name)
+    key = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:16]
     user = os.getuid() if sys.platform != "win32" else "user"  # on Windows the folder is the user's own
     return os.path.join(tempfile.gettempdir(), f"armkin-{user}-{key}.{end}")
 

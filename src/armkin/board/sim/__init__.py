@@ -7,7 +7,7 @@ motors.py     what moves its motors: queue.py, homing.py, jogging.py; cruise.py 
 axes.py       its counts; inputs.py: its switches
 
 clock.py      the time of the others
-grbl.py       GRBL
+grbl.py       GRBL; grbl_modes.py: what its lines mean
 klipper.py    Klipper
 servo_bus.py  bus servos
 """

@@ -1,8 +1,10 @@
-"""A stand-in for a GRBL 1.1 board, in simulated time, written from GRBL's public interface description.
+"""A stand-in for a GRBL 1.1 board, in simulated time, written from GRBL's sources read for facts.
 
-It keeps what armkin relies on: the receive buffer, answers in order, planner blocks, status reports with three
-decimals, feed hold along the path, soft reset, alarms with their locks, settings, work offsets and homing. Its
-blocks start and end at rest; GRBL itself looks ahead.
+It keeps what armkin relies on, and what other programs may do to it: the receive buffer, a line that is put together
+byte by byte, answers in order, planner blocks, status reports with three decimals, feed hold along the path, in which
+no line is taken, soft reset, alarms with their locks, settings, modes and offsets (grbl_modes.py), overrides and
+homing. Its blocks start and end at rest; GRBL itself looks ahead. `hal`: as grblHAL, which takes whole numbers alone
+for whole-number settings, keeps G92 over a soft reset, and over a loss of power unless $384 is 1.
 """
 
 from __future__ import annotations
@@ -10,15 +12,18 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from armkin.board.grbl.replies import LETTERS, RX_BUFFER
+from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
+from armkin.board.sim.grbl_modes import Modes, Words
 
 BLOCKS = 15  # planner blocks
-
-_WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
+_LINE = 80  # [bytes] of a line
+_SEEN = 10  # reports between two that tell offset and overrides
+_FEED = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides; 0x90 takes them back
+_WHOLE = {1, 3, 10, 13, 20, 21, 22, 23, 32, 384}  # settings of whole numbers
 
 
 @dataclass
@@ -28,11 +33,24 @@ class Block:
     start: tuple[int, ...]
     end: tuple[int, ...]
     length: float  # [units]
-    speed: float  # [units/s]
+    feed: float  # [units/s] as asked for
+    most: float  # [units/s] that the axes allow
     accel: float  # [units/s2]
+    jog: bool = False
     done: float = 0.0  # [units]
     rate: float = 0.0  # [units/s]
     line: bool = True  # False: a dwell, `done` counts seconds up to `length`
+
+    def go(self, seconds: float, override: int, holding: bool) -> float:
+        """Go on for some seconds; the share of the way that is done."""
+        left, change = self.length - self.done, self.accel * seconds
+        speed = min(self.feed * override / 100, self.most)
+        if holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
+            self.rate = max(0.0 if holding else change, self.rate - change)
+        else:
+            self.rate = min(speed, self.rate + change)
+        self.done = min(self.length, self.done + self.rate * seconds)
+        return self.done / self.length if self.length else 1.0
 
 
 @dataclass
@@ -44,14 +62,16 @@ class Grbl(SimulatedTime):
     settings: dict[int, float] = field(default_factory=dict)
     ends: Mapping[int, int] = field(default_factory=dict)  # axis -> steps where its switch closes
     baud: int = 115_200
+    hal: bool = False
 
     def __post_init__(self) -> None:
         super().__init__()
         defaults = {1: 25, 3: 0, 10: 1, 13: 0, 20: 0, 21: 0, 22: 0, 23: 0, 25: 20, 27: 1, 30: 1000, 31: 0, 32: 0}
         for k in range(self.axes):
             defaults |= {100 + k: 250, 110 + k: 500, 120 + k: 10, 130 + k: 200}
-        self.settings = {**defaults, **self.settings}
+        self.settings = {**defaults, **({384: 0} if self.hal else {}), **self.settings}
         self.steps = [0] * self.axes
+        self.modes = Modes(self.axes, self.hal)
         self.history: list[tuple[float, tuple[int, ...]]] = []  # every change of the steps
         self.dead = False  # unplugged
         self.boot()
@@ -60,13 +80,14 @@ class Grbl(SimulatedTime):
         """Start anew: a reset by DTR or the button (`power`), which forgets the position, or a soft one."""
         if power:
             self.steps = [0] * self.axes
+        self.modes.reset(power=power, keep=self.hal and not self.settings[384])
         self.state = "Idle"
-        self.g92 = [0.0] * self.axes
-        self._rx, self._line = deque[str](), ""
-        self._blocks = deque[Block]()
-        self._holding = self._relative = False
+        self._rx, self._line, self._comment = deque[int](), "", ""
+        self._whole: str | None = None  # a line that waits to be carried out
+        self._blocks, self._holding = deque[Block](), False
+        self.override, self._reports = 100, 0
         self.spindle: float | None = None  # the S word of M3
-        self._say("\r\nGrbl 1.1h ['$' for help]")
+        self._say("\r\nGrbl 1.1f ['$' or '$HELP' for help]" if self.hal else "\r\nGrbl 1.1h ['$' for help]")
 
     # The port
 
@@ -81,14 +102,14 @@ class Grbl(SimulatedTime):
         if self.dead:
             return
         self._run(seconds)
-        while self._rx and self._ready(self._rx[0]):
-            self._obey(self._rx.popleft())
+        while not self._holding and self._take():
+            pass
 
     def alarm(self, number: int) -> None:
         """Go into an alarm: in motion the steps that were lost are not known."""
         self._blocks.clear()
         self._rx.clear()
-        self.state = "Alarm"
+        self._whole, self._line, self.state = None, "", "Alarm"
         self._say(f"ALARM:{number}")
 
     def _say(self, text: str) -> None:
@@ -96,24 +117,26 @@ class Grbl(SimulatedTime):
 
     def _receive(self, byte: int) -> None:
         if byte == 0x18:
-            moving = bool(self._blocks) and not self._standing()
-            self.boot(power=False)
-            if moving:
+            if moving := not self._standing():
                 self.alarm(3)
+            self.boot(power=False)
+            self.state = "Alarm" if moving else "Idle"
         elif byte == ord("?"):
             self._say(self._report())
         elif byte == ord("!"):
-            self._holding = True
+            self._holding = self._holding or self.state != "Alarm"
         elif byte == ord("~"):
             self._holding = False
         elif byte == 0x85:
-            self._blocks.clear()
-        elif byte in b"\r\n":
-            if self._line or byte == ord("\n"):
-                self._rx.append(self._line)
-            self._line = ""
-        elif sum(len(line) + 1 for line in self._rx) + len(self._line) < RX_BUFFER - 1:
-            self._line += chr(byte).upper() if byte != 32 else ""
+            self._blocks = deque(block for block in self._blocks if not block.jog)
+            if self.hal:
+                self._rx.clear()
+                self._line = self._comment = ""
+        elif byte in _FEED:
+            self.override = 100 if byte == 0x90 else min(max(self.override + _FEED[byte], 10), 200)
+            self._reports = 0
+        elif byte < 0x80 and len(self._rx) < RX_BUFFER - 1:
+            self._rx.append(byte)
 
     # Motion
 
@@ -121,25 +144,16 @@ class Grbl(SimulatedTime):
         return not self._blocks or (self._holding and self._blocks[0].rate == 0.0)
 
     def _run(self, seconds: float) -> None:
-        if self._blocks and not self._blocks[0].line:
-            self._blocks[0].done += seconds
-            if self._blocks[0].done >= self._blocks[0].length:
+        if not self._blocks or (self._holding and not self._blocks[0].line):
+            return
+        block = self._blocks[0]
+        if not block.line:
+            block.done += seconds
+            if block.done >= block.length:
                 self._blocks.popleft()
                 self._say("ok")
             return
-        if not self._blocks:
-            return
-        block = self._blocks[0]
-        left = block.length - block.done
-        brake = self._holding or block.rate**2 / (2 * block.accel) >= left
-        change = block.accel * seconds
-        block.rate = (
-            max(0.0 if self._holding else change, block.rate - change)
-            if brake
-            else min(block.speed, block.rate + change)
-        )
-        block.done = min(block.length, block.done + block.rate * seconds)
-        share = block.done / block.length if block.length else 1.0
+        share = block.go(seconds, self.override, self._holding)
         here = [round(a + share * (b - a)) for a, b in zip(block.start, block.end, strict=True)]
         if here != self.steps:
             self.steps = here
@@ -153,47 +167,92 @@ class Grbl(SimulatedTime):
             self._blocks.popleft()
 
     def _planned(self) -> list[int]:
-        return list(self._blocks[-1].end) if self._blocks else list(self.steps)
+        return next((list(block.end) for block in reversed(self._blocks) if block.line), list(self.steps))
+
+    def _state(self) -> str:
+        if self.state != "Idle" or not (self._holding or any(block.line for block in self._blocks)):
+            return self.state
+        held = "Hold:0" if self._standing() else "Hold:1"
+        return held if self._holding else "Jog" if self._blocks[0].jog else "Run"
+
+    def _report(self) -> str:
+        place, shift, bits = _machine(self.settings, self.steps), self.modes.work(), int(self.settings[10])
+        if not bits & 1:
+            place = [a - b for a, b in zip(place, shift, strict=True)]
+        text = f"<{self._state()}|{'MPos' if bits & 1 else 'WPos'}:{_three(place)}"
+        text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" * (bits >> 1 & 1) + "|FS:0,0"
+        turn, self._reports = self._reports % _SEEN, self._reports + 1
+        return f"{text}{f'|Ov:{self.override},100,100' * (turn == 0)}{f'|WCO:{_three(shift)}' * (turn == 1)}>"
 
     # Lines
 
-    def _ready(self, line: str) -> bool:
-        if line.startswith("M") or (line.startswith("$") and not line.startswith("$J")):
-            return not self._blocks  # a spindle's word waits for the motion before it
-        if any(not block.line for block in self._blocks):
+    def _take(self) -> bool:
+        """Go on with the line that is being put together, or carry out a whole one; False: nothing to do now."""
+        if self._whole is not None:
+            line = self._whole
+            words = self.modes.read(line)
+            if isinstance(words, Words) and self._blocks and (words.waits() or len(self._blocks) >= BLOCKS):
+                return False
+            if any(not block.line for block in self._blocks):
+                return False
+            self._whole = None
+            self._obey(line)
+            return True
+        if not self._rx:
             return False
-        return len(self._blocks) < BLOCKS
+        char = chr(self._rx.popleft())
+        if char in "\r\n":
+            if self._line or char == "\n":
+                self._whole = self._line
+            self._line = self._comment = ""
+        elif self._comment:
+            self._comment = "" if char == ")" and self._comment == "(" else self._comment
+        elif char in "(;":
+            self._comment = char
+        elif char > " " and char != "/":
+            self._line += char.upper()
+        return True
 
     def _obey(self, line: str) -> None:
-        error = 0 if not line else self._system(line[1:]) if line.startswith("$") else self._code(line)
+        error = 11 if len(line) >= _LINE and not self.hal else self._system(line[1:]) if line[:1] == "$" else -2
+        if error == -2:
+            error = 9 if line and self.state == "Alarm" else self._code(line)
         if error >= 0:
             self._say("ok" if error == 0 else f"error:{error}")
 
     def _system(self, line: str) -> int:
-        if match := re.fullmatch(r"(\d+)=(-?[\d.]+)", line):
-            if int(match[1]) not in self.settings:
-                return 3
-            self.settings[int(match[1])] = float(match[2])
+        if line == "G":
+            self._say(self.modes.said(self.spindle))
+        elif line == "X":
+            self.state = "Idle"
+        elif line.startswith("J="):
+            return 9 if self.state != "Idle" else self._code(line[2:], jog=True)
+        elif self._blocks:
+            return 8  # the rest is for a machine at rest
+        elif match := re.fullmatch(r"(\d+)=(-?\d+\.?\d*)", line):
+            return self._set(int(match[1]), match[2])
         elif line == "$":
             for number in sorted(self.settings):
                 self._say(f"${number}={self.settings[number]:.3f}".rstrip("0").rstrip("."))
         elif line == "I":
-            self._say("[VER:1.1h.20190825:]")
+            self._say("[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]")
             self._say(f"[OPT:V,{BLOCKS},{RX_BUFFER}]")
-        elif line == "G":
-            on = "M5" if self.spindle is None else "M3"
-            self._say(f"[GC:G1 G54 G17 G21 G90 G94 {on} M9 T0 F0 S{self.spindle or 0:g}]")
+            if self.hal:
+                self._say("[FIRMWARE:grblHAL]")
         elif line == "#":
-            self._say(f"[G54:{','.join(['0.000'] * self.axes)}]")
-            self._say(f"[G92:{','.join(f'{value:.3f}' for value in self.g92)}]")
-        elif line == "X":
-            self.state = "Idle"
+            self._say("\r\n".join(self.modes.parameters()))
         elif line == "H":
             return self._home()
-        elif line.startswith("J="):
-            return self._code(line[2:]) if self.state == "Idle" else 9
         else:
             return 3
+        return 0
+
+    def _set(self, number: int, text: str) -> int:
+        if number not in self.settings:
+            return 3
+        if self.hal and number in _WHOLE and not text.lstrip("-").isdigit():
+            return 52
+        self.settings[number] = float(text)
         return 0
 
     def _home(self) -> int:
@@ -210,54 +269,64 @@ class Grbl(SimulatedTime):
         self.state = "Idle"
         return 0
 
-    def _code(self, line: str) -> int:
-        if self.state == "Alarm":
-            return 9
-        words = _WORD.findall(line)
-        if "".join(letter + value for letter, value in words) != line:
-            return 2
-        codes = {float(value) for letter, value in words if letter == "G"}
-        values = {letter: float(value) for letter, value in words if letter != "G"}
-        if "M" in values:
-            self.spindle = min(values.get("S", 0.0), self.settings[30]) if values["M"] == 3 else None
-        if 4.0 in codes:
-            self._blocks.append(Block((), (), values.get("P", 0.0), 0, 0, line=False))
-            return -1 if self._blocks else 0
-        self._relative = 91.0 in codes or (self._relative and 90.0 not in codes)
-        given = {k: values[letter] for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
-        if 92.0 in codes:
-            for k, value in given.items():
-                self.g92[k] = self._planned()[k] / self.settings[100 + k] - value
-            return 0
-        if given:
-            if "F" not in values:
-                return 22
-            self._plan(given, values["F"], 53.0 in codes)
+    def _code(self, line: str, *, jog: bool = False) -> int:
+        words = self.modes.read(line)
+        if isinstance(words, int):
+            return words
+        here = self._planned()
+        if jog:
+            return self._jog(words, here)
+        goal = self.modes.obey(words, _machine(self.settings, here))
+        if words.spindle is not None:
+            s = min(words.values.get("S", 0.0), self.settings[30])
+            self.spindle = s if words.spindle in (3.0, 4.0) else None
+        if 4.0 in words.codes:
+            self._blocks.append(Block((), (), words.values["P"], 0, 0, 0, line=False))
+            return -1
+        if goal is not None:
+            self._plan(here, goal)
         return 0
 
-    def _plan(self, given: Mapping[int, float], feed: float, machine: bool) -> None:
-        start = self._planned()
-        per = [self.settings[100 + k] for k in range(self.axes)]
-        end = list(start)
-        for k, value in given.items():
-            base = start[k] / per[k] if self._relative else 0.0 if machine else self.g92[k]
-            end[k] = round((base + value) * per[k])
-        change = [(b - a) / s for a, b, s in zip(start, end, per, strict=True)]
-        length = math.hypot(*change)
-        if length == 0.0:
-            return
-        share = [abs(c) / length for c in change]
-        speed = min([feed / 60, *(self.settings[110 + k] / 60 / s for k, s in enumerate(share) if s)])
-        accel = min(self.settings[120 + k] / s for k, s in enumerate(share) if s)
-        self._blocks.append(Block(tuple(start), tuple(end), length, speed, accel))
+    def _jog(self, words: Words, here: list[int]) -> int:
+        if "F" not in words.values:
+            return 22
+        modes = self.modes
+        kept = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
+        goal = modes.obey(Words(words.codes | {1.0, 94.0}, None, words.values), _machine(self.settings, here))
+        feed = modes.feed
+        modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = kept
+        if goal is not None:
+            self._plan(here, goal, feed)
+        return 0
 
-    def _report(self) -> str:
-        state = self.state
-        if state == "Idle" and self._blocks:
-            state = ("Hold:0" if self._standing() else "Hold:1") if self._holding else "Run"
-        place = ",".join(f"{n / self.settings[100 + k]:.3f}" for k, n in enumerate(self.steps))
-        used = sum(len(line) + 1 for line in self._rx) + len(self._line)
-        text = f"<{state}|MPos:{place}"
-        if int(self.settings[10]) & 2:
-            text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - used}"
-        return f"{text}|FS:0,0>"
+    def _plan(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:
+        rapid = jog is None and self.modes.motion == 0.0
+        feed = math.inf if rapid else self.modes.feed if jog is None else jog
+        block = _block(self.settings, start, goal, feed / 60, jog is not None)
+        if block is not None:
+            block.feed *= block.length if self.modes.inverse and not rapid else 1.0
+            self._blocks.append(block)
+
+
+def _block(
+    settings: Mapping[int, float], start: Sequence[int], goal: Sequence[float], feed: float, jog: bool
+) -> Block | None:
+    """A block to a goal in units; None: nothing to do."""
+    per = [settings[100 + k] for k in range(len(start))]
+    end = [round(value * p) for value, p in zip(goal, per, strict=True)]
+    change = [(b - a) / s for a, b, s in zip(start, end, per, strict=True)]
+    length = math.hypot(*change)
+    if length == 0.0:
+        return None
+    share = [abs(c) / length for c in change]
+    most = min(settings[110 + k] / 60 / s for k, s in enumerate(share) if s)
+    accel = min(settings[120 + k] / s for k, s in enumerate(share) if s)
+    return Block(tuple(start), tuple(end), length, feed, most, accel, jog)
+
+
+def _machine(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]:
+    return [n / settings[100 + k] for k, n in enumerate(steps)]
+
+
+def _three(values: Sequence[float]) -> str:
+    return ",".join(f"{value:.3f}" for value in values)

@@ -160,6 +160,7 @@ class StatusOfGrbl(Stands):
     state: Annotated[str, "as the board says it: idle, run, hold, alarm, ...; ready, shutdown, ..."]
     inputs: Annotated[str, "letters of the active ones: limits X Y Z A B C, probe P, door D; Klipper tells none"]
     settings: Annotated[list[str], "those that differ from the robot file, in words"]
+    lost_because: Annotated[str | None, "why the position is lost, in words"]
 
 
 class Servo(TypedDict):

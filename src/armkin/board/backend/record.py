@@ -1,0 +1,173 @@
+"""What armkin last left on a board that other programs write to, beside the port's lock.
+
+Such a board (GRBL, Klipper) obeys everybody, and tells none who it was. Its position is known only while all that it
+keeps is what armkin last left there; in a motion, while it stands on that motion's way. The record outlives the
+process. That the board was reset since is told by marks that a reset clears.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.ports import read_note, record_path, remove_note, write_note
+from armkin.motion.trajectory import Straight
+from armkin.motors import pulses
+
+if TYPE_CHECKING:
+    from armkin.board.backend.job import Job
+    from armkin.board.ports import Port
+    from armkin.model.arm import Arm
+
+Marks = Mapping[str, Sequence[float] | str]  # what a board keeps, by name, as it says it
+_MOST = 64_000_000  # [bytes] of a record, and of its plan
+_STEP = 1.0 + 1e-9  # [counts] that every motor of an arm on its plan is within; no count lies just there
+
+
+@dataclass(frozen=True)
+class Left:
+    """What was left on a board."""
+
+    arm: str  # digest of what makes joint values of counts
+    marks: dict[str, list[float] | str]
+    offset: list[int]  # of the board's own steps where the arm's counts are 0
+    counts: list[int]  # where the arm stood, or where its motion began
+    plan: NDArray[np.int64] | None = None  # (points, motors) [counts] corners of the way of the motion under way
+
+
+class Record:
+    """The record of one arm on one port; a board in this process has none that outlives it."""
+
+    def __init__(self, port: Port, arm: Arm) -> None:
+        self._path = None if port.simulated else record_path(port.name)
+        self._arm = arm
+        self.left = None if self._path is None else _read(self._path)
+
+    def stands(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
+        """The arm stands there, by armkin's own doing or somebody's word."""
+        kept = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
+        self._put(Left(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
+
+    def moves(self, job: Job, piece: float) -> None:
+        """A motion begins, of which curves are sent in pieces of so many seconds."""
+        assert self.left is not None
+        left = self.left
+        self._put(Left(left.arm, left.marks, left.offset, job.start.tolist(), way(job, piece)))
+
+    def forget(self) -> None:
+        """Nobody knows where the arm stands."""
+        self.left = None
+        if self._path is not None:
+            remove_note(self._path)
+
+    def differs(self, marks: Marks) -> str | None:
+        """What the board keeps that armkin did not leave there, in words; None: nothing."""
+        why = "the board was reset, or another program has set it"
+        left = self.left
+        if left is None:
+            return "nobody has told armkin on this computer where it stands"
+        if left.arm != _digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
+            return "the robot file's drives or home pose are others than when it was told"
+        for name in sorted({*marks, *left.marks}):
+            found, was = _plain(marks.get(name)), _plain(left.marks.get(name))
+            if found != was:
+                return f"{name} is {_said(found)}, and armkin left {_said(was)}: {why}"
+        return None
+
+    def moved(self, counts: Sequence[int]) -> str | None:
+        """How the arm stands elsewhere than armkin left it, in words; None: it does not."""
+        left = self.left
+        assert left is not None
+        at = np.asarray(counts, dtype=np.int64)
+        if at.tolist() == left.counts or (left.plan is not None and on_way(left.plan, at)):
+            return None
+        where = (
+            f"at {left.counts}" if left.plan is None else f"on a motion from {left.counts} to {left.plan[-1].tolist()}"
+        )
+        return f"it stands at {at.tolist()} steps, and armkin left it {where}: another program has moved it"
+
+    def _put(self, left: Left) -> None:
+        self.left = left
+        if self._path is not None:
+            plan = None if left.plan is None else _packed(left.plan)
+            told = {"arm": left.arm, "marks": left.marks, "offset": left.offset, "counts": left.counts, "plan": plan}
+            write_note(self._path, told)
+
+
+def way(job: Job, piece: float) -> NDArray[np.int64]:
+    """Corners (points, motors) [counts] of the way of a job whose curves are sent in pieces of so many seconds."""
+    arm, points = job.trajectory.arm, [np.asarray(job.start, dtype=np.int64)[None]]
+    for stretch in job.trajectory.stretches:
+        count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / piece)), 1)
+        points.append(pulses(arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:])))
+    return np.concatenate(points)
+
+
+def on_way(points: NDArray[np.int64], at: NDArray[np.int64]) -> bool:
+    """Whether every motor is within one step of some point of the lines between corners (points, motors).
+
+    >>> corners = np.array([[0, 0], [10, 5]])
+    >>> on_way(corners, np.array([4, 3])), on_way(corners, np.array([4, 5]))
+    (True, False)
+    """
+    if len(points) == 1:
+        return bool(np.abs(at - points[0]).max(initial=0) <= _STEP)
+    line, off = np.diff(points, axis=0), at - points[:-1]
+    with np.errstate(divide="ignore"):
+        ends = np.stack([(off - _STEP) / line, (off + _STEP) / line])  # shares of the line at which a motor is near
+    first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
+    return bool((first <= last).any())
+
+
+def _digest(arm: Arm) -> str:
+    parts = arm.motor_gain, arm.home, arm.motor_bias
+    return hashlib.sha256(repr([np.round(part, 9).tolist() for part in parts]).encode()).hexdigest()[:16]
+
+
+def _plain(value: Sequence[float] | str | None) -> list[float] | str | None:
+    return value if value is None or isinstance(value, str) else [x + 0.0 for x in value]
+
+
+def _said(value: list[float] | str | None) -> str:
+    if value is None:
+        return "not told"
+    return value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in value)
+
+
+def _packed(plan: NDArray[np.int64]) -> str:
+    rows = np.diff(plan, axis=0, prepend=np.zeros_like(plan[:1])).astype("<i8")
+    return base64.b64encode(zlib.compress(rows.tobytes())).decode()
+
+
+def _unpacked(text: str, motors: int) -> NDArray[np.int64]:
+    data = zlib.decompressobj().decompress(base64.b64decode(text), _MOST)
+    rows = np.frombuffer(data, dtype="<i8").reshape(-1, motors)
+    if not len(rows):
+        raise ValueError(text)
+    return np.cumsum(rows, axis=0).astype(np.int64)
+
+
+def _read(path: str) -> Left | None:
+    """What a record says, if it is one."""
+    told = read_note(path, _MOST)
+    if told is None:
+        return None
+    try:
+        offset, counts, plan = told["offset"], told["counts"], told["plan"]
+        if not all(type(x) is int for x in (*offset, *counts)) or len(offset) != len(counts):
+            return None
+        marks: dict[str, Any] = {
+            name: value if isinstance(value, str) else [float(x) for x in value]
+            for name, value in told["marks"].items()
+        }
+        rows = None if plan is None else _unpacked(plan, len(counts))
+        return Left(str(told["arm"]), marks, offset, counts, rows)
+    except (ValueError, KeyError, TypeError, AttributeError, zlib.error):
+        return None

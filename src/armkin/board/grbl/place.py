@@ -1,0 +1,127 @@
+"""Where an arm on GRBL stands.
+
+GRBL counts steps from its last reset, and obeys every program. Where the arm stands is kept in a record beside the
+port's lock, with all that GRBL keeps of offsets: it is believed while nothing of that differs. A mark in the volatile
+offset G92, which a reset clears, tells that GRBL was not reset since.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.backend.record import Record
+from armkin.board.backend.starting import unbelievable
+from armkin.errors import LinkError
+
+if TYPE_CHECKING:
+    from armkin.board.grbl.replies import Report
+    from armkin.board.grbl.session import Session
+    from armkin.board.grbl.settings import Axis
+    from armkin.model.arm import Arm
+
+MARK = 1000  # [units] in G92, and up to as much again at random: no other board has the same, 0 means a reset
+Kept = dict[str, list[float] | str]
+_LASTING = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
+
+
+class Place:
+    """Where the arm stands on the GRBL of a session, as last read."""
+
+    def __init__(self, session: Session, arm: Arm, axes: Sequence[Axis]) -> None:
+        self._session, self._arm, self._axes = session, arm, axes
+        self.record = Record(session.port, arm)
+        self.why = "it was not read"  # the position is lost; empty: it is known
+        self.offset: NDArray[np.int64] = np.zeros(len(axes), dtype=np.int64)  # machine steps less counts
+        self._steps = self.offset
+        self._kept: Kept = {}
+
+    def counts(self) -> tuple[int, ...]:
+        """Counts of the arm's motors; they mean nothing while the position is lost."""
+        found = self._steps if self._session.report is None else self._machine(self._session.report)
+        return tuple(int(n) for n in found - self.offset)
+
+    def read(self) -> None:
+        """Read where the arm stands: known if all that GRBL keeps is what armkin left there."""
+        status = self._session.sure_status()
+        self._session.demand_rest(status)
+        if status.position is None:
+            self.why = "GRBL reports no machine position: armkin setup writes $10, which asks for it"
+            return
+        if max(axis.index for axis in self._axes) >= len(status.position):
+            letter = self._axes[-1].letter
+            raise LinkError(f"GRBL has {len(status.position)} axes; {self._arm.name} needs {letter}, too")
+        motion = self._ask()
+        why, left = self.record.differs(self._kept), self.record.left
+        if status.state == "Alarm":
+            why = "GRBL is in an alarm"
+        elif why is None and left is not None:
+            self.offset = np.asarray(left.offset, dtype=np.int64)
+            counts = self.counts()
+            why = self.record.moved(counts) or unbelievable(self._arm, counts)
+            if why is None and left.plan is not None and list(counts) != left.counts and motion != "G1":
+                why = "GRBL was reset in a motion, or another program has spoken to it there"
+        self.why = why or ""
+
+    def vouch(self, counts: NDArray[np.int64]) -> None:
+        """Take somebody's word that the motors stand at these counts: set the mark, and record what GRBL keeps."""
+        self._session.ask("G21G54G49")
+        steps = self._machine(self._session.sure_status())
+        mark = MARK + random.randrange(MARK)
+        self._ask()
+        values = zip(steps, self._axes, np.asarray(self._kept["G54"], dtype=float), strict=True)
+        words = [f"{axis.letter}{n / axis.steps - g54 - mark:.5f}" for n, axis, g54 in values]
+        self._session.ask(f"G92{''.join(words)}")
+        self._ask()
+        if any(abs(float(value) - mark) > 0.01 for value in self._kept["G92"]) or self._kept["system"] != "G54":
+            raise LinkError("GRBL did not take the mark that tells its resets: was a line damaged on its way?")
+        self.offset, self.why = steps - counts, ""
+        self.record.stands(self._kept, counts.tolist(), self.offset.tolist())
+
+    def arrived(self) -> None:
+        """Record that the arm rests where it was read."""
+        self.record.stands(self._kept, self.counts(), self.offset.tolist())
+
+    def after_reset(self, counts: Sequence[int], why: str) -> None:
+        """A reset at a standstill has cleared the mark: set it anew, if all that outlives a reset is as it was left.
+
+        why: the position was lost already.
+        """
+        if not why:
+            self._ask()
+            left = self.record.left
+            if left is None or any(left.marks.get(name) != self._kept[name] for name in _LASTING):
+                why = "another program has set an offset while the arm moved"
+        if why:
+            self.forget(why)
+        else:
+            self.vouch(np.asarray(counts, dtype=np.int64))
+
+    def forget(self, why: str) -> None:
+        """Nobody knows where the arm stands."""
+        self.why = why
+        self.record.forget()
+
+    def _ask(self) -> str:
+        """Read what GRBL keeps that moves targets, of the arm's axes; returns the motion mode in force."""
+        offsets, words = self._session.kept()
+        ours = [axis.index for axis in self._axes]
+        found: Kept = {
+            name: list(values) if name == "TLO" else [values[k] for k in ours if k < len(values)]
+            for name, values in offsets.items()
+        }
+        systems = (word for word in words if word.partition(".")[0] in _LASTING)
+        scaled = (word for word in words if word.startswith("G51"))
+        self._kept = {**found, "system": next(systems, "none"), "scale": next(scaled, "G50")}
+        return words[0]
+
+    def _machine(self, report: Report) -> NDArray[np.int64]:
+        """GRBL's machine position in steps, as it was reported."""
+        if report.position is not None:
+            values = [report.position[axis.index] * axis.steps for axis in self._axes]
+            self._steps = np.rint(values).astype(np.int64)
+        return self._steps

@@ -1,0 +1,39 @@
+"""Small files beside a port's lock, which outlive the process: a motion under way, what was left on a board."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+
+def write_note(path: str, told: Mapping[str, Any]) -> None:
+    """Replace a note as a whole; a full disk costs the note, not the motion."""
+    new = f"{path}.{os.getpid()}"
+    with suppress(OSError):
+        remove_note(new)
+        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            json.dump(told, file)
+        os.replace(new, path)  # a link of that name is replaced, not followed
+
+
+def read_note(path: str, most: int) -> dict[str, Any] | None:
+    """The note of at most so many bytes, if there is one that this user wrote."""
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+        with os.fdopen(handle, encoding="ascii") as file:
+            if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
+                return None
+            told = json.loads(file.read(most))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return told if isinstance(told, dict) else None
+
+
+def remove_note(path: str) -> None:
+    """Forget a note."""
+    with suppress(OSError):
+        os.unlink(path)
