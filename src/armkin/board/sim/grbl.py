@@ -166,9 +166,6 @@ class Grbl(SimulatedTime):
             self.steps = list(block.end)
             self._blocks.popleft()
 
-    def _planned(self) -> list[int]:
-        return next((list(block.end) for block in reversed(self._blocks) if block.line), list(self.steps))
-
     def _state(self) -> str:
         if self.state != "Idle" or not (self._holding or any(block.line for block in self._blocks)):
             return self.state
@@ -273,7 +270,7 @@ class Grbl(SimulatedTime):
         words = self.modes.read(line)
         if isinstance(words, int):
             return words
-        here = self._planned()
+        here = next((list(block.end) for block in reversed(self._blocks) if block.line), list(self.steps))
         if jog:
             return self._jog(words, here)
         goal = self.modes.obey(words, _machine(self.settings, here))
