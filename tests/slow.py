@@ -103,6 +103,12 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_stop_from_another_terminal",
         "test_stop_without_a_sender",
     ),
+    "columns/test_columns.py": (
+        "test_a_run_goes_on_where_it_was_ended",
+        "test_another_job_is_refused_and_loses_nothing",
+        "test_processes_change_no_byte",
+        "test_two_runs_do_not_share_a_folder",
+    ),
     "compiled/test_compiled.py": (),
     "export/test_c.py": (),
     "export/test_js.py": (),

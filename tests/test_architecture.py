@@ -34,6 +34,8 @@ MAY_IMPORT: dict[str, str] = {
     "inverse": "keep_out keep_out/shapes"
     " errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
     " inverse/branches",
+    "engines": "errors",
+    "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse motors",
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
     "motion": "keep_out keep_out/shapes"

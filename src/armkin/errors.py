@@ -2,6 +2,7 @@
 
     ArmkinError
     ├── FileError          a file that cannot be read or written
+    │   └── UnfinishedError     finished parts of a file wait for a run that goes on
     ├── RobotFileError     a robot file that is not valid
     ├── UsageError         an argument that does not fit the arm or the command
     │   ├── PathFileError  a path file that is not valid
@@ -11,6 +12,7 @@
     ├── NoSolutionError    no pose reaches the target, or none within the limits
     │   └── NoBranchError       branches reach the target, and none that may be taken
     ├── MissingExtraError  an optional package is not installed
+    ├── ClusterError       the scheduler of a cluster, or its workers
     └── LinkError          the port, or the board behind it
         ├── HeldError           a motion was held on its way, and the position is known
         ├── PortInUseError      another armkin has the port
@@ -59,6 +61,10 @@ class ArmkinError(Exception):
 
 class FileError(ArmkinError):
     """A file cannot be read or written."""
+
+
+class UnfinishedError(FileError):
+    """Finished parts of a file stand beside it, and a later run can go on with them; fields: file, parts (a folder)."""
 
 
 class RobotFileError(ArmkinError):
@@ -117,6 +123,10 @@ class NoBranchError(NoSolutionError):
 
 class MissingExtraError(ArmkinError):
     """An optional package is needed and not installed."""
+
+
+class ClusterError(ArmkinError):
+    """The scheduler of a cluster cannot be reached, or its workers have another armkin or fail."""
 
 
 class LinkError(ArmkinError):

@@ -76,6 +76,22 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
         raise FileError(f"{name}: cannot write: {why}", file=name) from None
 
 
+def check(path: str | os.PathLike[str]) -> None:
+    """Raise what `whole` would of a name: before long work, not after it."""
+    name = os.fspath(path)
+    if "\0" in name:
+        raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
+    real = os.path.realpath(name)
+    try:
+        if os.path.exists(real) and stat.S_ISREG((there := os.stat(real)).st_mode) and not _is_stream(there):
+            _check_replaceable(name, real, there)
+    except OSError as error:
+        raise FileError(f"{name}: cannot write: {error.strerror or error}", file=name) from None
+    folder = os.path.dirname(real)
+    if not os.path.isdir(folder):
+        raise FileError(f"{name}: cannot write: there is no folder {os.path.dirname(name)}", file=name)
+
+
 def _is_stream(there: os.stat_result) -> bool:
     """Whether a file is what stdout or stderr are redirected to: writing to /dev/stdout that goes to a log."""
     for number in (1, 2):

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli.batch import run_batch
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.rows import Chunk
+from armkin.cli.rows import ROWS, Chunk
 from armkin.errors import UsageError
 from command_line import ROOT, THREE_DOF, run
 
@@ -58,7 +57,7 @@ def test_workers_change_no_byte_and_belong_to_a_batch() -> None:
     assert one.out == two.out
     assert one.code == two.code
     refused = run("ik", THREE_DOF, 390, 80, 300, "--workers", 2)
-    assert (refused.code, refused.err) == (2, "error: --workers belongs to --batch: one target is not shared\n")
+    assert (refused.code, refused.err) == (2, "error: --workers belongs to --batch: one row is not shared\n")
 
 
 def test_ik_exits_3_after_all_rows() -> None:
@@ -207,29 +206,29 @@ def test_out_follows_a_link(tmp_path: Path) -> None:
     assert (tmp_path / "real").read_text()
 
 
-def test_memory_does_not_grow_with_the_rows(tmp_path: Path) -> None:
-    def chunks() -> Iterator[Chunk]:
-        for first in range(0, 2_000_000, 4096):
-            yield Chunk(range(first, first + 4096), np.zeros((4096, 1)))
+def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.cli.csv_rows.ROWS", 2000)
 
-    def peak(limit: int) -> int:
+    def peak(count: int) -> int:
+        path = tmp_path / "in.csv"
+        path.write_bytes(b"10,20,30\n" * count)
         tracemalloc.start()
-        some = (chunk for i, chunk in enumerate(chunks()) if i < limit)
-        run_batch(some, str(tmp_path / "out"), False, lambda c: ({} for _ in c.values), ["n"], lambda n, _: [[n]])
+        assert run("fk", THREE_DOF, "--batch", path, "--out", tmp_path / "out.csv").code == 0
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
 
-    assert peak(12) < 1.2 * peak(3) + 100_000
+    peak(2000)
+    assert peak(24_000) < 1.3 * peak(6000) + 200_000
 
 
 def test_rows_are_read_as_they_are_needed(tmp_path: Path) -> None:
     path = tmp_path / "in.csv"
-    path.write_bytes(b"1,2\n" * 5000 + b"bad\n")
+    path.write_bytes(b"1,2\n" * (ROWS + 5000) + b"bad\n")
     chunks = batch_rows(str(path), ["a", "b"], "test")
-    assert len(next(chunks).values) == 4096
-    assert next(chunks).numbers[-1] == 5000
-    with pytest.raises(UsageError, match=r"in\.csv: row 5001"):
+    assert len(next(chunks).values) == ROWS
+    assert next(chunks).numbers[-1] == ROWS + 5000
+    with pytest.raises(UsageError, match=rf"in\.csv: row {ROWS + 5001}"):
         next(chunks)
 
 

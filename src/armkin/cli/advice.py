@@ -22,6 +22,7 @@ from armkin.errors import (
     PositionKnownError,
     PositionLostError,
     RedundantArmError,
+    UnfinishedError,
     UsageError,
 )
 from armkin.robot_file.catalogue import shipped
@@ -73,7 +74,7 @@ def _lost(error: ArmkinError) -> str:
     return f"{home}, or {assume}" if error.fields["homing"] else f"put the arm in its home pose and {assume}"
 
 
-_ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError)
+_ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError, UnfinishedError)
 _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     RedundantArmError: _redundant,
     NoBranchError: lambda error: "ik --all-branches lists all branches, also those outside limits",
@@ -98,5 +99,6 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     PositionKnownError: lambda error: "leave --assume-home (--assume) out",
     GripperLostError: lambda error: "add --assume open (or closed, or a value)",
     GripperKnownError: lambda error: "leave --assume out",
+    UnfinishedError: lambda error: "the same command with --resume goes on; without these parts another one may begin",
     UsageError: _incomplete,  # the last: NoHomingError and others are such, too
 }

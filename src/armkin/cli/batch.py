@@ -1,18 +1,39 @@
-"""Answers to many poses: CSV or JSON Lines, chunk by chunk, in the order of the input."""
+"""Answers to many poses: columns or JSON Lines, chunk by chunk, in the order of the input."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+import io
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import IO, Any, NamedTuple, Protocol
 
+from armkin import __version__
 from armkin.cli import output
+from armkin.cli.pieces import Piece, Rows, parsed
 from armkin.cli.render import to_json
 from armkin.cli.rows import Chunk
-from armkin.errors import NoSolutionError
+from armkin.columns.cells import csv_line
+from armkin.columns.formats import Format, format_of
+from armkin.columns.parts import Parts
+from armkin.columns.table import Table
+from armkin.engines.run import Engine, in_order
+from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError
 
-_MOST_TEXT = 1_000_000  # characters that are written at once
-Answer = TypeVar("Answer", bound=Mapping[str, Any])
+_AT_ONCE = 4096  # rows that become objects together: Python's take a hundred times the room of numbers
+
+
+class Questions(Protocol):
+    """What a command answers of each row; it can be pickled."""
+
+    unsolvable: bool  # whether a row that is not `good` has no answer; else it is outside the limits
+
+    def table(self, chunk: Chunk) -> tuple[Table, Any]:
+        """The columns of some rows, and which rows are good (N,)."""
+
+    def objects(self, chunk: Chunk) -> Iterator[Mapping[str, Any]]:
+        """An object a row, for JSON."""
 
 
 @dataclass
@@ -20,85 +41,277 @@ class Tally:
     """What a batch came to, for the warning and the exit code."""
 
     rows: int = 0
-    outside: int = 0  # rows outside the limits
-    unsolved: int = 0  # rows without a best branch
-    first_outside: int = 0  # their row number
-    first_unsolved: int = 0
+    bad: int = 0  # rows outside the limits, or without a best branch
+    first_bad: int = 0  # the number of the first of them
+    skipped: int = 0  # rows without values
 
-    def add(self, number: int, answer: Mapping[str, Any]) -> None:
-        """Count one answer."""
-        self.rows += 1
-        if answer.get("violations"):
-            self.first_outside = self.first_outside or number
-            self.outside += 1
-        if "best" in answer and answer["best"] is None:
-            self.first_unsolved = self.first_unsolved or number
-            self.unsolved += 1
+    def add(self, other: Tally) -> None:
+        """Count another chunk, too."""
+        firsts = [first for first in (self.first_bad, other.first_bad) if first]
+        self.first_bad = min(firsts, default=0)
+        self.rows, self.bad, self.skipped = self.rows + other.rows, self.bad + other.bad, self.skipped + other.skipped
 
-    def warn_of_limits(self) -> None:
-        """Say how many rows are outside the limits."""
-        if self.outside:
-            first = f"the first is row {self.first_outside}"
-            output.warn(f"{self.outside} of {self.rows} rows are outside the limits; {first}")
-
-    def refuse_unsolved(self) -> None:
-        """Raise NoSolutionError if rows have no best branch."""
-        if self.unsolved:
-            raise NoSolutionError(
-                f"{self.unsolved} of {self.rows} rows have no branch within limits; "
-                f"the first is row {self.first_unsolved}",
-                rows=self.rows,
-                unsolved=self.unsolved,
-                row=self.first_unsolved,
-            )
+    def conclude(self, unsolvable: bool) -> None:
+        """Warn of rows outside the limits; raise NoSolutionError for rows without a best branch."""
+        if not self.bad:
+            return
+        first = f"the first is row {self.first_bad}"
+        if not unsolvable:
+            output.warn(f"{self.bad} of {self.rows} rows are outside the limits; {first}")
+            return
+        raise NoSolutionError(
+            f"{self.bad} of {self.rows} rows have no branch within limits; {first}",
+            rows=self.rows,
+            unsolved=self.bad,
+            row=self.first_bad,
+        )
 
 
-def run_batch(
-    chunks: Iterable[Chunk],
-    out: str | None,
-    as_json: bool,
-    answers: Callable[[Chunk], Iterable[Answer]],
-    heading: Sequence[str],
-    records: Callable[[int, Answer], Iterable[Sequence[Any]]],
-) -> Tally:
-    """Answer all chunks: each row's answer as a line of JSON, or its `records` as CSV under a `heading`."""
-    tally = Tally()
-    with output.destination(out) as write, output.progress("rows") as tick:
-        for chunk in chunks:
-            lines: list[str] = []
-            if not as_json and not tally.rows:  # nothing is written before the first row is read
-                lines.append(csv_line(heading))
-            length = 0
-            for number, answer in zip(chunk.numbers, answers(chunk), strict=True):
-                tally.add(number, answer)
-                new = [to_json(answer)] if as_json else list(map(csv_line, records(number, answer)))
-                lines += new
-                length += sum(map(len, new))
-                if length > _MOST_TEXT:
-                    write("\n".join([*lines, ""]))
-                    lines.clear()
-                    length = 0
-            if lines:
-                write("\n".join([*lines, ""]))
-            tick(tally.rows)
-    return tally
+class Job(NamedTuple):
+    """Questions, and what to make of their answers."""
+
+    questions: Questions
+    as_json: bool
+    format: str  # the ending of what is written
 
 
-def csv_line(record: Iterable[Any]) -> str:
-    """One line of CSV: numbers at full precision, text quoted where it holds a comma or a quote.
+class Done(NamedTuple):
+    """A finished piece: its bytes, and what to do with them."""
 
-    >>> csv_line([1.5, "left, elbow up", True, None])
-    '1.5,"left, elbow up",true,'
-    """
-    return ",".join([repr(value) if type(value) is float else _cell(value) for value in record])
+    number: int
+    input: str
+    data: bytes
+    heading: list[str]
+    tally: Tally
+    problem: ArmkinError | None = None  # a malformed row behind those that were answered
+    near: list[float] | None = None  # where the next piece goes on, for questions that follow each other
+
+    def about(self) -> dict[str, Any]:
+        """What is kept beside the bytes."""
+        return {"input": self.input, "heading": self.heading, "near": self.near, **asdict(self.tally)}
 
 
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    text = str(value)
-    if any(mark in text for mark in ',"\r\n'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
+def work(job: Job, piece: Piece) -> Done:
+    """Answer one piece of the input: a pure function, wherever it runs."""
+    tally, data, heading, problem = Tally(), [], [], None
+    encoded = format_of(f"x{job.format}").encoded
+    rows = parsed(piece)
+    while True:
+        try:
+            chunk = next(rows, None)
+        except UsageError as error:
+            problem = error
+            break
+        if chunk is None:
+            break
+        if job.as_json:
+            data.append(_lines(job.questions, chunk, tally))
+        else:
+            table, good = job.questions.table(chunk)
+            heading = list(table)
+            _count(tally, chunk, good)
+            data.append(encoded(table))
+    if piece.columns is not None:
+        tally.skipped = piece.columns.skipped
+    elif piece.values is not None and problem is None:
+        tally.skipped = len(piece.values) - tally.rows
+    near = getattr(job.questions, "near", None)
+    return Done(piece.number, piece.digest(), b"".join(data), heading, tally, problem, near)
+
+
+def _lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
+    """A chunk's answers as JSON Lines."""
+    lines = []
+    for start in range(0, len(chunk.values), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        part = Chunk(chunk.numbers[some], chunk.values[some])
+        for number, answer in zip(part.numbers, questions.objects(part), strict=True):
+            bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])
+            tally.add(Tally(1, int(bad), number if bad else 0))
+            lines.append(to_json(answer))
+    return "\n".join([*lines, ""]).encode()
+
+
+def _count(tally: Tally, chunk: Chunk, good: Any) -> None:
+    bad = (~good).nonzero()[0]
+    tally.add(Tally(len(good), len(bad), int(chunk.numbers[int(bad[0])]) if len(bad) else 0))
+
+
+@dataclass
+class Batch:
+    """A batch of questions and where its answers go."""
+
+    questions: Questions
+    out: str | None
+    as_json: bool
+    workers: int
+    cluster: str | None
+    resume: bool
+    asked: Mapping[str, Any]  # what the bytes depend on besides robot and input, for --resume
+
+    @property
+    def engine(self) -> Engine:
+        """Where the work is done."""
+        return Engine(self.workers, self.cluster)
+
+    def run(self, pieces: Rows) -> Tally:
+        """Answer all pieces."""
+        to_file = self.out is not None and self.out != "-"
+        format = format_of(self.out if to_file else None)
+        if self.as_json and not format.is_text:
+            raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away")
+        if self.resume and not to_file:
+            raise UsageError("--resume goes on with --out FILE; give the file")
+        job = Job(self.questions, self.as_json, "" if format.name == "csv" else f".{format.name}")
+        tally = Tally()
+        if to_file and _is_file(str(self.out)):
+            _ToFile(self, format, job, tally, pieces.size).run(pieces)
+        else:
+            self._stream(format, job, pieces, tally)
+        if tally.skipped:
+            names = ",".join(pieces.names)
+            output.warn(f"{tally.skipped} row{'s' * (tally.skipped > 1)} without {names} skipped")
+        return tally
+
+    def _stream(self, format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
+        """To a pipe, piece by piece; what is no text when all is there."""
+        kept: list[bytes] = []
+        with _binary(self.out) as write, output.progress("rows") as tick:
+            for done in in_order(self.engine, work, job, pieces):
+                if format.is_text:
+                    write(_headed(done, job, format, tally) + done.data)
+                elif done.tally.rows:
+                    kept.append(done.data)
+                tally.add(done.tally)
+                tick(tally.rows)
+                if done.problem is not None:
+                    raise done.problem
+            if not tally.rows:
+                raise pieces.empty(tally.skipped)
+            if kept:
+                whole = io.BytesIO()
+                format.together(whole, lambda: map(io.BytesIO, kept))
+                write(whole.getvalue())
+
+
+def _headed(done: Done, job: Job, format: Format, tally: Tally) -> bytes:
+    """The heading of a CSV, before its first rows."""
+    first = format.name == "csv" and not job.as_json and done.tally.rows and not tally.rows
+    return (csv_line(done.heading) + "\n").encode() if first else b""
+
+
+def _is_file(path: str) -> bool:
+    """Whether a name is that of a regular file, or of none yet: what is no pipe and no device."""
+    return os.path.isfile(path) or not os.path.exists(path)
+
+
+@contextmanager
+def _binary(out: str | None) -> Iterator[Callable[[bytes], object]]:
+    if out is None or out == "-":
+        with output.destination(out) as write:
+            yield lambda data: write(data.decode())
+        return
+    from armkin import files
+
+    with files.whole(out, "wb") as file:
+        yield file.write
+
+
+class _ToFile:
+    """A batch whose answers become a file: more than one piece keep their answers beside it until all are there."""
+
+    def __init__(self, batch: Batch, format: Format, job: Job, tally: Tally, size: int | None) -> None:
+        from armkin import files
+
+        self.batch, self.format, self.job, self.tally = batch, format, job, tally
+        self.path = str(batch.out)
+        files.check(self.path)
+        asked = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
+        self.parts = Parts(self.path, {**batch.asked, **asked})
+        self.first: Done | None = None  # the only piece so far: it may be the last
+        self.count = 0
+
+    def run(self, pieces: Rows) -> None:
+        """Answer what is missing, and make the file."""
+        if self.batch.resume and self.parts.begun:
+            self.parts.begin()
+        else:
+            self.parts.refuse_begun()
+        try:
+            with output.progress("rows") as tick:
+                for done in in_order(self.batch.engine, work, self.job, self._missing(pieces)):
+                    self._keep(done)
+                    tick(self.tally.rows)
+            if not self.tally.rows:
+                raise pieces.empty(self.tally.skipped)
+            self._write()
+        except UsageError:
+            if not self.batch.resume and self.parts.held:
+                self.parts.remove()
+            raise
+        finally:
+            self.parts.leave()
+
+    def _missing(self, pieces: Iterable[Piece]) -> Iterator[Piece]:
+        """The pieces that no earlier run has finished; those that one has are counted."""
+        for piece in pieces:
+            self.count = piece.number + 1
+            about = self.parts.about(piece.number) if self.parts.held and self.batch.resume else None
+            if about is None:
+                yield piece
+                continue
+            if about["input"] != piece.digest():
+                raise UsageError(
+                    f"the input has changed since {self.path}.parts was begun; "
+                    f"give it as it was, or remove {self.parts.folder}",
+                    file=self.path,
+                )
+            self.tally.add(Tally(*(about[name] for name in ("rows", "bad", "first_bad", "skipped"))))
+            if about["near"] is not None:
+                self.job.questions.near = about["near"]  # type: ignore[attr-defined]
+
+    def _keep(self, done: Done) -> None:
+        if done.problem is not None:
+            raise done.problem
+        if self.first is None and done.number == 0 and not self.parts.held:
+            self.first = done
+        else:
+            if not self.parts.held:
+                self.parts.begin()
+                assert self.first is not None
+                self.parts.keep(0, self.first.about(), self.first.data)
+            self.parts.keep(done.number, done.about(), done.data)
+        self.tally.add(done.tally)
+
+    def _write(self) -> None:
+        from armkin import files
+
+        held = self.parts.held
+        try:
+            with files.whole(self.path, "wb") as file:
+                self._put(file)
+        except FileError as error:
+            if held:
+                raise UnfinishedError(
+                    f"{error.message}; what is finished stays in {self.path}.parts",
+                    file=self.path,
+                    parts=str(self.parts.folder),
+                ) from None
+            raise
+        if held:
+            self.parts.remove()
+
+    def _put(self, file: IO[bytes]) -> None:
+        if self.parts.held:
+            headings = (about["heading"] for i in range(self.count) if (about := self.parts.about(i)) is not None)
+            heading: list[str] = next((names for names in headings if names), [])
+        else:
+            assert self.first is not None
+            heading = self.first.heading
+        if self.format.name == "csv" and not self.job.as_json:
+            file.write((csv_line(heading) + "\n").encode())
+        first = self.first
+        if self.parts.held or first is None:
+            self.format.together(file, lambda: self.parts.opened(self.count))
+        else:
+            self.format.together(file, lambda: [io.BytesIO(first.data)])

@@ -7,14 +7,19 @@ import csv
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output
 from armkin.cli.numbers import LARGEST, numbers
-from armkin.cli.rows import ROWS, Chunk
+from armkin.cli.rows import ROWS as ROWS
+from armkin.cli.rows import Chunk
 from armkin.errors import FileError, UsageError
 
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+
+WORTH = 2_000  # rows for which pyarrow is worth its import
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
@@ -71,27 +76,23 @@ class Columns:
                     raise UsageError(f"separate the numbers with commas, not with {separator!r}")
         return numbers(cells, self.names, self.what)
 
-    def all_plain(self, lines: list[bytes]) -> list[float] | None:
-        """All numbers of lines whose wanted cells are ordinary numbers: the fast way; None: look closer."""
-        text = b"".join(lines)
+    def all_plain(self, lines: list[bytes]) -> Array | None:
+        """All numbers (N, m) of lines whose wanted cells are ordinary numbers: the fast way; None: look closer."""
+        import numpy as np
+
         if not self.begun or len(lines[-1]) >= LONGEST:
             return None
-        if self.places is None:
-            if text.translate(None, _PLAIN) or any(line.count(b",") != len(self.names) - 1 for line in lines):
-                return None
-            chosen = [cell for line in lines for cell in line.split(b",")]
+        text = b"\n".join(line.rstrip(b"\r\n") for line in lines) if lines[0][-1:] == b"\n" else b"\n".join(lines)
+        width = len(self.heading) if self.places is not None else len(self.names)
+        if not text.translate(None, _PLAIN):
+            values = _regular(text, len(lines), width)
+            if values is not None and self.places is not None:
+                values = values[:, self.places]
+        elif self.places is not None and b'"' not in text:
+            values = _among_others([line.split(b",") for line in lines], width, self.places)
         else:
-            rows = [line.split(b",") for line in lines]
-            if b'"' in text or any(len(row) != len(self.heading) for row in rows):
-                return None
-            chosen = [row[i] for row in rows for i in self.places]
-            if b"".join(chosen).translate(None, _PLAIN):
-                return None
-        try:
-            values = [float(cell) for cell in chosen]
-        except ValueError:
             return None
-        return values if max(map(abs, values)) <= LARGEST else None
+        return values if values is not None and np.abs(values).max() <= LARGEST else None
 
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
@@ -123,17 +124,17 @@ def batch_rows(
     editor counts lines), after the complete rows before it were given out.
     """
     files.keep(0 if source == "-" else source)  # before an output of that name is opened
-    return _batch_rows(source, names, what, named)
+    return _all_rows(source, names, what, named)
 
 
-def _batch_rows(
+def _all_rows(
     source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None
 ) -> Iterator[Chunk]:
     columns = Columns(names, what, named)
     first, empty = 1, True
-    with _opened(source) as file:
-        while lines := _lines(file, source):
-            for chunk in _chunk(lines, first, columns, source):
+    with opened(source) as file:
+        while lines := lines_of(file, source):
+            for chunk in chunk_of(lines, first, columns, source):
                 empty = False
                 yield chunk
             first += len(lines)
@@ -141,7 +142,7 @@ def _batch_rows(
         output.warn(f"{columns.skipped} row{'s' * (columns.skipped > 1)} without {','.join(names)} skipped")
     if empty:
         why = "has no row with values" if columns.skipped else "is empty"
-        raise UsageError(f"{_name(source)} {why}; it needs one row of {','.join(names)} per pose")
+        raise UsageError(f"{name_of(source)} {why}; it needs one row of {','.join(names)} per pose")
 
 
 def streamed_rows(
@@ -149,18 +150,18 @@ def streamed_rows(
 ) -> Iterator[tuple[int, list[float]]]:
     """Rows of a CSV file one by one, each as soon as it can be read: its number and its values."""
     columns = Columns(names, what, named)
-    with _opened(source) as file:
+    with opened(source) as file:
         for number, line in enumerate(iter(lambda: _line(file, source), b""), 1):
             try:
                 row = columns.row(line, number)
             except UsageError as error:
-                raise error.within(f"{_name(source)}: row {number}", row=number) from None
+                raise error.within(f"{name_of(source)}: row {number}", row=number) from None
             if row is not None:
                 yield number, row
 
 
 @contextlib.contextmanager
-def _opened(source: str) -> Iterator[IO[bytes]]:
+def opened(source: str) -> Iterator[IO[bytes]]:
     if source == "-":
         if sys.stdin is None:
             raise FileError("standard input is closed; give --batch a file")
@@ -175,7 +176,59 @@ def _opened(source: str) -> Iterator[IO[bytes]]:
         yield file
 
 
-def _lines(file: IO[bytes], source: str) -> list[bytes]:
+def _regular(text: bytes, count: int, width: int) -> Array | None:
+    """The numbers (count, width) of lines without anything else in them; None if they are not all that wide."""
+    import numpy as np
+
+    marks = np.frombuffer(text, np.uint8)
+    ends = marks[(marks == ord(",")) | (marks == ord("\n"))] == ord("\n")
+    if len(ends) + 1 != count * width or ends.sum() + 1 != count or not ends[width - 1 :: width].all():
+        return None
+    if count >= WORTH and (values := _by_arrow(text, width)) is not None:
+        return values
+    try:
+        return np.array([float(cell) for cell in text.replace(b"\n", b",").split(b",")]).reshape(count, width)
+    except ValueError:
+        return None
+
+
+def _among_others(rows: list[list[bytes]], width: int, places: list[int]) -> Array | None:
+    """The numbers of rows that have other cells, too."""
+    import numpy as np
+
+    if any(len(row) != width for row in rows):
+        return None
+    chosen = [row[i] for row in rows for i in places]
+    if b"".join(chosen).translate(None, _PLAIN):
+        return None
+    try:
+        return np.array([float(cell) for cell in chosen]).reshape(len(rows), len(places))
+    except ValueError:
+        return None
+
+
+def _by_arrow(text: bytes, width: int) -> Array | None:
+    """The same by pyarrow, where it is installed and takes every cell for a number."""
+    import numpy as np
+
+    try:
+        import pyarrow
+        import pyarrow.csv as table
+    except ImportError:
+        return None
+    names = [str(i) for i in range(width)]
+    read = table.ReadOptions(column_names=names, use_threads=False, block_size=len(text) + 1)
+    convert = table.ConvertOptions(column_types=dict.fromkeys(names, pyarrow.float64()))
+    try:
+        found = table.read_csv(pyarrow.BufferReader(text), read, convert_options=convert)
+    except pyarrow.ArrowInvalid:
+        return None
+    if any(column.null_count for column in found.columns):
+        return None
+    return np.column_stack([column.to_numpy() for column in found.columns])
+
+
+def lines_of(file: IO[bytes], source: str) -> list[bytes]:
     lines: list[bytes] = []
     while len(lines) < ROWS and (line := _line(file, source)):
         lines.append(line)
@@ -189,14 +242,14 @@ def _line(file: IO[bytes], source: str) -> bytes:
         return file.readline(LONGEST)
     except (OSError, ValueError) as error:  # ValueError: closed
         reason = getattr(error, "strerror", None) or error
-        raise FileError(f"{_name(source)}: cannot read: {reason}") from None
+        raise FileError(f"{name_of(source)}: cannot read: {reason}") from None
 
 
-def _name(source: str) -> str:
+def name_of(source: str) -> str:
     return "standard input" if source == "-" else source
 
 
-def _chunk(lines: list[bytes], first: int, columns: Columns, source: str) -> Iterator[Chunk]:
+def chunk_of(lines: list[bytes], first: int, columns: Columns, source: str) -> Iterator[Chunk]:
     import numpy as np
 
     index: list[int] = []
@@ -209,13 +262,12 @@ def _chunk(lines: list[bytes], first: int, columns: Columns, source: str) -> Ite
             values = columns.all_plain(rest)
             if values is not None:
                 index += range(number, first + len(lines))
-                good += np.array(values).reshape(len(rest), -1).tolist() if good else []
-                yield Chunk(index, np.array(good or values).reshape(len(index), len(columns.names)))
+                yield Chunk(index, np.concatenate([np.array(good), values]) if good else values)
                 return
         try:
             row = columns.row(line, number)
         except UsageError as error:
-            problem = error.within(f"{_name(source)}: row {number}", row=number)
+            problem = error.within(f"{name_of(source)}: row {number}", row=number)
             break
         if row is not None:
             index.append(number)
@@ -237,7 +289,7 @@ def _cells(text: str) -> list[str]:
 
 
 def _places(heading: Sequence[str], name: str) -> list[int]:
-    """Columns of a name: those of exactly this name, or those with a unit behind it."""
-    exact = [i for i, cell in enumerate(heading) if cell == name]
-    others = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
-    return exact or [i for i, cell in enumerate(heading) if cell in others]
+    """See `armkin.columns.reading.places`."""
+    from armkin.columns.reading import places  # here, as it needs numpy
+
+    return places(heading, name)

@@ -21,6 +21,7 @@ EXIT_CODES: dict[type[errors.ArmkinError], int] = {
     errors.UsageError: USAGE,
     errors.NoSolutionError: NO_SOLUTION,
     errors.MissingExtraError: RUNTIME,
+    errors.ClusterError: RUNTIME,
     errors.LinkError: LINK,
 }
 

@@ -128,6 +128,13 @@ def check_commas(arm: Arm, task: str | None, text: str, rest: Sequence[str]) -> 
     target_list(arm, task_for(arm, task), text, rest)
 
 
+def one_alone(workers: int, cluster: str | None, resume: bool) -> None:
+    """One row is not shared, and there is nothing to go on with."""
+    for option, given in (("--workers", workers > 1), ("--cluster", cluster is not None), ("--resume", resume)):
+        if given:
+            raise UsageError(f"{option} belongs to --batch: one row is not shared")
+
+
 def no_numbers(words: Sequence[str] | None) -> None:
     """A batch takes its numbers from the file alone."""
     if words:

@@ -41,12 +41,26 @@ Batch = Annotated[
     typer.Option(
         "--batch",
         metavar="FILE|-",
-        help="Many at once: a CSV file, or standard input; one row each. Gives CSV, or JSON Lines.",
+        help="Many at once, a row each: CSV (or standard input), .npz, .parquet, .jsonl. Gives CSV; see --out.",
     ),
 ]
 Out = Annotated[
     str | None,
     typer.Option("--out", "-o", metavar="FILE|-", help="Write to a file, which appears whole or not at all."),
+]
+BatchOut = Annotated[
+    str | None,
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="FILE|-",
+        help="Write to a file, whole or not at all; a batch by its ending: .csv, .npz, .parquet, .jsonl.",
+    ),
+]
+Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an earlier run was ended.")]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Share the work on a Dask cluster: tcp://HOST:8786."),
 ]
 Compiled = Annotated[
     bool,
@@ -54,7 +68,7 @@ Compiled = Annotated[
 ]
 Workers = Annotated[
     int,
-    typer.Option("--workers", metavar="N", min=1, help="With --batch: threads that share the rows, the same answers."),
+    typer.Option("--workers", metavar="N", min=1, help="Processes that share the work, the same answers."),
 ]
 Target = Annotated[
     list[str] | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
 
-ROWS = 4096  # rows in memory at a time
+ROWS = 16_384  # rows in memory at a time
 
 
 class Chunk(NamedTuple):

@@ -101,6 +101,32 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
     )
 
 
+def transforms(xyz: Array, rpy: Array) -> Array:
+    """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
+    cosine, sine = _cos_sin_deg(rpy)
+    (cr, cp, cy), (sr, sp, sy) = np.moveaxis(cosine, -1, 0), np.moveaxis(sine, -1, 0)
+    T = np.zeros((*xyz.shape[:-1], 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2] = -sp, cp * sr, cp * cr
+    T[..., :3, 3], T[..., 3, 3] = xyz, 1.0
+    return T
+
+
+def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
+    """`cos_sin_deg` of many; by the same functions of single numbers, as numpy's differ in the last bit."""
+    flat = (angles * (math.pi / 180)).ravel().tolist()
+    cosine = np.array([math.cos(angle) for angle in flat]).reshape(angles.shape)
+    sine = np.array([math.sin(angle) for angle in flat]).reshape(angles.shape)
+    quarter, rest = np.divmod(angles, 90.0)
+    exact = rest == 0.0
+    if exact.any():
+        turns = quarter[exact].astype(np.int64) % 4
+        cosine[exact] = np.array([1.0, 0.0, -1.0, 0.0])[turns]
+        sine[exact] = np.array([0.0, 1.0, 0.0, -1.0])[turns]
+    return cosine, sine
+
+
 def cos_sin_deg(angle: float) -> tuple[float, float]:
     """Cosine and sine of an angle in degrees, exact at multiples of 90."""
     quarter, rest = divmod(angle, 90.0)

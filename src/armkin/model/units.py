@@ -102,10 +102,9 @@ def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
 
     numbers = np.asarray(values, dtype=float)
     if list(labels[3:]) == ["roll", "pitch", "yaw"]:
-        from armkin.model.rotation import transform
+        from armkin.model.rotation import transforms
 
-        flat = [transform(row[:3], row[3:]) for row in numbers.reshape(-1, 6).tolist()]
-        return np.array(flat).reshape(*numbers.shape[:-1], 4, 4)
+        return transforms(numbers[..., :3], numbers[..., 3:])
     return numbers * _label_scale(labels)
 
 

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Batch, Compiled, Joints, JsonLines, Out, RobotOrPipe, Scene
+from armkin.cli.options import (
+    Batch,
+    BatchOut,
+    Cluster,
+    Compiled,
+    Joints,
+    JsonLines,
+    Resume,
+    RobotOrPipe,
+    Scene,
+    Workers,
+)
 from armkin.cli.render import fixed
-from armkin.cli.rows import Chunk, all_rows, one_row
+from armkin.cli.rows import Chunk, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Fk
+    from armkin.columns.table import Table
     from armkin.model.arm import Arm
 
 
@@ -26,35 +39,60 @@ def fk(
     scene: Scene = None,
     json: JsonLines = False,
     batch: Batch = None,
-    out: Out = None,
+    out: BatchOut = None,
+    workers: Workers = 1,
+    cluster: Cluster = None,
+    resume: Resume = False,
 ) -> None:
     """Where the tool is for given joint values."""
     if batch is not None:
-        from armkin.cli.csv_rows import batch_rows
-
         inputs.no_numbers(q)
-        arm = inputs.load(inputs.named(robot), scene)
-        chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
+        arm, values = inputs.load(inputs.named(robot), scene), list[list[float]]()
     else:
         arm, values = _poses(robot, q, scene)
         if len(values) == 1:
+            inputs.one_alone(workers, cluster, resume)
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out) as write:
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"], answer)
             return
-        chunks = all_rows(values)
-    from armkin.cli.batch import run_batch
+    from armkin.cli.batch import Batch as Run
+    from armkin.cli.pieces import Rows
 
-    tally = run_batch(
-        chunks,
-        out,
-        json,
-        lambda chunk: _answers(arm, chunk, frames, compiled),
-        [*arm.joint_names, "x", "y", "z", "roll", "pitch", "yaw", "within_limits"],
-        lambda _, a: [[*a["joints"], *a["position_mm"], *a["rpy_deg"], a["within_limits"]]],
-    )
-    tally.warn_of_limits()
+    rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
+    asked = {
+        "command": "fk",
+        "robot file": arm.sha256,
+        "scene": arm.scene_sha256,
+        "frames": frames,
+        "compiled": compiled,
+    }
+    questions = Questions(arm, frames, compiled)
+    Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
+
+
+@dataclass(frozen=True)
+class Questions:
+    """What is asked of each row of a batch."""
+
+    arm: Arm
+    frames: bool
+    compiled: bool
+    unsolvable = False
+
+    def table(self, chunk: Chunk) -> tuple[Table, Any]:
+        """The columns, and which rows are within limits."""
+        import armkin
+        from armkin.columns import postures
+
+        T = armkin.compile(self.arm).fk(units.joints_in(self.arm, chunk.values)) if self.compiled else None
+        found = postures.poses(self.arm, chunk.values, T)
+        return found, found["within_limits"]
+
+    def objects(self, chunk: Chunk) -> Iterator[Fk]:
+        """An object a row."""
+        return _answers(self.arm, chunk, self.frames, self.compiled)
 
 
 def _poses(robot: str | None, q: list[str] | None, scene: str | None) -> tuple[Arm, list[list[float]]]:

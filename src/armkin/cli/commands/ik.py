@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, lock_and_sweep, output, piped_answers, render
-from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import (
     AllBranches,
     Batch,
+    BatchOut,
     BranchName,
+    Cluster,
     Compiled,
     JsonLines,
     Lock,
     Near,
-    Out,
+    Resume,
     RobotOrPipe,
     Scene,
     Sweep,
@@ -29,12 +28,13 @@ from armkin.cli.options import (
     Workers,
 )
 from armkin.cli.render import fixed
-from armkin.cli.rows import Chunk, all_rows, one_row
+from armkin.cli.rows import Chunk, one_row
 from armkin.errors import UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Closest, Ik
+    from armkin.columns.table import Table
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
     from armkin.inverse.solutions import Solutions
@@ -64,7 +64,9 @@ def ik(
     workers: Workers = 1,
     json: JsonLines = False,
     batch: Batch = None,
-    out: Out = None,
+    out: BatchOut = None,
+    cluster: Cluster = None,
+    resume: Resume = False,
 ) -> None:
     """All joint values that reach a target.
 
@@ -90,34 +92,36 @@ def ik(
     )
     if compiled and sweep:
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
-    if workers > 1 and batch is None:
-        raise UsageError("--workers belongs to --batch: one target is not shared")
-    if compiled or workers > 1:
-        request = replace(request, ik=partial(_compiled if compiled else request.ik, workers=workers))
+    if compiled:
+        request = replace(request, ik=_compiled)
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):
         inputs.no_numbers(target)
-        rows = _Rows(request, what, all_branches, turns, continuous=continuous, with_closest=json)
-        tally = run_batch(
-            all_rows(reached or []) if batch is None else batch_rows(batch, what.labels, f"task {what.name}"),
-            out,
-            json,
-            rows.answers,
-            [
-                "row",
-                "status",
-                "branch",
-                *arm.joint_names,
-                "within_limits",
-                "residual_mm",
-                "residual_deg",
-                "motion",
-            ],
-            lambda row, answer: _records(arm, row, answer),
-        )
-        tally.refuse_unsolved()
+        from armkin.cli.batch import Batch as Run
+        from armkin.cli.pieces import Rows
+
+        questions = Questions(request, what, all_branches, turns, continuous)
+        asked = {
+            "command": "ik",
+            "robot file": arm.sha256,
+            "scene": arm.scene_sha256,
+            "task": what.name,
+            "near": request.near_out,
+            "branch": branch,
+            "lock": dict(request.held),
+            "sweep": dict(request.swept),
+            "all_branches": all_branches,
+            "turns": turns,
+            "continuous": continuous,
+            "compiled": compiled,
+        }
+        rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
+        if continuous:  # each row waits for the one before
+            workers, cluster = 1, None
+        Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
         return
+    inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     goal = units.targets_in(what.labels, values)
     [found] = choose.solve(request, goal)
@@ -139,31 +143,62 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, workers: int) -> Solutions:
+def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Solutions:
     """`armkin.ik` by machine code."""
     import armkin
 
-    return armkin.compile(arm).ik(targets, task, near, workers=workers)
+    return armkin.compile(arm).ik(targets, task, near)
 
 
-class _Rows:
-    """The rows of a batch; continuous: each is compared with the one before."""
+@dataclass
+class Questions:
+    """What is asked of each row of a batch; continuous: each is compared with the one before."""
 
-    def __init__(
-        self,
-        request: choose.Request,
-        task: Task,
-        all_branches: bool,
-        turns: bool,
-        *,
-        continuous: bool,
-        with_closest: bool,
-    ) -> None:
-        self.request, self.task, self.continuous = request, task, continuous
-        self.show = {"all_branches": all_branches, "turns": turns, "with_closest": with_closest}
+    request: choose.Request
+    task: Task
+    all_branches: bool
+    turns: bool
+    continuous: bool
+    unsolvable = True
 
-    def answers(self, chunk: Chunk) -> Iterator[Ik]:
-        """The answers of some rows."""
+    @property
+    def near(self) -> list[float] | None:
+        """Where the next row goes on [deg | mm]; None: each row by itself."""
+        return self.request.near_out if self.continuous else None
+
+    @near.setter
+    def near(self, joints: list[float]) -> None:
+        self.request = replace(self.request, near=joints)
+
+    def table(self, chunk: Chunk) -> tuple[Table, Any]:
+        """The columns, and which rows have a best branch."""
+        import numpy as np
+
+        if self.continuous or self.request.swept:
+            return self._table_of_objects(chunk)
+        from armkin.columns import branches
+
+        targets = units.targets_in(self.task.labels, chunk.values)
+        found = branches.listed(self.request, targets, np.asarray(chunk.numbers), self.all_branches)
+        return found.table, ~found.unsolved
+
+    def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
+        """By way of an object a row, for what is not asked of each row by itself."""
+        import numpy as np
+
+        from armkin.columns.table import of_records
+
+        rest = ("within_limits", "residual_mm", "residual_deg", "motion")
+        heading = ["row", "status", "branch", *self.request.arm.joint_names, *rest]
+        records: list[list[Any]] = []
+        solved: list[bool] = []
+        for number, answer in zip(chunk.numbers, self.objects(chunk, with_closest=False), strict=True):
+            records += _records(self.request.arm, int(number), answer)
+            solved.append(answer["best"] is not None)
+        return of_records(heading, records), np.array(solved)
+
+    def objects(self, chunk: Chunk, with_closest: bool = True) -> Iterator[Ik]:
+        """An object a row."""
         from armkin.inverse import choose
 
         most = choose.most_targets(self.request)
@@ -173,7 +208,9 @@ class _Rows:
             found = choose.solve(self.request, targets)
             each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
             for values, goal, (request, one) in zip(part.tolist(), targets, each, strict=True):
-                yield _answer(request, self.task, values, goal, one, **self.show)
+                yield _answer(
+                    request, self.task, values, goal, one, self.all_branches, self.turns, with_closest=with_closest
+                )
                 if self.continuous and one.best is not None:
                     self.request = replace(request, near=one.branches[one.best].joints)
 

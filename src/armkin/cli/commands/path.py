@@ -8,10 +8,10 @@ import typer
 
 from armkin import files
 from armkin.cli import board_link, inputs, lock_and_sweep, output, render
-from armkin.cli.batch import csv_line
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
+from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, output, piped_answers, render
-from armkin.cli.batch import run_batch
-from armkin.cli.csv_rows import batch_rows
-from armkin.cli.options import Batch, Joints, JsonLines, Out, RobotOrPipe, Scene
+from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
 from armkin.cli.render import fixed
-from armkin.cli.rows import Chunk, all_rows, one_row
+from armkin.cli.rows import Chunk, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Pulses
+    from armkin.columns.table import Table
     from armkin.model.arm import Arm
 
 
@@ -34,24 +34,24 @@ def pulses(
     scene: Scene = None,
     json: JsonLines = False,
     batch: Batch = None,
-    out: Out = None,
+    out: BatchOut = None,
+    workers: Workers = 1,
+    cluster: Cluster = None,
+    resume: Resume = False,
 ) -> None:
     """Motor pulses from home to a pose.
 
     Whole steps counted from home, halves away from zero; for RC servos the pulse width, for bus servos
     the count. Also where these pulses put the joints and the tip.
     """
-    from armkin.motors import motor_names
-
     if batch is not None:
         inputs.no_numbers(q)
-        arm = inputs.load(inputs.named(robot), scene)
-        chunks = batch_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
+        arm, values = inputs.load(inputs.named(robot), scene), list[list[float]]()
     else:
         arm, values = piped_answers.poses(robot, q, scene)
-        chunks = all_rows(values)
     origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
     if batch is None and len(values) == 1:
+        inputs.one_alone(workers, cluster, resume)
         [answer] = _answers(arm, one_row(values[0]), origin, best)
         with output.destination(out) as write:
             write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
@@ -59,17 +59,34 @@ def pulses(
         for name in answer["outside_travel"]:
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
-    motors = [f"pulses_{name}" for name in motor_names(arm)]
-    actual = [f"actual_{name}" for name in arm.joint_names]
-    tally = run_batch(
-        chunks,
-        out,
-        json,
-        lambda chunk: _answers(arm, chunk, origin, best),
-        [*arm.joint_names, *motors, *actual, "x", "y", "z", "error_mm", "within_limits"],
-        lambda _, a: [_record(a)],
-    )
-    tally.warn_of_limits()
+    from armkin.cli.batch import Batch as Run
+    from armkin.cli.pieces import Rows
+
+    rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
+    asked = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
+    questions = Questions(arm, origin, best)
+    Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
+
+
+@dataclass(frozen=True)
+class Questions:
+    """What is asked of each row of a batch."""
+
+    arm: Arm
+    origin: list[float]
+    best: bool
+    unsolvable = False
+
+    def table(self, chunk: Chunk) -> tuple[Table, Any]:
+        """The columns, and which rows are within limits."""
+        from armkin.columns import postures
+
+        found = postures.counts(self.arm, chunk.values, self.best)
+        return found, found["within_limits"]
+
+    def objects(self, chunk: Chunk) -> Iterator[Pulses]:
+        """An object a row."""
+        return _answers(self.arm, chunk, self.origin, self.best)
 
 
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
@@ -131,11 +148,6 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
             answer["gain_mm"] = gains[i]
             answer["tried"] = found.tried
         yield answer
-
-
-def _record(answer: Pulses) -> list[Any]:
-    motion = [*answer["joints"], *answer["pulses"], *answer["actual_joints"]]
-    return [*motion, *answer["position_mm"]["actual"], answer["error_mm"], answer["within_limits"]]
 
 
 def _text(arm: Arm, answer: Pulses) -> str:

@@ -7,11 +7,11 @@ from typing import Annotated
 import typer
 
 from armkin.cli import board_link, inputs, output
-from armkin.cli.batch import csv_line
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Out, Robot
+from armkin.columns.cells import csv_line
 from armkin.errors import UsageError
 from armkin.model import units
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import board_link, inputs, output, render
-from armkin.cli.batch import csv_line
 from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
 from armkin.cli.send_goals import goals as read_goals
+from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

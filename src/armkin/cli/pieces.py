@@ -1,0 +1,135 @@
+"""Pieces of a batch's input: so many rows each, read one after the other and parsed wherever the piece is answered."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from armkin import files
+from armkin.cli import csv_rows
+from armkin.cli.csv_rows import Columns
+from armkin.cli.numbers import LARGEST
+from armkin.cli.rows import Chunk
+from armkin.errors import ArmkinError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+
+
+class Piece(NamedTuple):
+    """Some rows: lines of text with what the heading says of them, or values (N, m).
+
+    number: from 0; first: the first row's number, from 1; source: what messages call the input.
+    """
+
+    number: int
+    first: int
+    source: str
+    names: tuple[str, ...]
+    lines: bytes = b""
+    columns: Columns | None = None
+    values: Array | None = None
+
+    def digest(self) -> str:
+        """What tells this input from another."""
+        data = self.lines if self.values is None else self.values.tobytes()
+        return hashlib.sha256(data).hexdigest()
+
+
+class Rows:
+    """The rows of a file, of standard input ("-") or of a list, in pieces."""
+
+    def __init__(
+        self,
+        source: str | None,
+        names: Sequence[str],
+        what: str,
+        named: Mapping[str, Sequence[float]] | None = None,
+        values: Sequence[Sequence[float]] = (),
+    ) -> None:
+        """source: a name, or None for values that are there already; the rest: see `csv_rows.Columns`."""
+        self.source, self.names, self.what, self.named, self.values = source, tuple(names), what, named, values
+        if source is not None:
+            files.keep(0 if source == "-" else source)  # before an output of that name is opened
+
+    @property
+    def size(self) -> int | None:
+        """Of the file [bytes]; None for what is no file."""
+        return os.path.getsize(self.source) if self.source is not None and os.path.isfile(self.source) else None
+
+    def __iter__(self) -> Iterator[Piece]:
+        if self.source is None:
+            import numpy as np
+
+            return self._of_values([np.array(self.values)])
+        if self.source != "-" and not self.source.lower().endswith((".npz", ".parquet", ".jsonl")):
+            return self._of_text(self.source)
+        from armkin.columns.reading import reader_of
+
+        read = reader_of(self.source)
+        if read is None:
+            return self._of_text(self.source)
+        return self._of_values(read(self.source, self.names, csv_rows.ROWS))
+
+    def empty(self, skipped: int) -> ArmkinError:
+        """The error of an input without rows."""
+        why = "has no row with values" if skipped else "is empty"
+        name = csv_rows.name_of(self.source or "-")
+        return UsageError(f"{name} {why}; it needs one row of {','.join(self.names)} per pose")
+
+    def _of_values(self, chunks: Any) -> Iterator[Piece]:
+        first = 1
+        for number, values in enumerate(chunks):
+            yield Piece(number, first, csv_rows.name_of(self.source or "-"), self.names, values=values)
+            first += len(values)
+
+    def _of_text(self, source: str) -> Iterator[Piece]:
+        learner = Columns(self.names, self.what, self.named)  # learns the heading, for the pieces after it
+        number, first = 0, 1
+        with csv_rows.opened(source) as file:
+            while lines := csv_rows.lines_of(file, source):
+                columns = copy.copy(learner)
+                columns.skipped = 0
+                yield Piece(number, first, csv_rows.name_of(source), self.names, b"".join(lines), columns)
+                for i, line in enumerate(lines, first):
+                    if learner.begun:
+                        break
+                    try:
+                        learner.row(line, i)
+                    except UsageError:
+                        break
+                number, first = number + 1, first + len(lines)
+
+
+def parsed(piece: Piece) -> Iterator[Chunk]:
+    """The rows of a piece; a malformed one raises UsageError, after those before it were given out."""
+    if piece.values is not None:
+        yield from _checked(piece, piece.values)
+        return
+    assert piece.columns is not None
+    lines = piece.lines.split(b"\n")
+    if not lines[-1]:
+        lines.pop()
+    yield from csv_rows.chunk_of(lines, piece.first, piece.columns, piece.source)
+
+
+def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:
+    """Rows of finite numbers; rows without any are passed over."""
+    import numpy as np
+
+    absent = np.isnan(values)
+    numbers = np.arange(piece.first, piece.first + len(values))
+    keep = np.asarray(~absent.all(axis=1))
+    bad = np.argwhere(~(np.abs(values) <= LARGEST) & keep[:, None])
+    end = int(bad[0, 0]) if len(bad) else len(values)
+    some = np.flatnonzero(keep[:end])
+    if len(some):
+        yield Chunk(numbers[some].tolist(), values[some])
+    if len(bad):
+        row, column = bad[0].tolist()
+        value = values[row, column]
+        why = "a number is missing" if np.isnan(value) else f"{value:g} is too large; numbers here go up to {LARGEST:g}"
+        raise UsageError(f"{piece.source}: row {numbers[row]}: {piece.names[column]}: {why}", row=int(numbers[row]))

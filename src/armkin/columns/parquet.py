@@ -1,0 +1,50 @@
+"""Tables as Parquet, by pyarrow: numbers without a value are null."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterable
+from typing import IO, Any
+
+from armkin.columns.table import Column, Table, Words
+from armkin.errors import MissingExtraError
+
+
+def require() -> Any:
+    """pyarrow. Raises MissingExtraError where it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingExtraError("Parquet needs pyarrow: pip install 'armkin[tables]'") from None
+    return pyarrow
+
+
+def encoded(table: Table) -> bytes:
+    """A table as the bytes of an Arrow stream, which `together` makes a row group of."""
+    pa = require()
+    whole = pa.table({name: _array(pa, column) for name, column in table.items()})
+    out = io.BytesIO()
+    with pa.ipc.new_stream(out, whole.schema) as stream:
+        stream.write_table(whole)
+    return out.getvalue()
+
+
+def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
+    """One Parquet file, a row group a part."""
+    pa = require()
+    writer = None
+    for part in parts():
+        table = pa.ipc.open_stream(part.read()).read_all()
+        if writer is None:
+            writer = pa.parquet.ParquetWriter(file, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
+
+
+def _array(pa: Any, column: Column) -> Any:
+    if isinstance(column, Words):
+        names = pa.array([*column.names, None], pa.string())
+        return names.take(pa.array(column.index % (len(column.names) + 1)))
+    return pa.array(column, from_pandas=True)

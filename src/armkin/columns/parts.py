@@ -1,0 +1,157 @@
+"""Finished chunks of a long command in a folder beside its file, FILE.parts: a later run goes on with them.
+
+A part is one whole file: a line of JSON about it, then its bytes. It is written aside, flushed to the disk and renamed,
+so that a part that is there is whole, whatever ended the run. `job.json` says what was asked: parts of another job are
+never mixed in. `lock` keeps two runs from one folder, and the system opens it when its run ends, however that ends.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+from armkin.errors import FileError, UnfinishedError, UsageError
+
+_ASIDE = ".writing"  # ends the name of what is not whole yet
+
+
+class Parts:
+    """The parts of one file."""
+
+    def __init__(self, path: str, job: Mapping[str, Any]) -> None:
+        """path: of the file; job: what was asked, by names that a message can tell; values of JSON."""
+        self.path = path
+        self.folder = Path(f"{os.path.realpath(path)}.parts")
+        self.job = {name: json.loads(json.dumps(value)) for name, value in job.items()}
+        self._lock: Any = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is such a folder."""
+        return self.folder.is_dir()
+
+    @property
+    def held(self) -> bool:
+        """Whether this run has the folder."""
+        return self._lock is not None
+
+    def refuse_begun(self) -> None:
+        """Raise UnfinishedError if an earlier run has left its parts."""
+        if self.begun:
+            raise UnfinishedError(
+                f"{self.path}.parts holds what an earlier run has finished", file=self.path, parts=str(self.folder)
+            )
+
+    def begin(self) -> None:
+        """Take the folder, making it if there is none, and sweep what a killed run has left half written.
+
+        Raises UsageError if its parts are of another job, FileError if another run has the folder.
+        """
+        from filelock import FileLock, Timeout
+
+        with self._errors():
+            self.folder.mkdir(exist_ok=True)
+            lock = FileLock(self.folder / "lock")
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                raise FileError(f"{self.path}.parts: another run works on it", file=self.path) from None
+            self._lock = lock
+            try:
+                self._check_job()
+            except BaseException:
+                self.leave()
+                raise
+            for left in self.folder.glob(f"*{_ASIDE}"):
+                left.unlink()
+
+    def _check_job(self) -> None:
+        place = self.folder / "job.json"
+        try:
+            before = json.loads(place.read_text("utf-8"))
+        except FileNotFoundError:
+            self._write(place, json.dumps(self.job).encode())
+            return
+        except ValueError:
+            raise FileError(f"{place}: this is no job of armkin's; remove {self.folder}", file=str(place)) from None
+        other = [name for name in {**before, **self.job} if before.get(name) != self.job.get(name)]
+        if other:
+            now = ", ".join(other)
+            raise UsageError(
+                f"{self.path}.parts belongs to another job: {now} differ{'s' if len(other) == 1 else ''} from before; "
+                f"give them as they were, or remove {self.folder}",
+                file=self.path,
+                differs=other,
+            )
+
+    def about(self, number: int) -> dict[str, Any] | None:
+        """What was said of a part when it was kept; None if it is missing."""
+        try:
+            with open(self._place(number), "rb") as file:
+                return dict(json.loads(file.readline()))
+        except FileNotFoundError:
+            return None
+
+    def keep(self, number: int, about: Mapping[str, Any], data: bytes) -> None:
+        """Keep a finished part. Raises UnfinishedError for a full disk: the parts so far stay."""
+        with self._errors():
+            self._write(self._place(number), json.dumps(about).encode() + b"\n" + data)
+
+    def opened(self, count: int) -> Iterator[IO[bytes]]:
+        """The bytes of the first parts, one file after the other: each is closed when the next is opened."""
+        for number in range(count):
+            with open(self._place(number), "rb") as file:
+                file.readline()
+                if file.tell() < os.fstat(file.fileno()).st_size:  # rows without values leave none
+                    yield file
+
+    def leave(self) -> None:
+        """Let go of the folder; its parts stay."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+    def remove(self) -> None:
+        """The file is whole: the parts go."""
+        self.leave()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _place(self, number: int) -> Path:
+        return self.folder / f"{number:08d}"
+
+    def _write(self, place: Path, data: bytes) -> None:
+        aside = Path(f"{place}{_ASIDE}")
+        try:
+            with open(aside, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(aside, place)
+        except OSError:
+            with suppress(OSError):
+                aside.unlink()
+            raise
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else error.strerror or error
+            raise UnfinishedError(
+                f"{self.path}: cannot write: {why}; what is finished stays in {self.path}.parts",
+                file=self.path,
+                parts=str(self.folder),
+            ) from None
+
+
+def digest(data: bytes) -> str:
+    """What tells inputs apart."""
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,126 @@
+"""Columns of numbers from .npz, .parquet and .jsonl, some rows at a time."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armkin.columns import parquet
+from armkin.errors import FileError, UsageError
+from armkin.formula.arrays import Array
+
+
+def reader_of(path: str) -> Callable[[str, Sequence[str], int], Iterator[Array]] | None:
+    """What reads a file of columns, by its ending; None: it is text of rows.
+
+    It is called with the path, the columns wanted and how many rows to give at a time, and yields (N, columns).
+    """
+    return {".npz": _npz, ".parquet": _parquet, ".jsonl": _json_lines}.get(Path(path).suffix.lower())
+
+
+def places(heading: Sequence[str], name: str) -> list[int]:
+    """Columns of a name: those of exactly this name, or those with a unit behind it."""
+    exact = [i for i, cell in enumerate(heading) if cell == name]
+    others = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
+    return exact or [i for i, cell in enumerate(heading) if cell in others]
+
+
+def _chosen(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The file's names of the columns wanted."""
+    lower = [cell.lower() for cell in heading]
+    found = {name: places(lower, name.lower()) for name in names}
+    missing = [name for name, there in found.items() if not there]
+    if missing:
+        some = ", ".join(heading[:20])
+        raise UsageError(f"{path} has no column{'s' * (len(missing) > 1)} {', '.join(missing)}; it has {some}")
+    double = [name for name, there in found.items() if len(there) > 1]
+    if double:
+        raise UsageError(f"{path} has two columns {double[0]}")
+    return [heading[there[0]] for there in found.values()]
+
+
+def _npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    try:
+        with ExitStack() as stack:
+            archive = stack.enter_context(zipfile.ZipFile(path))
+            heading = [name.removesuffix(".npy") for name in archive.namelist()]
+            files = [stack.enter_context(archive.open(f"{name}.npy")) for name in _chosen(path, heading, names)]
+            heads = [_head(path, name, file) for name, file in zip(names, files, strict=True)]
+            if len({count for count, _ in heads}) > 1:
+                raise UsageError(f"{path}: its columns are not of one length")
+            for start in range(0, heads[0][0], rows):
+                some = min(rows, heads[0][0] - start)
+                columns = [
+                    np.frombuffer(file.read(some * dtype.itemsize), dtype)
+                    for file, (_, dtype) in zip(files, heads, strict=True)
+                ]
+                yield np.column_stack(columns).astype(float)
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        if isinstance(error, UsageError):
+            raise
+        raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
+
+
+def _head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if len(shape) != 1 or dtype.kind not in "iuf":
+        raise UsageError(f"{path}: {name} is no column of numbers: its shape is {shape}, its type {dtype}")
+    return shape[0], dtype
+
+
+def _parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    pa = parquet.require()
+    try:
+        file = pa.parquet.ParquetFile(path)
+        chosen = _chosen(path, file.schema_arrow.names, names)
+        for batch in file.iter_batches(batch_size=rows, columns=chosen):
+            columns = [batch.column(name) for name in chosen]
+            for name, column in zip(chosen, columns, strict=True):
+                if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+                    raise UsageError(f"{path}: {name} is no column of numbers: its type is {column.type}")
+            yield np.column_stack([c.cast(pa.float64()).to_numpy(zero_copy_only=False) for c in columns])
+    except (OSError, pa.ArrowException) as error:
+        raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
+
+
+def _json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    chosen: list[str] = []
+    try:
+        with open(path, encoding="utf-8") as file:
+            numbered = ((i, line) for i, line in enumerate(file, 1) if line.strip())
+            while lines := list(itertools.islice(numbered, rows)):
+                table = []
+                for number, line in lines:
+                    row = _object(path, number, line)
+                    chosen = chosen or _chosen(path, list(row), names)
+                    table.append([_number(path, number, name, row.get(name)) for name in chosen])
+                yield np.array(table, dtype=float)
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
+
+
+def _object(path: str, number: int, line: str) -> dict[str, Any]:
+    try:
+        row = json.loads(line)
+    except ValueError:
+        row = None
+    if not isinstance(row, dict):
+        raise UsageError(f"{path}: row {number}: this is no JSON object", row=number)
+    return row
+
+
+def _number(path: str, number: int, name: str, value: Any) -> float:
+    if value is None:
+        return np.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise UsageError(f"{path}: row {number}: {name}: {json.dumps(value)[:40]} is no number", row=number)
+    return float(value)

@@ -1,0 +1,106 @@
+"""Tables as CSV and JSON Lines: every number with the fewest digits that read back to the same double.
+
+The digits are those of Python's `repr`. Where pyarrow is installed it prints whole columns, several times as fast; what
+it prints in another way (whole numbers, small and large ones) is printed by Python, so that the bytes are the same.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.columns.cells import cell
+from armkin.columns.table import Column, Table, Words, rows
+
+WORTH = 2_000  # rows for which pyarrow is worth its import
+
+
+def csv(table: Table) -> bytes:
+    """The rows of a table as CSV, without a heading."""
+    names = list(table)
+    between = ["", *[","] * (len(names) - 1), "\n"]
+    return _written(table, between, cell, "")
+
+
+def json_lines(table: Table) -> bytes:
+    """The rows of a table as flat JSON objects, one a line."""
+    between = [("{" if i == 0 else ", ") + json.dumps(name) + ": " for i, name in enumerate(table)]
+    return _written(table, [*between, "}\n"], json.dumps, "null")
+
+
+def _written(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+    """All rows: between[i] stands before column i, the last one at the end."""
+    count = rows(table)
+    if count >= WORTH and (arrow := _arrow()) is not None:
+        return _by_arrow(arrow, table, between, quoted, missing)
+    columns = [_texts(column, quoted, missing) for column in table.values()]
+    if not count:
+        return b""
+    line = "%s".join(text.replace("%", "%%") for text in between)
+    return "".join([line % row for row in zip(*columns, strict=True)]).encode()
+
+
+def _texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[str]:
+    if isinstance(column, Words):
+        names = [*map(quoted, column.names), missing]
+        return [names[i] for i in column.index.tolist()]
+    if column.dtype == bool:
+        return ["true" if value else "false" for value in column.tolist()]
+    if column.dtype.kind != "f":
+        return list(map(str, column.tolist()))
+    texts = list(map(repr, column.tolist()))
+    for row in np.flatnonzero(np.isnan(column)).tolist():
+        texts[row] = missing
+    return texts
+
+
+@cache
+def _arrow() -> Any:
+    """pyarrow with its functions, or None where it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.compute
+    except ImportError:
+        return None
+    return pyarrow
+
+
+def _by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+    pieces: list[Any] = []
+    for before, column in zip(between, table.values(), strict=False):
+        if before:
+            pieces.append(pa.scalar(before))
+        pieces.append(_arrow_texts(pa, column, quoted, missing))
+    lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[-1]), "")
+    _, offsets, data = lines.buffers()
+    ends = np.frombuffer(offsets, np.int32, len(lines) + 1, 4 * lines.offset)
+    return bytes(memoryview(data)[ends[0] : ends[-1]])
+
+
+def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing: str) -> Any:
+    if isinstance(column, Words):
+        names = pa.array([*map(quoted, column.names), missing], pa.string())
+        return names.take(pa.array(np.where(column.index < 0, len(column.names), column.index)))
+    if column.dtype == bool:
+        return pa.array(["false", "true"]).take(pa.array(column.astype(np.int64)))
+    values = np.ascontiguousarray(column)
+    texts = pa.array(values).cast(pa.string())
+    if values.dtype.kind != "f":
+        return texts
+    odd = _printed_otherwise(values)
+    if odd.any():
+        words = [missing if value != value else repr(value) for value in values[odd].tolist()]
+        texts = pa.compute.replace_with_mask(texts, pa.array(odd), pa.array(words, pa.string()))
+    return texts
+
+
+def _printed_otherwise(values: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Where pyarrow's digits are not laid out as Python's: 1 for 1.0, 1e-7 for 1e-07, 1e+10 for 10000000000.0, nan."""
+    size = np.abs(values)
+    plain = (values != np.rint(values)) & (((size >= 1e-3) & (size < 1e9)) | ((size < 1e-10) & (size > 1e-99)))
+    return np.asarray(~plain)

@@ -1,0 +1,137 @@
+"""A Dask cluster: chunks go to its workers, a window of them at a time.
+
+A worker that is killed loses its chunks, and the scheduler gives them to another. A scheduler that is killed ends the
+run; what is finished is with the client. The job travels with every chunk, as bytes that a worker unpacks once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import platform
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from functools import lru_cache
+from importlib import import_module
+from typing import Any, TypeVar
+
+from armkin.errors import ArmkinError, ClusterError, MissingExtraError
+
+Chunk = TypeVar("Chunk")
+Result = TypeVar("Result")
+
+SECONDS = 10  # until a scheduler that does not answer is given up
+AHEAD = 3  # chunks a thread of the workers
+
+
+def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
+    """See `armkin.engines.run.in_order`. Raises ClusterError for a scheduler that cannot be reached or goes away."""
+    client = _client(address)
+    try:
+        _check_workers(client, address)
+        data = pickle.dumps((work, job))
+        yield from _results(client, address, data, iter(chunks))
+    finally:
+        with suppress(Exception):  # a scheduler that is gone cannot be told
+            client.close(timeout=2)
+
+
+def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> Iterator[Any]:
+    waiting: deque[Any] = deque()
+    name = hashlib.sha256(data).hexdigest()
+    while True:
+        try:
+            threads = sum(client.nthreads().values()) if not waiting else 0
+            window = max(AHEAD * threads, 2, len(waiting))
+            while len(waiting) < window and (some := next(source, waiting)) is not waiting:
+                waiting.append(client.submit(_done, data, name, some, pure=False))
+            if not waiting:
+                return
+            result = waiting.popleft().result()
+        except ArmkinError:
+            raise
+        except Exception as error:
+            raise _lost(client, address, error) from None
+        yield result
+        # one out, one in: the window stays full
+        with suppress(StopIteration):
+            waiting.append(client.submit(_done, data, name, next(source), pure=False))
+
+
+def _lost(client: Any, address: str, error: Exception) -> ClusterError:
+    kind = type(error).__name__
+    if kind == "KilledWorker":
+        return ClusterError(f"{address}: the same chunk has ended several workers: out of memory?", address=address)
+    if client.status != "running" or kind in ("CancelledError", "FutureCancelledError", "CommClosedError"):
+        return ClusterError(f"{address}: the scheduler is gone", address=address)
+    return ClusterError(f"{address}: a chunk failed: {kind}: {error}", address=address)
+
+
+def _client(address: str) -> Any:
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise MissingExtraError("a cluster needs Dask: pip install 'armkin[cluster]'") from None
+    import logging
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is said here
+    try:
+        return distributed.Client(address, timeout=SECONDS, set_as_default=False)
+    except (OSError, ValueError, TypeError, ImportError) as error:
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ClusterError(
+            f"{address}: no scheduler answers ({why}); start one with: dask scheduler", address=address
+        ) from None
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Raise ClusterError if there is no worker, or one that would compute with another armkin, numpy or Python."""
+    try:
+        client.wait_for_workers(1, timeout=SECONDS)
+        told = client.run(versions)
+    except TimeoutError:
+        raise ClusterError(
+            f"{address}: the scheduler has no worker; start one with: dask worker {address}", address=address
+        ) from None
+    except Exception as error:
+        raise ClusterError(f"{address}: a worker has no armkin of this version: {error}", address=address) from None
+    here = versions()
+    for worker, there in told.items():
+        other = [name for name in here if here[name] != there.get(name)]
+        if other:
+            found = ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in other)
+            raise ClusterError(f"{address}: worker {worker} has {found}", address=address)
+
+
+def versions() -> dict[str, str]:
+    """What must be the same on every worker."""
+    import numpy
+
+    from armkin import __version__
+
+    return {"armkin": __version__, "numpy": numpy.__version__, "Python": platform.python_version().rpartition(".")[0]}
+
+
+def _done(data: bytes, name: str, chunk: Any) -> Any:
+    work, job = _unpacked(_Packed(data, name))
+    return work(job, chunk)
+
+
+class _Packed:
+    """A job's bytes, told apart by their name alone."""
+
+    def __init__(self, data: bytes, name: str) -> None:
+        self.data, self.name = data, name
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Packed) and self.name == other.name
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+
+@lru_cache(maxsize=4)
+def _unpacked(packed: _Packed) -> tuple[Callable[[Any, Any], Any], Any]:
+    work, job = pickle.loads(packed.data)
+    return work, job

@@ -1,0 +1,69 @@
+"""A pool of processes on this machine. A process that is killed takes its chunks with it: they are done again."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from armkin.errors import ClusterError
+
+Chunk = TypeVar("Chunk")
+Result = TypeVar("Result")
+
+AHEAD = 2  # chunks a process that wait for it, or for those before them
+PATIENCE = 3  # times that the process of the same chunk may end
+
+_job: tuple[Callable[[Any, Any], Any], Any] | None = None
+
+
+def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
+    """See `armkin.engines.run.in_order`."""
+    source = iter(chunks)
+    waiting: deque[tuple[Chunk, Future[Result]]] = deque()
+    pool, lost = _pool(workers, work, job), 0
+    try:
+        while True:
+            while len(waiting) < AHEAD * workers and (some := next(source, waiting)) is not waiting:
+                waiting.append((some, pool.submit(_done, some)))  # type: ignore[arg-type]
+            if not waiting:
+                return
+            try:
+                result = waiting[0][1].result()
+            except BrokenProcessPool:
+                lost += 1
+                if lost > PATIENCE:
+                    why = f"the process of the same chunk has ended {lost} times: out of memory?"
+                    raise ClusterError(why) from None
+                pool.shutdown(wait=True, cancel_futures=True)
+                pool = _pool(workers, work, job)
+                waiting = deque((chunk, pool.submit(_done, chunk)) for chunk, _ in waiting)
+                continue
+            lost = 0
+            waiting.popleft()
+            yield result
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _pool(workers: int, work: Callable[[Any, Any], Any], job: Any) -> ProcessPoolExecutor:
+    # new interpreters: a copy of this one would have its threads' locks without the threads
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, context, _begin, (work, job))
+
+
+def _begin(work: Callable[[Any, Any], Any], job: Any) -> None:
+    """In a new process: Ctrl-C is the parent's matter."""
+    global _job
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _job = work, job
+
+
+def _done(chunk: Any) -> Any:
+    assert _job is not None
+    work, job = _job
+    return work(job, chunk)

@@ -1,0 +1,39 @@
+"""Chunks in, results out, in the order of the chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, TypeVar
+
+Chunk = TypeVar("Chunk")
+Result = TypeVar("Result")
+
+
+class Engine(NamedTuple):
+    """workers: processes on this machine; cluster: the address of a Dask scheduler instead."""
+
+    workers: int = 1
+    cluster: str | None = None
+
+    @property
+    def alone(self) -> bool:
+        """Whether all is done in this process."""
+        return self.workers == 1 and self.cluster is None
+
+
+def in_order(
+    engine: Engine, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]
+) -> Iterator[Result]:
+    """``work(job, chunk)`` of every chunk; work is a function of a module, job and chunks can be pickled.
+
+    Chunks are taken as they are needed. Raises what `work` raises; ClusterError.
+    """
+    if engine.cluster is not None:
+        from armkin.engines import cluster
+
+        return cluster.in_order(engine.cluster, work, job, chunks)
+    if engine.workers > 1:
+        from armkin.engines import pool
+
+        return pool.in_order(engine.workers, work, job, chunks)
+    return (work(job, chunk) for chunk in chunks)

@@ -1,0 +1,251 @@
+"""Batches by columns: the bytes of CSV, other files, processes, and going on with what is finished."""
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armkin.cli import batch, csv_rows
+from armkin.cli.csv_rows import Columns
+from armkin.columns import parts, text
+from armkin.columns.cells import csv_line
+from armkin.columns.table import Table, Words
+from armkin.errors import UnfinishedError
+from command_line import THREE_DOF, Result, run
+
+ODD = [0.0, -0.0, 1.0, -1.0, 1e-3, 1e-4, 9.9e-5, 1.5e-7, 1e-10, 1e-9, 1e9, 1e10, 1e15, 1e16, 1e17, 1e22, 5e-324, 1e-99]
+ODD += [1e-100, 2.5e-100, 1.7976931348623157e308, 0.1, 1 / 3, 123456789.125, 1234567890.5, 9007199254740993.0, np.nan]
+
+
+def by_python(table: Table, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
+    monkeypatch.setattr(text, "WORTH", 10**9)
+    return text.csv(table), text.json_lines(table)
+
+
+@pytest.fixture
+def table() -> Table:
+    bits = np.random.default_rng(3).integers(0, 2**63, 20_000).view(np.float64)
+    values = np.concatenate(
+        [ODD, np.negative(ODD), np.round(bits[:2000] % 1000, 3), np.where(np.isfinite(bits), bits, 0.0)]
+    )
+    words = Words(np.arange(len(values)) % 4 - 1, ("left", 'with, comma and "quote"', "right"))
+    return {"row": np.arange(len(values)), "word": words, "value": values, "legal": values > 0}
+
+
+def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    fast = text.csv(table), text.json_lines(table)
+    assert fast == by_python(table, monkeypatch)
+    names = ["", 'with, comma and "quote"', "right"]
+    assert fast[0].splitlines()[7] == b"7,right,1.5e-07,true"
+    assert csv_line([names[1]]).encode() in fast[0]
+    json_rows = [json.loads(line) for line in fast[1].splitlines()]
+    assert json_rows[0] == {"row": 0, "word": None, "value": 0.0, "legal": False}
+    assert json_rows[len(ODD) - 1]["value"] is None
+
+
+@given(st.lists(st.floats(-1e9, 1e9), min_size=4, max_size=4), st.sampled_from(["%r", " %r", "%.3f", "%.17e"]))
+def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> None:
+    words = [form % value for value in row]
+    lines = [",".join(words).encode()] * 3000
+    columns = Columns("abcd", "a test")
+    columns.begun = True
+    found = columns.all_plain(lines)
+    assert found is not None
+    assert found.tolist() == [[float(word) for word in words]] * 3000
+
+
+@pytest.fixture
+def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A batch of ten pieces for three_dof; some rows have no branch within limits."""
+    monkeypatch.setattr(csv_rows, "ROWS", 30)
+    values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
+    path = tmp_path / "in.csv"
+    path.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")
+    return path
+
+
+def ik(source: Path, out: Path, *more: object) -> Result:
+    return run("ik", THREE_DOF, "--batch", source, "--out", out, *more)
+
+
+@pytest.mark.parametrize("more", [[], ["--all-branches"], ["--branch", "left"], ["--near", "10,20,-30"]])
+def test_columns_are_what_objects_say(rows: Path, more: list[str]) -> None:
+    lines = run("ik", THREE_DOF, "--batch", rows, "--json", *more).lines
+    found = run("ik", THREE_DOF, "--batch", rows, *more).out.splitlines()
+    wanted = []
+    for number, answer in enumerate(lines, 2):
+        for branch in answer["branches"]:
+            rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
+            name = branch["name"].replace(",", "")
+            wanted.append(csv_line([number, answer["status"], name, *branch["joints"], *rest]))
+        if not answer["branches"]:
+            wanted.append(csv_line([number, answer["status"], None, None, None, None, False, None, None, None]))
+    assert found[1:] == wanted
+
+
+def test_every_format_holds_the_same_and_is_read_again(rows: Path, tmp_path: Path) -> None:
+    outs = {end: tmp_path / f"out.{end}" for end in ("csv", "npz", "parquet", "jsonl")}
+    assert {ik(rows, out).code for out in outs.values()} == {3}
+    csv = [line.split(",") for line in outs["csv"].read_text().splitlines()]
+    npz = np.load(outs["npz"])
+    parquet = pyarrow.parquet.read_table(outs["parquet"])
+    lines = [json.loads(line) for line in outs["jsonl"].read_text().splitlines()]
+    assert csv[0] == list(npz) == parquet.column_names == list(lines[0])
+    for i, name in enumerate(csv[0]):
+        flat = [line[name] for line in lines]
+        assert parquet[name].to_pylist() == flat
+        cells = ["" if v is None else str(v).lower() if isinstance(v, bool) else str(v) for v in flat]
+        assert cells == [row[i] for row in csv[1:]]
+        missing = "" if any(isinstance(value, str) for value in flat) else np.nan
+        column = [missing if value is None else value for value in flat]
+        assert np.array_equal(npz[name], np.array(column), equal_nan=npz[name].dtype.kind == "f")
+    again = {end: run("fk", THREE_DOF, "--batch", out).out for end, out in outs.items()}
+    assert len(set(again.values())) == 1
+    assert len(again["csv"].splitlines()) > 50
+
+
+def test_json_is_no_archive(rows: Path, tmp_path: Path) -> None:
+    for end in ("npz", "parquet"):
+        assert ik(rows, tmp_path / f"out.{end}", "--json").code == 2
+
+
+@pytest.mark.parametrize("end", ["csv", "npz", "parquet"])
+def test_processes_change_no_byte(rows: Path, tmp_path: Path, end: str) -> None:
+    one, two = tmp_path / f"one.{end}", tmp_path / f"two.{end}"
+    assert ik(rows, one) == ik(rows, two, "--workers", 2)
+    assert one.read_bytes() == two.read_bytes()
+
+
+def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseException) -> list[int]:
+    """Let a run end when so many pieces are kept; returns the numbers of the pieces that are answered."""
+    answered: list[int] = []
+    work = batch.work
+
+    def counted(job: Any, piece: Any) -> Any:
+        if len(answered) == pieces:
+            raise error
+        answered.append(piece.number)
+        return work(job, piece)
+
+    monkeypatch.setattr(batch, "work", counted)
+    return answered
+
+
+@pytest.mark.parametrize("end", ["csv", "npz", "parquet", "jsonl"])
+@pytest.mark.parametrize("more", [[], ["--continuous"]])
+def test_a_run_goes_on_where_it_was_ended(
+    rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str, more: list[str]
+) -> None:
+    whole, out = tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
+    done = ik(rows, whole, *more)
+    with monkeypatch.context() as patch:
+        stop_after(4, patch, KeyboardInterrupt())
+        assert ik(rows, out, *more).code == 130
+    folder = tmp_path / f"out.{end}.parts"
+    assert sorted(path.name for path in folder.iterdir() if path.name[0] == "0") == [f"{i:08d}" for i in range(4)]
+    (folder / "00000004.writing").write_bytes(b"half")
+    refused = ik(rows, out, *more)
+    assert refused.code == 1
+    assert f"out.{end}.parts holds what an earlier run has finished" in refused.err
+    answered = stop_after(99, monkeypatch, KeyboardInterrupt())
+    assert ik(rows, out, *more, "--resume") == done
+    assert answered == [4, 5, 6, 7, 8, 9]
+    assert out.read_bytes() == whole.read_bytes()
+    assert not folder.exists()
+
+
+def test_another_job_is_refused_and_loses_nothing(rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out.csv"
+    with monkeypatch.context() as patch:
+        stop_after(4, patch, KeyboardInterrupt())
+        ik(rows, out)
+    before = rows.read_bytes()
+    for more, word in ((["--all-branches"], "all_branches"), (["--near", "1,2,3"], "near")):
+        refused = ik(rows, out, *more, "--resume")
+        assert refused.code == 2
+        assert f"belongs to another job: {word} differs" in refused.err
+    rows.write_bytes(before + b"1,2,3\n")
+    assert "input size differs" in ik(rows, out, "--resume").err
+    rows.write_bytes(before.replace(b"x,y,z", b"x,Y,z"))  # as long, in the first piece
+    assert "the input has changed" in ik(rows, out, "--resume").err
+    rows.write_bytes(before)
+    assert ik(rows, out, "--resume").code == 3
+
+
+def test_two_runs_do_not_share_a_folder(rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out.csv"
+    with monkeypatch.context() as patch:
+        stop_after(4, patch, KeyboardInterrupt())
+        ik(rows, out)
+    job = json.loads((tmp_path / "out.csv.parts" / "job.json").read_text())
+    other = parts.Parts(str(out), job)
+    other.begin()
+    assert "another run works on it" in ik(rows, out, "--resume").err
+    other.leave()
+    assert ik(rows, out, "--resume").code == 3
+
+
+def test_a_full_disk_stops_and_the_run_goes_on_later(
+    rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
+    ik(rows, whole)
+    flush = os.fsync
+    calls: list[int] = []
+
+    def full(number: int) -> None:
+        calls.append(number)
+        if len(calls) == 5:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        flush(number)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        stopped = ik(rows, out)
+    assert stopped.code == 1
+    assert "the disk is full; what is finished stays in" in stopped.err
+    assert "--resume" in stopped.err
+    assert ik(rows, out, "--resume").code == 3
+    assert out.read_bytes() == whole.read_bytes()
+
+
+def test_resume_belongs_to_a_file(rows: Path) -> None:
+    assert run("ik", THREE_DOF, "--batch", rows, "--resume").code == 2
+    assert run("fk", THREE_DOF, 1, 2, 3, "--resume").code == 2
+
+
+def test_bad_archives_are_told(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", x=np.zeros(3), y=np.zeros(2), z=np.zeros(3))
+    np.savez(tmp_path / "b.npz", x=np.zeros(3), y=np.zeros(3))
+    np.savez(tmp_path / "c.npz", x=np.zeros(3), y=np.zeros(3), z=np.array([0, np.inf, 0]))
+    np.savez(tmp_path / "d.npz", x=np.zeros(3), y=np.zeros(3), z=np.array(["a", "b", "c"]))
+    (tmp_path / "e.npz").write_bytes(b"no archive")
+    (tmp_path / "f.parquet").write_bytes(b"no table")
+    (tmp_path / "g.jsonl").write_text('{"x": 1, "y": "two", "z": 3}\n')
+    for name, said in (
+        ("a.npz", "not of one length"),
+        ("b.npz", "has no column z"),
+        ("c.npz", "row 2: z: inf is too large"),
+        ("d.npz", "z is no column of numbers"),
+        ("e.npz", "cannot read"),
+        ("f.parquet", "cannot read"),
+        ("g.jsonl", 'row 1: y: "two" is no number'),
+        ("h.npz", "cannot read"),
+    ):
+        done = run("ik", THREE_DOF, "--batch", tmp_path / name)
+        assert done.code in (1, 2), name
+        assert said in done.err, done.err
+
+
+def test_the_error_of_unfinished_parts_has_its_fields(tmp_path: Path) -> None:
+    (tmp_path / "out.csv.parts").mkdir()
+    with pytest.raises(UnfinishedError) as caught:
+        parts.Parts(str(tmp_path / "out.csv"), {}).refuse_begun()
+    assert caught.value.fields["parts"] == str(tmp_path / "out.csv.parts")
