@@ -2,14 +2,14 @@ import js from "@eslint/js";
 
 const browser = [
   "Blob", "CustomEvent", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver",
-  "URL", "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "location", "matchMedia", "performance",
+  "URL", "URLSearchParams", "addEventListener", "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "history", "location", "matchMedia", "navigator", "performance",
   "requestAnimationFrame", "setInterval", "setTimeout", "window",
 ];
 
 export default [
   js.configs.recommended,
   {
-    files: ["src/armkin/teach/static/js/*.js"],
+    files: ["src/armkin/teach/static/js/*.js", "src/armkin/teach/local/*.js"],
     languageOptions: { globals: Object.fromEntries(browser.map((name) => [name, "readonly"])) },
     rules: {
       eqeqeq: "error",

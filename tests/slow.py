@@ -162,6 +162,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "robot_file/test_robot_file.py": ("test_mutated_files_load_or_are_refused",),
     "robot_file/test_strict_yaml.py": ("test_both_parsers_refuse_the_same",),
+    "teach/test_one_file.py": (),
     "teach/test_teach_board.py": (),
     "teach/test_teach_browser.py": (),
     "teach/test_teach_flow.py": (),

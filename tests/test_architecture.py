@@ -67,7 +67,7 @@ MAY_IMPORT: dict[str, str] = {
     "teach": "keep_out keep_out/shapes"
     " errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
     " motion path_file reachability view board board/ports board/backend board/firmware board/feetech"
-    " board/kinds board/sim",
+    " board/kinds board/sim export/js",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

@@ -8,5 +8,6 @@ program.py          moves recorded one after another, in the words of a path fil
 scene.py            what the page draws: links, bodies, limits
 pose_answers.py     one pose or one target: branches, limits, pulses
 board.py            the actions on the board; board_thread.py: the thread that owns the port
+one_file.py         the page without a server, in one HTML file; local/: what answers in the server's place
 static/             the page itself; static/vendor/three is three.js, byte for byte
 """

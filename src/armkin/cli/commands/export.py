@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,11 +34,18 @@ def export(
     js: Annotated[
         bool, typer.Option("--js", help="An ES module without imports: all branches in a browser or in node.")
     ] = False,
+    html: Annotated[
+        bool,
+        typer.Option("--html", help="One HTML file that asks no server: all branches as it is dragged."),
+    ] = False,
+    path: Annotated[
+        str | None, typer.Option("--path", metavar="FILE", help="With --html: a path file, whose plan the page plays.")
+    ] = None,
     single: Annotated[bool, typer.Option("--float", help="With --c: 32-bit numbers, for microcontrollers.")] = False,
     task: TaskName = None,
     out: Out = None,
 ) -> None:
-    """The arm in other words: URDF, DH tables, screws, JSON, C99, JavaScript.
+    """The arm in other words: URDF, DH tables, screws, JSON, C99, JavaScript, HTML.
 
     All but --c go to stdout, or to the file that --out names. --dh, --mdh and --screws give a robot file: the
     same arm, the same poses.
@@ -51,6 +58,7 @@ def export(
         "--json": (json, lambda arm: _json(arm, out)),
         "--c": (c, lambda arm: _c(arm, task, single, out)),
         "--js": (js, lambda arm: _js(arm, task, out)),
+        "--html": (html, lambda arm: _html(arm, task, path, out)),
     }
     asked = [name for name, (wanted, _) in kinds.items() if wanted]
     if len(asked) != 1:
@@ -58,6 +66,8 @@ def export(
         raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(asked)}" if asked else ""))
     if single and not c:
         raise UsageError("--float goes with --c alone")
+    if path is not None and not html:
+        raise UsageError("--path goes with --html alone")
     kinds[asked[0]][1](inputs.load(robot))
 
 
@@ -94,12 +104,37 @@ def _json(arm: Arm, out: str | None) -> None:
 def _js(arm: Arm, task: str | None, out: str | None) -> None:
     from armkin.export.js.program import module
 
-    try:
+    with _without_lock("JavaScript"):
         text = module(arm, task)
-    except RedundantArmError as error:  # ik's advice is --lock, which a module cannot take
-        raise UsageError(f"{error.message}: no JavaScript for that; armkin.lock in Python holds joints") from None
     with output.destination(out) as write:
         write(text)
+
+
+def _html(arm: Arm, task: str | None, path: str | None, out: str | None) -> None:
+    from armkin.teach.one_file import html
+
+    plan = None
+    if path is not None:
+        from armkin import path_file
+        from armkin.motion.path import path as planned
+
+        file = path_file.read(path)
+        path_file.check_robot(file, arm.name, arm.path)
+        plan = planned(arm, file)
+    with _without_lock("JavaScript"):
+        text = html(arm, task, plan)
+    with output.destination(out) as write:
+        write(text)
+
+
+@contextmanager
+def _without_lock(language: str) -> Iterator[None]:
+    """What `ik` advises, --lock, is none of what a file in another language can take."""
+    try:
+        yield
+    except RedundantArmError as error:
+        advice = "ik --lock and Python's armkin.lock hold joints"
+        raise UsageError(f"{error.message}: no {language} for that; {advice}") from None
 
 
 def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
@@ -112,12 +147,9 @@ def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     if any(letter in path.name for letter in '"\\\n'):
         raise UsageError(f"{path.name}: #include cannot name a header with a quote or a backslash in its name")
     try:
-        texts = program(arm, path.name, task, single)
+        with _without_lock("C"):
+            texts = program(arm, path.name, task, single)
     except UsageError as error:
-        if isinstance(error, RedundantArmError):  # ik's advice is --lock, which a file of C cannot take
-            raise UsageError(
-                f"{error.message}: no C for that; ik --lock and Python's armkin.lock hold joints"
-            ) from None
         if error.fields.get("precision") != "double":
             raise
         raise UsageError(error.message, advice="leave --float away", **error.fields) from None

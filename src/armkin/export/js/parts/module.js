@@ -1,3 +1,6 @@
+/** Names of all branches that a target may have. */
+export const branch_names = ARM.names;
+
 /** @param {ArrayLike<number>} q @returns {number[]} actual joint values of commanded ones, which calibration tells apart */
 function actual(q) {
   if (q.length !== ARM.joints) throw new RangeError(`${ARM.name} has ${ARM.joints} joints, ${names.join(' ')}; got ${q.length} values`);

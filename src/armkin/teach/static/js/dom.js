@@ -1,6 +1,9 @@
 // @ts-check
 /** Small helpers around the document. */
 
+/** Parts of the page that need a server, where there is none. */
+export const absent = document.createDocumentFragment();
+
 /**
  * The element of that id.
  * @template {HTMLElement} [T=HTMLElement]
@@ -8,7 +11,7 @@
  * @returns {T}
  */
 export function get(id) {
-  const found = document.getElementById(id);
+  const found = document.getElementById(id) ?? absent.getElementById(id);
   if (!found) throw new Error(`there is no #${id}`);
   return /** @type {T} */ (found);
 }

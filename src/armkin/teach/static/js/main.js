@@ -4,9 +4,10 @@ import { Board } from "./board.js";
 import { get } from "./dom.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
+import { Latest } from "./latest.js";
 import { Motors } from "./motors.js";
 import { Program } from "./program.js";
-import { act, enter, Latest } from "./server.js";
+import { act, enter } from "./server.js";
 import { Tip } from "./tip.js";
 
 /** @typedef {import("./types.js").Look} Look */
@@ -283,6 +284,7 @@ async function start() {
   one.program.show(opened.program);
   if (opened.board) one.board.show(opened.board);
   one.hold(here.mine);
+  opened.ready?.(one); // of a page without a server
   await one.draw();
   await known; // who holds control
   document.documentElement.dataset.ready = "yes";

@@ -1,8 +1,9 @@
 // @ts-check
 /** The program: record, name, reorder, delete, undo; save and load the path file. */
 import { fixed, get, make } from "./dom.js";
+import { Latest } from "./latest.js";
 import { Player } from "./player.js";
-import { act, Latest } from "./server.js";
+import { act } from "./server.js";
 
 export class Program {
   /**
@@ -16,6 +17,7 @@ export class Program {
     this.player = new Player(arm, page.played, page.settled);
     this.chosen = -1;
     this.count = 0;
+    this.carried = false; // the plan is part of the page
     this.shown = "";
     /** @type {Promise<void>} */
     this.editing = Promise.resolve();
@@ -81,7 +83,22 @@ export class Program {
     }
   }
 
+  /** A plan that is part of the page. @param {import("./types.js").Played} plan */
+  carry(plan) {
+    this.carried = true;
+    this.take(plan);
+  }
+
+  /** @param {import("./types.js").Played} plan */
+  take(plan) {
+    this.player.load(plan);
+    this.page.trail(plan.tips);
+    get("planned").textContent = `${fixed(plan.duration_s, 3)} s, ${fixed(plan.length_mm, 1)} mm on the tool's way`;
+    get("planned").className = "";
+  }
+
   async plan() {
+    if (this.carried) return;
     if (!this.count || !this.page.mine()) {
       this.player.load(null);
       this.page.trail([]);
@@ -89,11 +106,7 @@ export class Program {
       return;
     }
     try {
-      const plan = /** @type {import("./types.js").Played} */ (await act("plan"));
-      this.player.load(plan);
-      this.page.trail(plan.tips);
-      get("planned").textContent = `${fixed(plan.duration_s, 3)} s, ${fixed(plan.length_mm, 1)} mm on the tool's way`;
-      get("planned").className = "";
+      this.take(/** @type {import("./types.js").Played} */ (await act("plan")));
     } catch (error) {
       this.player.load(null);
       this.page.trail([]);

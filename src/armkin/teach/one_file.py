@@ -1,0 +1,102 @@
+"""The page as one HTML file that asks no server: its modules inlined, the arm's own solver in place of the server."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armkin.export.js.program import module
+from armkin.inverse.recognise import solver
+from armkin.model import units
+from armkin.model.arm import actual
+from armkin.motors import pulse_range
+from armkin.teach.program import played
+from armkin.teach.scene import scene
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+
+_STATIC = Path(__file__).parent / "static"
+_LOCAL = Path(__file__).parent / "local" / "local.js"
+_IMPORT = re.compile(r'((?:from|import)\s*\(?\s*)"([./][^"]+)"')
+
+
+def html(arm: Arm, task_name: str | None = None, plan: PathPlan | None = None) -> str:
+    """The arm in one HTML file: every branch as the pose is dragged; plan: of a path, which the page plays.
+
+    Raises UsageError if the task does not fit the arm, or if its class has no form in JavaScript.
+    """
+    modules = {f"js/{path.name}": path.read_text(encoding="utf-8") for path in sorted((_STATIC / "js").glob("*.js"))}
+    modules["js/server.js"] = _LOCAL.read_text(encoding="utf-8").replace('"../static/js/', '"./')
+    for path in sorted((_STATIC / "vendor" / "three").glob("*.js")):
+        modules[f"vendor/three/{path.name}"] = path.read_text(encoding="utf-8")
+    modules |= {"arm.js": module(arm, task_name), "data.js": _data(arm, task_name, plan)}
+    imports = {f"armkin/{name}": _url(_by_name(_stripped(text), name)) for name, text in modules.items()}
+    imports["three"] = imports.pop("armkin/vendor/three/three.module.min.js")
+    import_map = re.sub("<(?=[/!]|script)", r"\\u003c", json.dumps({"imports": imports}), flags=re.IGNORECASE)
+    main = 'import "armkin/js/main.js";'
+    style = (_STATIC / "page.css").read_text(encoding="utf-8")
+    scripts = f"{_hash(import_map)} {_hash(main)} data:"
+    policy = f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; img-src data:"
+    text = (_STATIC / "index.html").read_text(encoding="utf-8")
+    text = re.sub(r'<link rel="(?:modulepreload|stylesheet)"[^>]*>\n', "", text)
+    text = re.sub(r"<script .*?</script>\n", "", text, flags=re.DOTALL)
+    head = (
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>\n'
+        f'<script type="importmap">{import_map}</script>\n<script type="module">{main}</script>\n</head>'
+    )
+    return text.replace("</head>", head, 1)
+
+
+def _stripped(text: str) -> str:
+    """A module without its whole-line comments and indentation; no string of ours goes on over lines."""
+    text = re.sub(r"^[ \t]*/\*\*(?:(?!\*/).)*\*/[ \t]*$", "", text, flags=re.DOTALL | re.MULTILINE)
+    lines = (line.strip() for line in text.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
+
+
+def _by_name(text: str, name: str) -> str:
+    """A module's imports by the names of the import map: a `data:` URL has no place that others stand beside."""
+    folder = Path("/") / Path(name).parent
+
+    def named(match: re.Match[str]) -> str:
+        path = match[2] if match[2].startswith("/") else str((folder / match[2]).as_posix())
+        return f'{match[1]}"armkin{path}"'
+
+    return _IMPORT.sub(named, text)
+
+
+def _url(text: str) -> str:
+    """A module as a `data:` URL: only what would end it is escaped."""
+    for letter in ("%", "#", "\r", "\n", "\t"):
+        text = text.replace(letter, f"%{ord(letter):02X}")
+    return f"data:text/javascript;charset=utf-8,{text}"
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _data(arm: Arm, task_name: str | None, plan: PathPlan | None) -> str:
+    """What the page must know besides the solver: the scene, words, and a plan."""
+    turned = actual(arm)
+    task, _ = solver(turned, task_name)
+    drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": None, "locks": False}
+    about = {
+        "robot": Path(arm.path).stem if arm.path else arm.name,
+        "task": task.name,
+        "labels": list(task.labels),
+        "units": units.label_units(task.labels),
+        "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
+    }
+    values = {"arm": drawn, "solver": about, "plan": None if plan is None else played(arm, plan)}
+    return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, allow_nan=False).replace("<", "\\u003c")

@@ -1,0 +1,113 @@
+"""The arm in one HTML file: from disk, without a server, in a real browser."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browsing import chromium, opened, settled
+from playwright.sync_api import Browser, expect
+
+import armkin
+from armkin import path_file
+from armkin.errors import UsageError
+from armkin.motion.path import path
+from armkin.teach.one_file import html
+
+
+@pytest.fixture(scope="module")
+def browser() -> Any:
+    with chromium() as started:
+        yield started
+
+
+def written(folder: Path, name: str, plan: Any = None) -> str:
+    """The address of an arm's file."""
+    file = folder / "arm.html"
+    file.write_text(html(armkin.load(name), plan=plan), encoding="utf-8")
+    return file.as_uri()
+
+
+@pytest.mark.parametrize("name", ["three_dof", "ur5e", "jaco_j2n6s300", "so101"])
+def test_a_file_can_be_mailed(name: str) -> None:
+    arm = armkin.load(name)
+    began = time.process_time()
+    text = html(arm)
+    assert time.process_time() - began < 2.0
+    assert len(text.encode()) <= 1.5e6
+    assert len(gzip.compress(text.encode())) <= 450e3
+
+
+def test_the_branches_are_those_of_python(browser: Browser, tmp_path: Path) -> None:
+    """The posture stands in the address; a slider turns a joint; all branches follow; nothing is asked of anybody."""
+    arm = armkin.load("ur5e")
+    with opened(browser, written(tmp_path, "ur5e") + "#q=20,-70,80,10,20,30") as page:
+        assert [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()] == [
+            20.0, -70.0, 80.0, 10.0, 20.0, 30.0,
+        ]  # fmt: skip
+        slider = page.locator("#sliders input[type=range]").nth(1)
+        slider.focus()
+        slider.press("ArrowRight")
+        settled(page)
+        shown = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
+        assert shown[1] > -70.0
+        s = armkin.ik(arm, armkin.fk(arm, np.deg2rad(shown)))
+        names = {s.names[b] for b in s.branch[s.valid]}
+        radios = page.get_by_role("radiogroup", name="Branches").get_by_role("radio")
+        assert {radio.locator(".name").inner_text() for radio in radios.all()} == names
+        assert page.evaluate("location.hash").startswith("#q=20,")
+        answer = page.evaluate("T => window.armkin.ik(T)", armkin.fk(arm, np.deg2rad(shown)).tolist())
+        assert len(answer["branches"]) == int(s.valid.sum())
+        radios.nth(3).click()
+        settled(page)
+        other = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
+        assert np.abs(armkin.fk(arm, np.deg2rad(other)) - armkin.fk(arm, np.deg2rad(shown))).max() < 1e-2
+        for absent in ("#send", "#board", "#record", "#save", "#stop", "#follow", "#take"):
+            assert page.locator(absent).count() == 0, absent
+        page.evaluate("location.hash = '#q=0,-90,90,0,90,0'")
+        expect(page.locator("#box-1")).to_have_value("-90.0000")
+
+
+@pytest.mark.parametrize("fragment", ["#q=<img src=x onerror=alert(1)>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00"])
+def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path, fragment: str) -> None:
+    with opened(browser, written(tmp_path, "three_dof") + fragment) as page:
+        assert [box.input_value() for box in page.locator("#sliders input[type=number]").all()] == [
+            "0.0000", "90.0000", "-90.0000",
+        ]  # fmt: skip
+        assert page.locator("img").count() == 0
+
+
+def test_a_path_is_played(browser: Browser, tmp_path: Path) -> None:
+    arm = armkin.load("three_dof")
+    file = path_file.validated({"moves": [{"joint": [0, 90, -90]}, {"line": [258, 110, 367]}, {"wait": 0.2}]})
+    plan = path(arm, file)
+    with opened(browser, written(tmp_path, "three_dof", plan)) as page:
+        page.locator("#when").evaluate("(bar) => { bar.value = bar.max; bar.dispatchEvent(new Event('input')); }")
+        ends = np.rad2deg(plan.q(plan.duration))
+        shown = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
+        assert np.abs(np.array(shown) - ends).max() < 1e-3
+        page.locator("#play").click()
+        expect(page.locator("#clock")).not_to_have_text(re.compile(r"^0\.00 "))
+        assert page.locator("#save").count() == 0
+
+
+def test_a_name_runs_as_no_script(browser: Browser, tmp_path: Path) -> None:
+    arm = armkin.load("three_dof")
+    name = "</script><script>window.bad=1</script><img src=x onerror='window.bad=2'>"
+    object.__setattr__(arm, "name", name)
+    object.__setattr__(arm, "joint_names", ("</script><b>", "q2", '"><img src=x onerror=window.bad=3>'))
+    file = tmp_path / "arm.html"
+    file.write_text(html(arm), encoding="utf-8")
+    with opened(browser, file.as_uri()) as page:
+        assert page.locator("#robot").inner_text() == name
+        assert page.evaluate("window.bad") is None
+
+
+def test_an_arm_without_a_module_has_no_page() -> None:
+    with pytest.raises(UsageError):
+        html(armkin.load("panda"))
