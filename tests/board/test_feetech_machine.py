@@ -12,7 +12,7 @@ from armkin.board.backend import StoppedError
 from armkin.board.feetech import registers
 from armkin.board.feetech.machine import LAG, SETTLED, ServoMachine
 from armkin.board.sim.servo_bus import Noise, Servo, ServoBus
-from armkin.errors import LinkError
+from armkin.errors import LinkError, NoSolutionError
 from armkin.model.build import build
 from armkin.robot_file import parse
 
@@ -135,3 +135,59 @@ def test_relaxed_motors_can_be_moved_by_hand_and_read() -> None:
         servo.advance(0.0)
     assert all(servo.get(registers.TORQUE) == 0 for servo in port.servos.values())
     np.testing.assert_allclose(np.rad2deg(one.read()), np.array([100, -200, 300]) * 360 / 4096, atol=1e-9)
+
+
+class Stuck(Servo):
+    """A servo whose shaft cannot pass a place."""
+
+    stop = 10_000.0
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        super().advance(seconds)
+        self.at = min(self.at, self.stop)
+
+
+def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
+    """An arm one of whose servos stops so many counts from home."""
+    port = bus()
+    port.servos[number] = Stuck(number, HOME[number - 1])
+    one = machine(port)
+    port.servos[number].stop = HOME[number - 1] + after  # type: ignore[attr-defined]
+    return port, one
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
+    _, one = stuck(number, 100)
+    with pytest.raises(LinkError, match=rf"servo {number} \(j{number}\) stands 1[0-9][0-9] counts from its goal"):
+        one.run([one.plan(one.counts(), np.deg2rad([20, -20, 20]))])
+
+
+def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
+    port, one = stuck(1, 100)
+    with pytest.raises(LinkError, match=r"servo 1 \(j1\) is \d+ counts behind"):
+        one.run([one.plan(one.counts(), np.deg2rad([120, -120, 120]))])
+    there = [servo.at for servo in port.servos.values()]
+    assert [servo.get(registers.GOAL_POSITION) for servo in port.servos.values()] == pytest.approx(there, abs=40)
+    port.advance(2.0)
+    assert [servo.at for servo in port.servos.values()] == pytest.approx(there, abs=40)
+
+
+def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() -> None:
+    """Whoever set up the servo gave it limits: it would stop there, and never arrive."""
+    port = bus()
+    port.servos[2].set(registers.LEAST, 1500)
+    port.servos[2].set(registers.MOST, 2300)
+    one = machine(port)
+    goal = np.deg2rad([10, -30, 10])  # servo 2 is inverted: 2068 + 341
+    with pytest.raises(NoSolutionError, match=r"servo 2 \(j2\): 2409 counts is outside its own limits 1500 to 2300"):
+        one.run([one.plan(one.counts(), goal)])
+    assert [round(servo.at) for servo in port.servos.values()] == HOME
+    one.run([one.plan(one.counts(), np.deg2rad([10, -20, 10]))])
+    port.servos[2].set(registers.MOST, 2000)  # what it stands at is outside: it may come back, not go farther
+    two = machine(port)
+    with pytest.raises(NoSolutionError, match="outside its own limits 1500 to 2000"):
+        two.run([two.plan(two.counts(), np.deg2rad([10, -21, 10]))])
+    two.run([two.plan(two.counts(), np.deg2rad([10, 20, 10]))])
+    assert np.abs(np.array(two.counts()) - armkin.pulses(ARM, np.deg2rad([10, 20, 10]))).max() <= SETTLED

@@ -160,12 +160,15 @@ def test_ik_locked_and_swept() -> None:
     assert "--lock" in free.err
 
 
-def test_a_joint_locked_outside_its_limits_is_said() -> None:
+@pytest.mark.parametrize("more", [[], ["--all-branches"]])
+def test_a_joint_locked_outside_its_limits_is_refused(more: list[str]) -> None:
     """Else the nearest pose, which holds it as well, would pass for one within limits."""
-    result = run("ik", "robots/panda.yaml", 400, 0, 400, 180, 0, 0, "--lock", "J3=500", "--json")
-    assert result.code == 3
-    said = "--lock J3=500: the limits of J3 are -166.003 to 166.003: all branches are outside"
-    assert json.loads(result.err)["warnings"] == [said]
+    result = run("ik", "iiwa7", 400, 0, 600, 0, 180, 0, "--lock", "J3=171", "--json", *more)
+    assert (result.code, result.out) == (3, "")
+    error = json.loads(result.err)
+    assert "--lock J3=171: J3 = 171 deg is outside -170 to 170 deg" in error["error"]
+    assert (error["joint"], error["value"], error["upper"]) == ("J3", pytest.approx(171), pytest.approx(170))
+    assert run("ik", "iiwa7", 400, 0, 600, 0, 180, 0, "--lock", "J3=170", "--all-branches").code in (0, 3)
 
 
 def test_ik_lets_another_task_be_asked_for() -> None:

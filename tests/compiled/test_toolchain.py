@@ -29,13 +29,21 @@ def answer(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
 
 
+def put(kept: Path, held: bytes, mode: int = 0o700) -> None:
+    """Another file of that name: one that this process has loaded must not lose its pages, which its end still runs."""
+    new = kept.with_suffix(".new")
+    new.write_bytes(held)
+    new.chmod(mode)
+    new.rename(kept)
+
+
 @pytest.mark.parametrize("size", [5000, 12288])
 def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
     """The system's loader ends the process at the first page that is missing."""
     toolchain.load(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     assert kept.stat().st_size > size
-    os.truncate(kept, size)
+    put(kept, kept.read_bytes()[:size])
     done = answer()
     assert (done.returncode, done.stdout) == (0, "42\n")
 
@@ -45,9 +53,35 @@ def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
     [kept] = cache.glob("*.so")
     held = kept.read_bytes()
     place = held.index((42).to_bytes(4, "little"))
-    kept.write_bytes(held[:place] + b"\x2b" + held[place + 1 :])
+    put(kept, held[:place] + b"\x2b" + held[place + 1 :])
     assert answer().stdout == "42\n"
     assert [path.read_bytes() for path in cache.glob("*.so")] == [held]
+
+
+@pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
+def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode: int) -> None:
+    """It has the name of what it holds, and says that it is what was asked for."""
+    toolchain.load(SOURCE.replace("42", "43"), "abc")
+    [false] = cache.glob("*.so")
+    toolchain.load(SOURCE, "abc")
+    [true] = set(cache.glob("*.so")) - {false}
+    named = true.with_name(f"{true.stem.partition('-')[0]}-{false.stem.partition('-')[2]}.so")
+    put(named, false.read_bytes())
+    true.unlink()
+    false.unlink()
+    assert answer().stdout == "43\n"  # as it would be believed
+    named.chmod(mode)
+    assert answer().stdout == "42\n"
+
+
+def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    toolchain.load(SOURCE, "abc")
+    [kept] = cache.glob("*.so")
+    name = kept.stem.partition("-")[0]
+    assert toolchain._kept(cache, name, "abc") is not None
+    monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
+    assert toolchain._kept(cache, name, "abc") is None
+    assert toolchain._folder() is None
 
 
 def test_the_cache_is_used_under_a_umask_of_groups(cache: Path) -> None:

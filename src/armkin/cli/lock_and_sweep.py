@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import output
 from armkin.cli.numbers import number, whole
-from armkin.errors import UsageError
+from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -17,14 +16,18 @@ _RANGE = "JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16"
 
 
 def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
-    """`--lock J=V`: joint name -> value [deg | mm]."""
+    """`--lock J=V`: joint name -> value [deg | mm]. Raises NoSolutionError for one outside its joint's limits."""
+    from armkin.model import limits
+    from armkin.model.lock import joint_index
+
     found: dict[str, float] = {}
     for text in words or ():
-        name, value = _named(arm, text, "--lock", "JOINT=VALUE, for example J3=20", found)
-        found[name] = number(value, f"--lock {name}")
-        low, high = units.limits_out(arm)[arm.joint_names.index(name)]
-        if not low <= found[name] <= high:
-            output.warn(f"--lock {text}: the limits of {name} are {low:g} to {high:g}: all branches are outside")
+        name, word = _named(arm, text, "--lock", "JOINT=VALUE, for example J3=20", found)
+        found[name] = number(word, f"--lock {name}")
+        k = joint_index(arm, name)
+        value = units.joints_in(arm, [found[name] if i == k else 0.0 for i in range(arm.n)])
+        if limits.outside(arm, value)[k]:
+            raise NoSolutionError(f"--lock {text}: {limits.said(arm, k, value[k])}", **limits.fields(arm, k, value[k]))
     return found
 
 

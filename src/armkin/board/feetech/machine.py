@@ -18,8 +18,9 @@ from armkin.board.backend.job import Job, JobMachine, braking
 from armkin.board.backend.starting import from_counts
 from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
-from armkin.errors import LinkError, PositionKnownError, UsageError
+from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
+from armkin.motion.trajectory import Straight
 from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts
 SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
 STRAY = 2 * SETTLED  # [counts] that a motion may begin from where the servos stand: they sag a little under load
 SETTLING = 1.0  # [s] that it may take
+_ENDLESS = 1 << 30  # [counts] of a servo without limits
 EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
 
 
@@ -83,6 +85,7 @@ class ServoMachine(JobMachine):
             )
         self._counts = np.zeros(len(self.ids), dtype=np.int64)
         self._states: dict[int, bytes] = {}
+        self._limits = self._own_limits()
         self._read()
 
     # Where it stands
@@ -158,17 +161,22 @@ class ServoMachine(JobMachine):
     # Moving
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-        """A trajectory that starts at counts (motors,)."""
-        return job(trajectory, start)
+        """A trajectory that starts at counts (motors,). Raises NoSolutionError as `_check_limits` does."""
+        made = job(trajectory, start)
+        self._check_limits(made)
+        return made
 
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = done = 0.0
+        for one in plans if isinstance(plans, list) else ():
+            self._check_limits(one)  # all of them, before anything moves
         for job in from_counts(plans, self._measured, tolerance=STRAY):
             if job is None:
                 self._heed()
                 self.port.read(PERIOD)
                 continue
+            self._check_limits(job)
             total += job.duration
             self._follow(job.trajectory, partial(_tell, progress, done, total))
             self._arrive(job.end)
@@ -184,6 +192,29 @@ class ServoMachine(JobMachine):
     def grip(self, gripper: Gripper, value: float) -> float:
         """Move the gripper and return where it comes to rest, both in its drive's degrees."""
         return gripping.grip(self.bus, gripper, value, self._stop)
+
+    def _own_limits(self) -> NDArray[np.int64]:
+        """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
+        found = self.bus.read_all(self.ids, *registers.LIMITS)
+        pairs = [[self._limit(registers.LEAST, found[n]), self._limit(registers.MOST, found[n])] for n in self.ids]
+        return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
+
+    def _check_limits(self, job: Job) -> None:
+        """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out where it stands so."""
+        low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
+        for stretch in job.trajectory.stretches:
+            count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PERIOD)), 1)
+            goals = pulses(self.arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:]))
+            for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
+                least, most = self._limits[k].tolist()
+                raise NoSolutionError(
+                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {goals[row, k]} counts is outside its own "
+                    f"limits {least} to {most} (registers 9 and 11): nothing was moved"
+                )
+
+    @staticmethod
+    def _limit(register: registers.Register, data: bytes) -> int:
+        return register.unpack(data, registers.LIMITS[0])
 
     def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""

@@ -33,6 +33,8 @@ class Register(NamedTuple):
 
 
 MODEL = Register(3, 2)
+LEAST = Register(9, 2)  # [counts] that the servo goes to, least and most; both 0: no limits, it turns on and on
+MOST = Register(11, 2)
 OFFSET = Register(31, 2, 11)  # [counts] taken off the encoder's position
 TORQUE = Register(40, 1)
 ACCELERATION = Register(41, 1)  # [100 counts/s^2], 0: none
@@ -46,6 +48,7 @@ VOLTAGE = Register(62, 1)  # [0.1 V]
 TEMPERATURE = Register(63, 1)  # [deg C]
 MOVING = Register(66, 1)
 
+LIMITS = (LEAST.address, 4)  # least and most: read together
 GOAL = (ACCELERATION.address, 7)  # acceleration, position, time, speed: written together
 STATE = (POSITION.address, 8)  # position, speed, load, voltage, temperature: read together
 

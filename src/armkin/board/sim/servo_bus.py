@@ -11,8 +11,10 @@ from armkin.board.feetech.registers import (
     COUNTS,
     GOAL_POSITION,
     GOAL_SPEED,
+    LEAST,
     LOAD,
     MODEL,
+    MOST,
     MOVING,
     POSITION,
     SPEED,
@@ -36,6 +38,8 @@ class Servo:
         self.errors = 0
         self.memory = bytearray(80)
         self.set(MODEL, 777)
+        self.set(LEAST, 0)
+        self.set(MOST, COUNTS - 1)
         self.set(VOLTAGE, 74)
         self.set(TEMPERATURE, 31)
         self.set(GOAL_POSITION, round(at))
@@ -57,7 +61,9 @@ class Servo:
         before = self.at
         if moves and seconds > 0:
             fastest = (abs(self.get(GOAL_SPEED)) or FASTEST) * seconds
-            self.at += max(-fastest, min(fastest, self.get(GOAL_POSITION) - self.at))
+            goal, low, high = (self.get(register) for register in (GOAL_POSITION, LEAST, MOST))
+            goal = min(max(goal, low), high) if low or high else goal  # it goes no farther than its own limits
+            self.at += max(-fastest, min(fastest, goal - self.at))
         self.speed = (self.at - before) / seconds if seconds > 0 else 0.0
         self.set(POSITION, round(self.at))
         self.set(SPEED, round(self.speed))

@@ -1,0 +1,33 @@
+"""Pieces of tool paths: the arc through three points, whichever way round, and however far."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.inverse.tasks.fitting import task_for
+from armkin.motion.geometry import arc, spot
+
+TASK = task_for(armkin.load("three_dof"))
+
+
+@pytest.mark.parametrize("degrees", [10, 90, 179, 181, 270, 350])
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("tilt", [0.0, 1.1, math.pi])
+def test_an_arc_goes_through_its_points_once_and_no_farther(degrees: float, way: int, tilt: float) -> None:
+    centre, radius = np.array([300.0, -40.0, 210.0]), 55.0
+
+    def on_circle(angle: float) -> np.ndarray:
+        x, y = math.cos(angle), math.sin(angle)
+        return centre + radius * np.array([x, y * math.cos(tilt), y * math.sin(tilt)])
+
+    angle = way * math.radians(degrees)
+    first, via, last = on_circle(0.3), on_circle(0.3 + 0.4 * angle), on_circle(0.3 + angle)
+    piece = arc(TASK, spot(TASK, first), via, spot(TASK, last))
+    assert piece.length == pytest.approx(radius * abs(angle), rel=1e-9)
+    shares = np.linspace(0.0, 1.0, 41)
+    expected = np.array([on_circle(0.3 + share * angle) for share in shares])
+    np.testing.assert_allclose(piece.targets(shares * piece.length), expected, atol=1e-8)
