@@ -5,6 +5,9 @@ The other side is a stand-in written from Klipper's public documentation, not Kl
 
 from __future__ import annotations
 
+import itertools
+import math
+import os
 import random
 from collections.abc import Callable
 
@@ -18,6 +21,7 @@ from armkin.board.backend.job import Job
 from armkin.board.klipper.axes import axes_of, differences, printer_cfg, settings_of
 from armkin.board.klipper.gcode import Lines
 from armkin.board.klipper.machine import KlipperMachine
+from armkin.board.ports import record_path
 from armkin.board.sim.klipper import Klipper
 from armkin.errors import LinkError, PositionLostError, UsageError
 from armkin.model.build import build
@@ -27,11 +31,12 @@ from command_line import ROOT
 FILE = ROOT / "tests/robots/three_dof_klipper.yaml"
 ARM = armkin.load(FILE)
 AXES = axes_of(ARM)
+_numbers = itertools.count()  # of ports: each has a name of its own, and so has its record
 
 
 def opened(stop: Callable[[], bool] = lambda: False) -> tuple[Klipper, KlipperMachine]:
     """The arm at home, as somebody has said."""
-    port = Klipper(settings_of(AXES))
+    port = Klipper(settings_of(AXES), f"klipper-{os.getpid()}-{next(_numbers)}")
     port.simulated = False  # so that nobody vouches for the position by itself
     one = KlipperMachine(port, ARM, stop)
     assert one.prepare(assume=ARM.home)
@@ -135,7 +140,7 @@ def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> No
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        (lambda port: port.shutdown(), "Printer is shutdown"),
+        (lambda port: port.shutdown(), "state shutdown in the motion"),
         (lambda port: port.restart(), "has no axis"),
         (lambda port: setattr(port, "dead", True), "unanswered|did not answer"),
     ],
@@ -169,9 +174,15 @@ def test_motors_that_are_switched_off_lose_the_position() -> None:
 
 def test_another_program_s_move_is_found() -> None:
     port, one = opened()
-    one.api.run("G1 A3 F600\nM400")
-    one.refresh()
-    assert list(one.counts()) == pins(port) != [0, 0, 0]
+    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+    for line in ("G1 A3 F600", "G91\nG1 B-2 F600"):
+        there = one.counts()
+        one.api.run(f"{line}\nM400")
+        with pytest.raises(PositionLostError, match="another program has moved it"):
+            one.prepare()
+        assert one.position() == KlipperMachine(port, ARM).position() == "lost"
+        assert one.prepare(assume=armkin.joints(ARM, there))
+        one.run([one.plan(one.counts(), np.deg2rad([12, 80, -70]))])
 
     class Meddled(Klipper):
         def _obey(self, line: str) -> None:
@@ -184,6 +195,79 @@ def test_another_program_s_move_is_found() -> None:
     one.prepare()
     with pytest.raises(LinkError, match="another program has moved it"):
         one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+
+
+def test_a_program_that_moves_the_arm_between_plan_and_motion_is_told() -> None:
+    _, one = opened()
+    plan = one.plan(one.counts(), np.deg2rad([10, 80, -70]))
+    one.api.run("G1 A3 F600\nM400")
+    with pytest.raises(LinkError, match="another program has moved it"):
+        one.run([plan])
+    one.refresh()
+    assert one.position() == "lost"
+
+
+@pytest.mark.parametrize("asks", [3, 40, 120])
+def test_a_shutdown_in_motion_is_told_as_such(asks: int) -> None:
+    count = itertools.count()
+
+    def stop() -> bool:
+        if next(count) == asks:
+            port.shutdown()
+        return False
+
+    port, one = opened(stop)
+    with pytest.raises(
+        LinkError, match="Klipper went into state shutdown in the motion: Printer is shutdown"
+    ) as caught:
+        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
+    assert "another program" not in str(caught.value)
+
+
+def test_a_shutdown_after_the_last_line_is_told_as_such() -> None:
+    class Late(Klipper):
+        def _obey(self, line: str) -> None:
+            super()._obey(line)
+            if line == "M400" and self.x > 1:
+                self.state = "shutdown"
+
+    port = Late(settings_of(AXES))
+    one = KlipperMachine(port, ARM)
+    one.prepare()
+    with pytest.raises(LinkError, match="Klipper is in state shutdown: Printer is shutdown") as caught:
+        one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+    assert "another program" not in str(caught.value)
+
+
+@pytest.mark.parametrize("after", [0.0, 0.4, 1.1, 30.0])
+def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(after: float) -> None:
+    class Killed(BaseException):
+        pass
+
+    def die() -> bool:
+        if port.now() > began + after:
+            raise Killed
+        return False
+
+    began = math.inf
+    port, one = opened(die)
+    moves = [{"joint": [0, 80, -80]}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
+    path = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
+    plan = one.lay(path.motion, np.array(one.counts()))
+    began = port.now()
+    if after < plan.duration:
+        with pytest.raises(Killed):
+            one.run([plan])
+    else:
+        one.run([plan])
+    for _ in range(500):
+        port.advance(0.02)
+    port.close()
+    again = KlipperMachine(port, ARM)
+    assert not again.prepare()
+    assert list(again.counts()) == pins(port)
+    os.unlink(record_path(port.name))
+    assert KlipperMachine(port, ARM).position() == "lost"
 
 
 def test_printer_cfg_is_compared() -> None:

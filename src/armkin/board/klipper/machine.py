@@ -2,7 +2,8 @@
 
 Klipper plans on its host and tells what it has commanded; between host and boards it counts and checks every byte.
 Where the arm stands is kept by Klipper itself: the axes are registered, and given their place, when somebody has
-vouched for it, and a restart forgets both.
+vouched for it, and a restart forgets both. Klipper obeys every program: a place is believed while it is the one that
+armkin left, by a record beside the port's lock.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Position, Progress, StoppedError
 from armkin.board.backend.job import Job, JobMachine, braking
-from armkin.board.backend.starting import from_counts, is_believable
+from armkin.board.backend.record import Record
+from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.axes import Axis, Difference, axes_of, differences
+from armkin.board.klipper.axes import PIECE, Axis, Difference, axes_of, differences
 from armkin.errors import LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
 from armkin.motors import pulses
@@ -57,15 +59,16 @@ class KlipperMachine(JobMachine):
         told = self.api.ask("info")
         self.version, self.state = str(told.get("software_version", "")), str(told.get("state", ""))
         self._message = str(told.get("state_message", "")).partition("\n")[0]
-        self._known, self._counts = False, np.zeros(len(self.axes), dtype=np.int64)
+        self.why, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
+        self._record, self._marks = Record(port, arm), dict[str, str]()
         self.settings: dict[str, Any] = {}
         self._read()
 
     # Where it stands
 
     def position(self) -> Position:
-        """Known while Klipper is ready, the axes are registered and their motors on."""
-        return "known" if self._known and is_believable(self.arm, self.counts()) else "lost"
+        """Known while Klipper is ready, the axes are registered, their motors on, and stand where armkin left them."""
+        return "lost" if self.why else "known"
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -73,21 +76,20 @@ class KlipperMachine(JobMachine):
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
-        if not self._known:
-            return "the arm's position is lost: put it in its home pose and say so"
+        if self.why:
+            return f"the arm's position is lost ({self.why}): put it in its home pose and say so"
         names = zip(self.arm.joint_names, joints_out(self.arm, self.joints()).tolist(), strict=True)
         where = ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in names)
         return f"the arm stands at {where}, its position is known: the next command starts there"
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        settings = [str(difference) for difference in self.wrong()]
         return {
             "firmware": f"Klipper {self.version}",
             "state": self.state,
             "inputs": "",
-            "settings": settings,
-            "lost_because": None,
+            "settings": [str(difference) for difference in self.wrong()],
+            "lost_because": self.why or None,
         }
 
     def wrong(self) -> list[Difference]:
@@ -105,29 +107,34 @@ class KlipperMachine(JobMachine):
             more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
             raise LinkError(f"printer.cfg does not fit {self.arm.name}: {wrong[0]}{more}; armkin setup prints it")
         self._settle()
-        if assume is not None and self._known:
+        if assume is not None and not self.why:
             joints = joints_out(self.arm, self.joints()).tolist()
             raise PositionKnownError("the position is known", joints=joints)
-        if self._known:
+        if not self.why:
             return False
         if assume is None and not self.port.simulated:
             raise PositionLostError(
-                "the arm's position is lost", robot_file=self.arm.path, port=self.port.name, homing=False
+                f"the arm's position is lost: {self.why}",
+                robot_file=self.arm.path,
+                port=self.port.name,
+                homing=False,
             )
         self.vouch(pulses(self.arm, self.arm.home if assume is None else assume).tolist())
         return True
 
     def vouch(self, counts: Sequence[int]) -> None:
         """Take somebody's word that the motors stand at these counts: register the axes there, motors on."""
+        self._record.forget()
         for axis, count in zip(self.axes, counts, strict=True):
             begin = f"MANUAL_STEPPER STEPPER={axis.section}"
             place = f"{begin} ENABLE=1 SET_POSITION={axis.at_home + count / axis.steps:.9f}"
             limits = f"LIMIT_VELOCITY={axis.max_speed * 1.001:.6f} LIMIT_ACCEL={axis.max_accel:.6f}"
             corner = f"INSTANTANEOUS_CORNER_VELOCITY={axis.corner:.6f}"
             self.api.run(f"{begin} GCODE_AXIS=\n{place}\n{begin} GCODE_AXIS={axis.letter} {limits} {corner}")
-        self._read()
-        if not self._known or self.counts() != tuple(counts):
+        if self._ask() or self.counts() != tuple(counts):
             raise LinkError("Klipper did not take the arm's position: is it older than November 2025? Update it")
+        self._record.stands(self._marks, counts, [0] * len(counts))
+        self._read()
 
     # Moving
 
@@ -138,27 +145,42 @@ class KlipperMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
         total = done = 0.0
+        seen = False  # where the arm stands was read just now
         for one in from_counts(plans, self.counts):
             if one is None:
                 if self._stop():
                     raise StoppedError
                 self.port.read(0.01)
+                seen = False
                 continue
+            self._begin(one, seen=seen)
             total += one.duration
             try:
                 whole = self._follow(one, lambda t, done=done, total=total: progress(done + t, total))  # type: ignore[misc]
                 self._settle()
             except LinkError as error:
                 raise self._explain(error) from None
+            if not self.why:
+                self._record.stands(self._marks, self.counts(), [0] * len(self.axes))
             if not whole or self._stop():
                 raise StoppedError
-            if self.counts() != tuple(one.end.tolist()) or not self._known:
+            if self.why or self.counts() != tuple(one.end.tolist()):
                 raise LinkError(
-                    f"Klipper stands at {list(self.counts())} steps, the plan ends at {one.end.tolist()}: another "
-                    f"program has moved it\n{self.standing()}"
+                    f"Klipper stands at {list(self.counts())} steps, the plan ends at {one.end.tolist()}\n"
+                    f"{self.standing()}"
                 )
-            done = total
+            done, seen = total, True
             progress(done, total)
+
+    def _begin(self, one: Job, *, seen: bool) -> None:
+        """Make sure that the arm stands where a job starts, and record the motion."""
+        if not seen:
+            self._read()
+        if self.why:
+            raise LinkError(self.standing())
+        if self.counts() != tuple(one.start.tolist()):
+            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
+        self._record.moves(one, PIECE)
 
     def hold(self) -> None:
         """Wait until what was sent is done: Klipper takes nothing of it back."""
@@ -199,10 +221,16 @@ class KlipperMachine(JobMachine):
                 self._read()
             except LinkError:
                 return error
-        return LinkError(f"{error}\n{self.standing()}")
+        shut = f"Klipper went into state {self.state} in the motion: {self._message}"
+        return LinkError(f"{error if self.state == 'ready' else shut}\n{self.standing()}")
 
     def _read(self) -> None:
-        """Read Klipper's state, its configuration and where it stands."""
+        """Read where the arm stands: known while that is where armkin left it."""
+        why = self._ask() or self._record.differs(self._marks)
+        self.why = why or self._record.moved(self.counts()) or unbelievable(self.arm, self.counts()) or ""
+
+    def _ask(self) -> str:
+        """Read Klipper's state, its configuration and its places; returns why these mean nothing, in words."""
         found = self.api.query(
             webhooks=["state", "state_message"],
             configfile=["settings"],
@@ -213,13 +241,20 @@ class KlipperMachine(JobMachine):
         self.state = str(found["webhooks"].get("state", self.state))
         self._message = str(found["webhooks"].get("state_message", self._message)).partition("\n")[0]
         self.settings = _dict(found["configfile"].get("settings"))
-        values = _places(found["toolhead"].get("position"), _dict(found["gcode_move"].get("axis_map")), self.axes)
+        letters = _dict(found["gcode_move"].get("axis_map"))
+        values = _places(found["toolhead"].get("position"), letters, self.axes)
         on = _dict(found["stepper_enable"].get("steppers"))
-        running = all(on.get(f"manual_stepper {axis.section}") is True for axis in self.axes)
-        self._known = self.state == "ready" and running and values is not None
-        if self._known and values is not None:
-            steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
-            self._counts = np.rint(steps).astype(np.int64)
+        off = [axis.section for axis in self.axes if on.get(f"manual_stepper {axis.section}") is not True]
+        if self.state != "ready":
+            return f"Klipper is in state {self.state}: {self._message}"
+        if values is None:
+            return "Klipper does not tell the axes' places: it was restarted, or nobody has said where the arm stands"
+        if off:
+            return f"motors are off: {', '.join(off)}"
+        self._marks = {f"axis {axis.letter}": f"number {letters[axis.letter]}" for axis in self.axes}
+        steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
+        self._counts = np.rint(steps).astype(np.int64)
+        return ""
 
 
 def _dict(value: object) -> dict[str, Any]:

@@ -69,7 +69,7 @@ class Klipper(SimulatedTime):
         self.state = "ready"
         self.at = {"X": 0.0, **dict.fromkeys(names, 0.0)}  # where the motors are
         self.x, self.x_base = 0.0, 0.0
-        self.feed = 1500.0
+        self.feed, self.factor, self.relative = 1500.0, 1.0, False
         self.jumps = 0  # changes of speed beyond the corner's
         self._speeds: dict[str, float] = {}
         self._moves = deque[Move]()
@@ -172,7 +172,11 @@ class Klipper(SimulatedTime):
                 one.on = False
         elif head in ("G1", "G0"):
             self._move({word[0]: float(word[1:]) for word in words})
-        elif head not in ("G90", "M220", "M400"):
+        elif head in ("G90", "G91"):
+            self.relative = head == "G91"
+        elif head == "M220":
+            self.factor = float(words[0][1:]) / 100
+        elif head != "M400":
             raise Refused(f'Unknown command:"{head}"')
 
     def _manual(self, given: dict[str, str]) -> None:
@@ -205,13 +209,14 @@ class Klipper(SimulatedTime):
             one.place = self.at[name] = float(given["SET_POSITION"])
 
     def _move(self, words: dict[str, float]) -> None:
-        self.feed = words.pop("F", self.feed)
+        self.feed = words.pop("F") * self.factor if "F" in words else self.feed
         letters = {self.steppers[name].letter: name for name in self.axes}
         if unknown := words.keys() - letters.keys() - {"X"}:
             raise Refused(f"the stand-in has no axis {', '.join(sorted(unknown))}")
         start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
-        end = start | {letters.get(letter, "X"): value for letter, value in words.items()}
-        end["X"] = self.x_base + words["X"] if "X" in words else self.x
+        goals = {letters.get(letter, "X"): value for letter, value in words.items()}
+        base = start if self.relative else {"X": self.x_base}
+        end = start | {name: base.get(name, 0.0) + value for name, value in goals.items()}
         way = {key: end[key] - start[key] for key in end}
         along = abs(way["X"]) or max(map(abs, way.values()))
         if along < 1e-9:
