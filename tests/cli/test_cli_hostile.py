@@ -247,7 +247,7 @@ def test_an_output_file_that_may_not_be_written(tmp_path: Path, monkeypatch: pyt
 def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     from armkin.cli import inputs
 
-    def bug(_: str) -> None:
+    def bug(*_: object) -> None:
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr(inputs, "load", bug)
@@ -257,7 +257,7 @@ def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "Traceback" not in result.err
     monkeypatch.setenv("ARMKIN_TRACEBACK", "1")
     assert "Traceback" in run("fk", DOF, 1, 2, 3).err
-    monkeypatch.setattr(inputs, "load", lambda _: (_ for _ in ()).throw(MemoryError))
+    monkeypatch.setattr(inputs, "load", lambda *_: (_ for _ in ()).throw(MemoryError))
     assert "not enough memory" in run("fk", DOF, 1, 2, 3).err
 
 

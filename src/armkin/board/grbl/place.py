@@ -79,7 +79,7 @@ class Place:
         self._ask()
         if any(abs(float(value) - mark) > 0.01 for value in self._kept["G92"]) or self._kept["system"] != "G54":
             raise LinkError("GRBL did not take the mark that tells its resets: was a line damaged on its way?")
-        self.offset, self.why = steps - counts, ""
+        self.offset, self.why = steps - counts, unbelievable(self._arm, counts.tolist()) or ""
         self.record.stands(self._kept, counts.tolist(), self.offset.tolist())
 
     def arrived(self) -> None:

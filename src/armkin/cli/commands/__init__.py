@@ -24,6 +24,6 @@ COMMANDS = {
     "info": "What a robot file says, checked.",
     "calibrate": "A corrected robot file from measured tips.",
     "import": "A robot file from a URDF.",
-    "export": "The arm in other words: URDF, DH tables, screws, JSON, C99.",
+    "export": "The arm in other words: URDF, JSON, C, JavaScript, HTML.",
     "schema": "JSON Schema of robot files, for editors.",
 }

@@ -45,7 +45,7 @@ def export(
     task: TaskName = None,
     out: Out = None,
 ) -> None:
-    """The arm in other words: URDF, DH tables, screws, JSON, C99, JavaScript, HTML.
+    """The arm in other words: URDF, JSON, C, JavaScript, HTML.
 
     All but --c go to stdout, or to the file that --out names. --dh, --mdh and --screws give a robot file: the
     same arm, the same poses.
