@@ -16,4 +16,4 @@ class Wire(SimPort):
 
 def plug_in(board: SimBoard, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever port is asked for, the board is behind it."""
-    monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(board, name))
+    monkeypatch.setattr("armkin.board.kinds.firmware.open_port", lambda name, **_: Wire(board, name))

@@ -15,13 +15,12 @@ import yaml
 import armkin
 from armkin.board import path_run
 from armkin.board.backend import Backend
+from armkin.board.backend.board import Board
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import foreign
+from armkin.board.kinds import board_of
 from armkin.board.klipper.axes import axes_of
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
 from armkin.board.sim.servo_bus import Servo
+from armkin.board_kinds import BOARDS
 from armkin.formula.arrays import Array
 from armkin.model.build import build
 from armkin.robot_file import parse
@@ -59,11 +58,16 @@ class Kind:
     """An arm on a simulated board of one kind."""
 
     arm: armkin.Arm
-    machine: Backend
+    board: Board
     pins: Callable[[], list[list[float]]]  # counts of the motors since this was last asked
     tolerance: float  # [mm] of the tip from its path
     rest: int  # [counts] from the end
     grips: bool
+
+    @property
+    def machine(self) -> Backend:
+        """The arm on it."""
+        return self.board.machine
 
 
 def _text(board: str, axes: Sequence[str] = "XYZ", drives: Sequence[str] = (), gripper: bool = True) -> str:
@@ -100,24 +104,21 @@ def on(kind: str, at: Array | None = None) -> Kind:
     """three_dof on a simulated board of that kind, at home or at joint values (n,) [rad]."""
     arm = build(parse(KINDS[kind]))
     seen: list[list[float]] = []
-    board = foreign(arm)
-    if board is None:
-        configuration = configure(arm)
-        sim = SimBoard(configuration.board)
-        _watch(sim, seen, lambda: [float(sim.motors.counts()[axis]) for axis in configuration.axes])
-        machine: Backend = Machine(SimPort(sim), arm, configuration)
+    board = board_of(arm)
+    port: Any = board.simulated()
+    if kind in BOARDS:
+        axes = configure(arm).axes
+        _watch(port.board, seen, lambda: [float(port.board.motors.counts()[axis]) for axis in axes])
     else:
-        port: Any = board.simulated()
         if kind == "feetech":
             for k, count in enumerate(armkin.pulses(arm, arm.home if at is None else at), 1):
                 port.servos[k] = Servo(k, count)
             _watch(port, seen, lambda: [port.servos[k].at for k in (1, 2, 3)])
         elif kind == "klipper":
-            axes = axes_of(arm)
-            _watch(port, seen, lambda: [(port.at[axis.section] - axis.at_home) * axis.steps for axis in axes])
+            _watch(port, seen, lambda: [(port.at[a.section] - a.at_home) * a.steps for a in axes_of(arm)])
         else:
             _watch(port, seen, lambda: [float(port.steps[k]) for k in range(3)])
-        machine = board.machine(port, lambda: False)
+    machine = board.connect(port)
     machine.prepare(assume=None if kind == "feetech" else at)
 
     def pins() -> list[list[float]]:
@@ -127,7 +128,7 @@ def on(kind: str, at: Array | None = None) -> Kind:
 
     # RC servos' and bus servos' counts are some tenths of a mm at the tip.
     tolerance = {"uno_servos": 1.2, "feetech": 1.2}.get(kind, 0.4)
-    return Kind(arm, machine, pins, tolerance, 12 if kind == "feetech" else 0, board is None)
+    return Kind(arm, board, pins, tolerance, 12 if kind == "feetech" else 0, kind in BOARDS)
 
 
 def _watch(sim: Any, seen: list[list[float]], pins: Callable[[], list[float]]) -> None:
@@ -160,7 +161,7 @@ def carried_out(kind: Kind, moves: dict[str, Any], place: Sequence[float]) -> Re
     plan = armkin.path(arm, moves, start=machine.joints())
     laid = path_run.parts(plan, machine.counts(), machine.lay)
     kind.pins()
-    path_run.follow(machine, plan, laid, lambda done, total: None)
+    path_run.follow(kind.board, plan, laid, lambda done, total: None)
     return judged(plan, np.array([*kind.pins(), list(machine.counts())], dtype=float))
 
 

@@ -17,10 +17,11 @@ SOURCE = Path(__file__).parents[1] / "src"
 MAY_IMPORT: dict[str, str] = {
     "errors": "",
     "board_kinds": "",
+    "installed_kinds": "board_kinds",
     "signals": "",
     "files": "errors",
     "formula": "errors",
-    "robot_file": "errors files board_kinds",
+    "robot_file": "errors files board_kinds installed_kinds",
     "model": "errors formula robot_file",
     "forward": "errors formula model",
     "view": "errors formula model forward",
@@ -53,21 +54,20 @@ MAY_IMPORT: dict[str, str] = {
     " export/c",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
     "board/ports": "errors",
-    "board/firmware": "board/backend errors board_kinds formula model forward motors motion board/ports robot_file",
-    "board/backend": "errors formula model motion motors board/ports",
+    "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion board/ports"
+    " robot_file",
+    "board/backend": "errors board_kinds installed_kinds formula robot_file model motion motors board/ports",
     "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/klipper": "errors formula model motors motion board/ports board/backend",
     "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
-    "board/kinds": "errors board_kinds formula robot_file model motors motion board/ports board/backend board/firmware"
-    " board/grbl board/feetech board/klipper board/sim",
-    "board": "keep_out keep_out/shapes"
-    " errors signals board_kinds formula robot_file model forward motors motion board/ports board/backend"
-    " board/firmware board/grbl board/feetech board/klipper board/kinds board/sim",
+    "board/kinds": "errors board_kinds installed_kinds formula robot_file model motors motion board/ports board/backend"
+    " board/firmware board/grbl board/feetech board/klipper board/sim",
+    "board": "keep_out keep_out/shapes errors signals formula model forward motors motion board/ports board/backend",
     "teach": "keep_out keep_out/shapes"
-    " errors files board_kinds formula robot_file model forward inverse inverse/tasks inverse/branches motors"
-    " motion path_file reachability view board board/ports board/backend board/firmware board/feetech"
-    " board/kinds board/sim export/js",
+    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches motors"
+    " motion path_file reachability view board board/ports board/backend board/kinds board/sim"
+    " export/js",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 
@@ -208,3 +208,44 @@ def test_a_package_lists_its_files(package: Path) -> None:
 
 def _is_room(path: Path) -> bool:
     return (path / "__init__.py").exists()
+
+
+def test_outside_board_nobody_knows_a_kind() -> None:
+    """No isinstance of a board or machine, no import of a kind's package: capabilities are asked by name."""
+    kinds = {f"armkin.board.{path.stem}" for path in (SOURCE / "armkin/board/kinds").glob("*.py")} - {
+        "armkin.board.__init__"
+    }
+    found = []
+    for module in (name for name in MODULES if not name.startswith("armkin.board.")):
+        for node in _nodes(MODULES[module]):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
+                asked = ast.unparse(node.args[1])
+                if any(word in asked for word in ("Machine", "Foreign", "Configuration", "Backend", "FirmwareBoard")):
+                    found.append(f"{module}: {ast.unparse(node)}")
+        # `stop` ends sessions of our firmware without knowing the arm
+        if module != "armkin.cli.commands.stop":
+            found += [f"{module}: {name}" for name in _imports(module) if name.startswith(tuple(kinds))]
+    assert not found
+
+
+def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file in board/kinds/ alone, and robot files, their schema and `board_of` know the kind."""
+    from armkin import installed_kinds
+    from armkin.board import kinds
+    from armkin.model.build import build
+    from armkin.robot_file import parse
+    from armkin.robot_file.schema import json_schema
+
+    text = (SOURCE / "armkin/board/kinds/grbl.py").read_text()
+    (tmp_path / "gcode_box.py").write_text(text.replace('ForeignBoard("grbl"', 'ForeignBoard("gcode_box"'))
+    monkeypatch.setattr(kinds, "__path__", [*kinds.__path__, str(tmp_path)])
+    installed_kinds.own.cache_clear()
+    try:
+        robot = (
+            (SOURCE.parent / "tests/robots/three_dof_grbl.yaml").read_text().replace("kind: grbl", "kind: gcode_box")
+        )
+        board = kinds.board_of(build(parse(robot)))
+        assert (board.kind, type(board).__module__) == ("gcode_box", "armkin.board.kinds.gcode_box")
+        assert "gcode_box" in json_schema()["$defs"]["Board"]["properties"]["kind"]["enum"]
+    finally:
+        installed_kinds.own.cache_clear()

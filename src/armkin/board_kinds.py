@@ -1,6 +1,6 @@
 """What the host must know of each board before it is connected: one entry a board, one a driver.
 
-A new entry here also needs its name in `BoardKind` of `robot_file/model.py`; CONTRIBUTING.md has the whole walk.
+CONTRIBUTING.md has the whole walk. Boards with other firmware are found by `installed_kinds`.
 The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two tables together.
 """
 
@@ -91,17 +91,6 @@ class ForeignBoard(NamedTuple):
     motors: str  # the kind of drive that it takes: stepper or bus
     gripper: str  # the kind of drive of a gripper that it moves: spindle or bus; none
     axes: tuple[str, ...]  # names of its axes; a bus goes by ids
-    baud: int
-
-
-FOREIGN = {
-    board.kind: board
-    for board in (
-        ForeignBoard("grbl", "stepper", "spindle", ("X", "Y", "Z", "A", "B", "C"), 115_200),
-        ForeignBoard("feetech", "bus", "bus", (), 1_000_000),
-        ForeignBoard("klipper", "stepper", "none", ("A", "B", "C", "D", "H", "I", "J", "K", "L"), 250_000),
-    )
-}
 
 
 class Driver(NamedTuple):

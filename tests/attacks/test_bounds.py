@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware.configuration import configure
+from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
 from command_line import ROOT, run
 from quick import least
@@ -83,7 +83,7 @@ def test_a_file_without_end_is_refused(words: str, message: str) -> None:
 def test_plans_that_were_sent_are_not_kept() -> None:
     """Rows on standard input may come for hours."""
     arm = armkin.load("three_dof")
-    planner = Planner(arm, configure(arm), 1.0)
+    planner = Planner(board_of(arm), 1.0)
     sent: list[weakref.ref[Any]] = []
 
     def plans() -> Iterator[Any]:

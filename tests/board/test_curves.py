@@ -7,11 +7,9 @@ import pytest
 
 import armkin
 from armkin.board.backend.job import braking
-from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.counts_to_segments import cycles_of
-from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.trajectory_to_counts import cut
-from armkin.board.opening import open_port
+from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.queue import intervals
 from armkin.motion.curve import Curve
@@ -34,12 +32,12 @@ def some_path(seed: int) -> dict[str, object]:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     arm = armkin.load("three_dof")
-    configuration = configure(arm)
+    board = board_of(arm)
     plan = armkin.path(arm, some_path(seed), jerk=np.deg2rad(3000) if seed % 2 else None)
-    machine = Machine(open_port("sim", board=configuration.board), arm, configuration)
+    machine = board.connect(board.simulated())
     machine.prepare()
     laid = parts(plan, machine.counts(), machine.lay)
-    follow(machine, plan, laid, lambda done, total: None)
+    follow(board, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(one.segments for one in laid) < 100 * plan.duration + 50
 

@@ -17,7 +17,7 @@ from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import Info, Status
 from armkin.board.firmware.reply_checks import BoardSaysError, ReplacedError
 from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
-from armkin.board.opening import Switches
+from armkin.board.kinds.firmware import Switches
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS

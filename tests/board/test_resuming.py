@@ -37,7 +37,7 @@ class Arm:
         self.name = str(folder / "port")
         self.paused_at: float | None = None  # seconds of the next motion after which the sender is paused
         self.track: list[tuple[int, ...]] = []
-        monkeypatch.setattr("armkin.board.opening.open_port", lambda name, **_: Wire(self))
+        monkeypatch.setattr("armkin.board.kinds.firmware.open_port", lambda name, **_: Wire(self))
 
     def send(self, *words: object) -> tuple[int, str]:
         done = run("send", THREE_DOF, *words, "--port", self.name)

@@ -78,7 +78,7 @@ def test_every_command_that_opens_a_port_takes_no_reset(monkeypatch: pytest.Monk
         opened.append(reset)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("armkin.board.opening.open_port", open_port)
+    monkeypatch.setattr("armkin.board.kinds.firmware.open_port", open_port)
     robot = "examples/every_key.yaml" if command == "home" else THREE_DOF
     words = [command, robot, *WORDS.get(command, "").split()]
     assert run(*words, "--port", "COM9", "--no-reset").code == 130

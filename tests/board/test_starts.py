@@ -11,9 +11,6 @@ import yaml
 
 import armkin
 from armkin.board.backend.starting import StartError
-from armkin.board.firmware import jogging
-from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import foreign
 from armkin.errors import NoSolutionError
 from armkin.motion.plan import plan as plan_joints
 from armkin.motion.plan import straight
@@ -104,12 +101,9 @@ OUT = np.deg2rad([125.0, 90, -90])  # q1 goes to 120
 
 def jogged(one: Kind, joint: int, rate: float, seconds: float) -> None:
     """A jog at deg/s."""
-    board = foreign(one.arm)
-    if board is None:
-        assert isinstance(one.machine, Machine)
-        jogging.jog(one.machine, jogging.rates(one.machine, joint, rate), seconds)
-    else:
-        board.jog(one.machine, joint, float(np.deg2rad(rate)), seconds)
+    wanted = float(np.deg2rad(rate))
+    assert one.board.ready_to_jog(joint, wanted) == wanted
+    one.board.jog(joint, wanted, seconds)
 
 
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "grbl", "klipper"])
@@ -137,6 +131,8 @@ def test_an_arm_outside_its_limits_may_come_back_and_go_no_farther(kind: str) ->
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "grbl", "klipper"])
 def test_more_than_a_turn_outside_nobody_believes(kind: str) -> None:
     near, far = (on(kind, np.deg2rad([120 + more, 90, -90])).machine for more in (359, 361))
+    near.refresh()
+    far.refresh()
     assert (near.position(), far.position()) == ("known", "lost")
 
 

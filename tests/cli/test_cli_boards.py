@@ -13,7 +13,7 @@ import pytest
 import armkin
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
-from armkin.board.kinds import foreign
+from armkin.board.kinds import board_of
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.robot_file.edit import replaced
@@ -246,8 +246,7 @@ def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path:
 def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
     arm, path = armkin.load("so101"), tmp_path / "path.yaml"
     path.write_text(f"moves:\n  - joint: {{{arm.joint_names[0]}: 5}}\n  - grip: open\n  - joint: home\n")
-    board = foreign(arm)
-    assert board is not None
+    board = board_of(arm)
     port = board.simulated()
     assert isinstance(port, ServoBus)
     assert arm.gripper is not None

@@ -24,7 +24,7 @@ DOF = THREE_DOF
         (f"ik {DOF} --near 0 0 0 390 80 300", "with commas and no spaces, as 0,0,0"),
         (f"plot {DOF} --target 390 80 300 --out x.png", "with commas: --target 390,80,300"),
         (f"send {DOF} --target 390 80 300 --port sim", "with commas: --target 390,80,300"),
-        (f"grip {DOF} close --port sim", "did you mean closed?"),
+        (f"grip {DOF} colsed --port sim", "did you mean closed?"),
         (f"grip {DOF} opne --port sim", "did you mean open?"),
         (f"workspace {DOF} --grid 10x10x10", "with commas: 10,10,10"),
         ("three_dof fk 1 2 3", "the command comes first: armkin fk three_dof ..."),

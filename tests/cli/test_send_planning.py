@@ -55,7 +55,7 @@ def _movable() -> list[Path]:
 @pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
 def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
     import armkin
-    from armkin.board.firmware.missing_keys import missing
+    from armkin.board.backend.missing_keys import missing
 
     arm = armkin.load(path)
     home = ",".join(str(x) for x in armkin.pulses(arm, arm.home))

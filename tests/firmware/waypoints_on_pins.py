@@ -16,9 +16,9 @@ from curve_on_pins import counts_of, late_us, predicted
 from emulator import EmulatedBoard
 
 import armkin
-from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.counts_to_segments import CLOCK
 from armkin.board.firmware.trajectory_to_counts import Cut
+from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
 from armkin.formula.arrays import Array
 from command_line import THREE_DOF, process
@@ -62,7 +62,7 @@ def rows(count: int) -> Array:
 def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Streamed:
     """Send so many waypoints from home, look at every edge; patience: as of the emulated board."""
     arm, q = armkin.load("three_dof"), rows(count)
-    plan = Planner(arm, configure(arm), 1.0, blend).plan([0, 0, 0], np.deg2rad(q))
+    plan = Planner(board_of(arm), 1.0, blend).plan([0, 0, 0], np.deg2rad(q))
     assert isinstance(plan, Cut)
     segments = [one for move in plan.moves() for one in move.segments]
     wanted = predicted(segments, [0, 0, 0])

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware import gripping
-from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import Foreign, foreign
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from armkin.board.backend import Backend, Planned, Progress
-    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.backend import Planned, Progress
+    from armkin.board.backend.board import Board
     from armkin.motion.path_plan import PathPlan
 
 Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
@@ -42,35 +39,20 @@ def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
     return found
 
 
-def check_gripper(plan: PathPlan, board: Configuration | Foreign) -> None:
+def check_gripper(plan: PathPlan, board: Board) -> None:
     """Raise UsageError if the plan needs a gripper that the board does not move, or a value it cannot reach."""
     for marker in plan.markers:
-        if isinstance(board, Foreign):
-            board.grip_value(marker.value)
-            continue
-        gripping.count_of(gripping.gripper_of(plan.arm.name, board), marker.value)
+        board.grip_value(marker.value)
 
 
-def follow(machine: Backend, plan: PathPlan, laid: Sequence[Planned], progress: Progress, first: int = 0) -> None:
+def follow(board: Board, plan: PathPlan, laid: Sequence[Planned], progress: Progress, first: int = 0) -> None:
     """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them."""
     done, total = 0.0, sum(one.duration for one in laid)
     markers = [None] * (plan.approach is not None) + [marker.value for marker in plan.markers]
     for k, one in enumerate(laid, first):
         if one.trajectory.stretches:
             begun = done
-            machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
+            board.machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
             done += one.duration
         if k < len(markers) and (value := markers[k]) is not None:
-            _grip(machine, plan.arm.name, value)
-
-
-def _grip(machine: Backend, name: str, value: str | float) -> None:
-    """Open or close the gripper; a board that measures where it stops may find something between its jaws."""
-    if isinstance(machine, Machine):
-        gripper = gripping.gripper_of(name, machine.configuration)
-        gripping.prepare(machine, gripper, None)
-        gripping.grip(machine, gripper, gripping.count_of(gripper, value))
-        return
-    board = foreign(machine.arm)
-    assert board is not None
-    board.grip(machine, value)
+            board.grip(value)

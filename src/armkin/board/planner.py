@@ -5,14 +5,11 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.trajectory_to_counts import cut, plan
-from armkin.board.kinds import Foreign
 from armkin.board.summaries import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
@@ -23,13 +20,10 @@ from armkin.motion.path import HOLD
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from armkin.board.backend import Backend, Planned
-    from armkin.board.firmware.configuration import Configuration
+    from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
 
 _AHEAD = 1000  # rows that are read before they are planned
 
@@ -37,25 +31,10 @@ _AHEAD = 1000  # rows that are read before they are planned
 class Planner:
     """Plans for one arm at one speed, and what they come to."""
 
-    def __init__(self, arm: Arm, board: Configuration | Foreign, speed: float, blend: float = 0.0) -> None:
+    def __init__(self, board: Board, speed: float, blend: float = 0.0) -> None:
         """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
-        self.arm, self.speed, self.blend = arm, speed, blend
-        self.done = Total(arm)  # what has been sent
-        self._plan: Callable[[Sequence[int], Array, float], Planned]
-        self._lay: Callable[[Trajectory, NDArray[np.int64]], Planned]
-        if isinstance(board, Foreign):
-            self._plan, self._lay = board.plan, board.lay
-        else:
-            self.use(board.board.clock, board.board.min_interval)
-
-    def use(self, clock: int, min_interval: int) -> None:
-        """Take the figures of the board that is there."""
-
-        def cut_moves(start: Sequence[int], q: Array, speed: float) -> Planned:
-            return plan(self.arm, start, q, speed=speed, clock=clock, min_interval=min_interval)
-
-        self._plan = cut_moves
-        self._lay = partial(cut, clock=clock, min_interval=min_interval)
+        self.arm, self.board, self.speed, self.blend = board.arm, board, speed, blend
+        self.done = Total(board.arm)  # what has been sent
 
     def counts(self, q: Array) -> list[int]:
         """Counts at joint values."""
@@ -64,10 +43,10 @@ class Planner:
     def plan(self, start: Sequence[int], q: Array) -> Planned:
         """A plan through joint values (w, n) [rad | mm]."""
         if not self.blend:
-            return self._plan(start, q, self.speed)
+            return self.board.plan(start, q, self.speed)
         counts = np.asarray(start, dtype=np.int64)
         way = rounded(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
-        return self._lay(way, counts)
+        return self.board.lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
         """Pass plans on and sum them up in `done`; none is kept, as rows may come for hours."""

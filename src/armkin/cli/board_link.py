@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import completion, inputs, output, render
-from armkin.cli.default_port import foreign_port, port_name
+from armkin.cli.default_port import port_name
 from armkin.cli.numbers import whole
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, Progress
-    from armkin.board.firmware.configuration import Configuration
-    from armkin.board.kinds import Foreign
-    from armkin.board.resuming import Note
+    from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -80,31 +78,20 @@ class Link:
 
 @contextmanager
 def backend(
-    arm: Arm,
-    board: Configuration | Foreign,
-    port: str | None,
-    baud: int | None,
-    *,
-    simulated: str = AT_HOME,
-    reset: bool = True,
+    board: Board, port: str | None, baud: int | None, *, simulated: str = AT_HOME, reset: bool = True
 ) -> Iterator[Backend]:
     """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first.
 
     simulated: what to say of a board in this process.
     """
     from armkin.board.backend import StoppedError
-    from armkin.board.kinds import Foreign
-    from armkin.board.opening import open_backend
+    from armkin.board.opening import open_board
     from armkin.board.stopping import stoppable
 
-    port = (
-        foreign_port(port, board, baud, reset=reset)
-        if isinstance(board, Foreign)
-        else port_name(port, board, baud or BAUD, reset=reset)
-    )
+    port = port_name(port, board, baud, reset=reset)
     if port == SIM:
         output.note(simulated)
-    with stoppable() as stop, open_backend(arm, board, port, baud=baud, stop=stop, reset=reset) as one:
+    with stoppable() as stop, open_board(board, port, baud=baud, stop=stop, reset=reset) as one:
         for difference in one.differences if port != SIM else ():
             output.note(difference)
         try:
@@ -137,20 +124,13 @@ def told(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Pr
         yield tell
 
 
-def held(machine: Backend, resume: bool) -> Note | None:
+def held(board: Board, resume: bool) -> Any:
     """The note of the motion that `--resume` goes on with; None without that option."""
-    from armkin.board import resuming
-    from armkin.board.firmware.machine import Machine
-
-    if not resume:
-        return None
-    if not isinstance(machine, Machine):
-        raise UsageError("--resume is for boards with armkin's firmware: only they tell where a motion was held")
-    return resuming.recall(machine)
+    return board.recall() if resume else None
 
 
-def board_of(arm: Arm, *, rehearsal: bool = False) -> Configuration | Foreign:
-    """The arm's board: one with armkin's firmware, or a foreign one; rehearsal: see `configure`."""
+def board_of(arm: Arm, *, rehearsal: bool = False) -> Board:
+    """The arm's board, of whatever kind; rehearsal: for a plan or a simulated board."""
     from armkin.board import kinds
 
     return kinds.board_of(arm, rehearsal=rehearsal)

@@ -10,7 +10,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin.board_kinds import BOARDS, FOREIGN
+from armkin import installed_kinds
+from armkin.board_kinds import BOARDS
 from armkin.robot_file.model import Gripper, Triple, dot
 
 if TYPE_CHECKING:
@@ -328,7 +329,7 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
     used: set[str] = set()
     numbers: set[int] = set()
     for path, drive in drives:
-        foreign = None if robot.board is None else FOREIGN.get(robot.board.kind)
+        foreign = None if robot.board is None else installed_kinds.foreign(robot.board.kind)
         if drive.kind == "bus" and robot.board is not None and robot.board.kind in BOARDS:
             yield (*path, "kind"), f"{robot.board.kind} has no bus; leave board out, or name one that has"
         if foreign is not None and path[0] == "gripper" and drive.kind != foreign.motors:
@@ -359,7 +360,7 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
 
 
 def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
-    if settings.kind in FOREIGN:
+    if settings.kind not in BOARDS:
         for key in ("driver", "enable", "abort"):
             if getattr(settings, key) is not None:
                 yield ("board", key), f"{settings.kind} has settings of its own for this; remove it"

@@ -9,9 +9,10 @@ Angles are degrees and lengths millimetres here; ``armkin.model.arm`` turns them
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from armkin import installed_kinds
 from armkin.robot_file.keys import Angle, Length, Model
 
 MAX_JOINTS = 12
@@ -22,8 +23,23 @@ Triple = tuple[float, float, float]
 Convention = Literal["standard", "modified", "screws"]
 JointType = Literal["revolute", "prismatic"]
 Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll", "xyz_roll", "xyz_axis", "pose"]
-BoardKind = Literal["uno_cnc_shield", "mega_ramps14", "uno_servos", "pico6", "grbl", "feetech", "klipper"]
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
+
+
+def _installed(kind: str) -> str:
+    if not installed_kinds.exists(kind):
+        *others, last = map(repr, installed_kinds.names())
+        raise PydanticCustomError(
+            "literal_error", "Input should be {expected}", {"expected": f"{', '.join(others)} or {last}"}
+        )
+    return kind
+
+
+def _kinds(schema: dict[str, Any]) -> None:
+    schema["enum"] = list(installed_kinds.names())
+
+
+BoardKind = Annotated[str, AfterValidator(_installed), Field(json_schema_extra=_kinds)]
 
 # Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres

@@ -13,9 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.board import path_run
-from armkin.board.firmware import gripping, homing, jogging
-from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import Foreign
 from armkin.errors import ArmkinError, FileError, LinkError, UsageError
 from armkin.model import units
 from armkin.model.limits import check_limits
@@ -25,6 +22,7 @@ from armkin.teach.request_checks import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
+    from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
     from armkin.motion.path_plan import PathPlan
     from armkin.teach.board_thread import BoardThread
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
 FOLLOW_SPEED = 0.15  # of every joint's max_speed
 FOLLOW_HOP = 5.0  # [deg | 2 mm] of the joint that moves farthest: where the arm stops and looks for its goal again
-FOREIGN_JOG = 0.3  # [s] of one piece of a jog on a board that cannot be told to go on
 _LONGEST_JOG = 60.0  # [s]
 
 
@@ -118,10 +115,9 @@ class BoardActions:
     def home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Find the limit switches."""
         board = self.thread.board
-        if not isinstance(board, Foreign):
-            homing.searches(self.arm, board)
+        board.check_home()
         self.check_file()
-        self.thread.submit("home", self._home)
+        self.thread.submit("home", lambda machine: _home(board))
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -153,10 +149,7 @@ class BoardActions:
             raise UsageError("value: expected open, closed or a number")
         wanted = value if isinstance(value, str) else request_checks.number(fields, "value", -1e6, 1e6)
         board = self.thread.board
-        if isinstance(board, Foreign):
-            board.grip_value(wanted)
-        else:
-            gripping.count_of(gripping.gripper_of(self.arm.name, board), wanted)
+        board.grip_value(wanted)
         assume = request_checks.flag(fields, "assume")
         self.check_file()
         self.thread.submit("grip", lambda machine: self._grip(machine, wanted, assume))
@@ -217,48 +210,23 @@ class BoardActions:
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
         path_run.check_gripper(plan, self.thread.board)
-        laid = path_run.parts(plan, machine.counts(), machine.lay)
-        path_run.follow(machine, plan, laid, self._progress)
-
-    def _home(self, machine: Backend) -> None:
-        if isinstance(self.thread.board, Foreign):
-            self.thread.board.home(machine)
-        else:
-            assert isinstance(machine, Machine)
-            homing.home(machine)
+        board = self.thread.board
+        path_run.follow(board, plan, path_run.parts(plan, machine.counts(), board.lay), self._progress)
 
     def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
         board = self.thread.board
-        if isinstance(board, Foreign):
-            board.grip(machine, value)
-            return
-        assert isinstance(machine, Machine)
-        grip = gripping.gripper_of(self.arm.name, machine.configuration)
-        known = gripping.known(machine, grip)
-        if not known and not assume and not machine.port.simulated:
+        known = board.grip_known()
+        if not known and not assume:
             raise LinkError(
                 "the gripper's position is lost: say first that it stands open\n"
                 "a servo jumps there at once, at its full speed: keep your fingers out"
             )
-        gripping.prepare(machine, grip, grip.open if assume and not known else None)
-        gripping.grip(machine, grip, gripping.count_of(grip, value))
+        board.grip(value, None if known else "open")
 
     def _jog(self, machine: Backend, joint: int, percent: float) -> None:
-        share = percent / 100
-        top = float(self.arm.max_speed[joint])
-        if isinstance(self.thread.board, Foreign):
-            while self._held_down():
-                end = time.monotonic() + FOREIGN_JOG
-                self.thread.board.jog(machine, joint, share * top, FOREIGN_JOG)
-                while time.monotonic() < min(end, self._alive) and not self.thread.stopping:
-                    time.sleep(0.01)  # a simulated one is there at once
-            return
-        assert isinstance(machine, Machine)
-        jogging.prepare(machine)
-        if machine.position() == "lost":
-            share = float(np.clip(share, -1 / jogging.SLOW, 1 / jogging.SLOW))
-        speed = share * float(units.joints_out(self.arm, self.arm.max_speed)[joint])
-        jogging.jog(machine, jogging.rates(machine, joint, speed), _LONGEST_JOG, more=self._held_down)
+        board = self.thread.board
+        rate = board.ready_to_jog(joint, percent / 100 * float(self.arm.max_speed[joint]))
+        board.jog(joint, rate, _LONGEST_JOG, self._held_down)
 
     def _held_down(self) -> bool:
         """Whether the page was heard of lately: its button is held."""
@@ -282,3 +250,7 @@ class BoardActions:
 
     def _progress(self, done: float, total: float) -> None:
         self.thread.done = (round(done, 1), round(total, 1))
+
+
+def _home(board: Board) -> None:
+    board.home()

@@ -13,11 +13,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, StoppedError
-from armkin.board.firmware.homing import switches
-from armkin.board.firmware.machine import Machine
-from armkin.board.kinds import Foreign, board_of
-from armkin.board.opening import open_port
-from armkin.board.ports import BAUD, SIM, SerialPort
+from armkin.board.kinds import board_of
+from armkin.board.ports import SIM
 from armkin.board.sim.port import Paced
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
@@ -25,7 +22,6 @@ from armkin.motors import joints as joints_of
 from armkin.teach.request_checks import RefusedError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.configuration import Configuration
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
 
@@ -41,7 +37,7 @@ class BoardThread:
     def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
         self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
-        self.board: Configuration | Foreign = board_of(arm, rehearsal=port == SIM)
+        self.board = board_of(arm, rehearsal=port == SIM)
         self.link: Port | None = None
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
@@ -156,30 +152,21 @@ class BoardThread:
         """The machine; our firmware's in a new session: what ended the last one is over."""
         first = self.machine is None
         if self.link is None:
-            self.link = self._plug()
-        if not isinstance(self.board, Foreign):
-            self.machine = Machine(self.link, self.arm, self.board, self._watch)
-        elif self.machine is None:
-            self.machine = self.board.machine(self.link, self._watch)
+            port = self.board.open(self.port, self.baud)
+            self.link = Paced(port) if port.simulated else port
+        if self.machine is None:
+            self.machine = self.board.connect(self.link, self._watch)
         else:
-            self.machine.refresh()
+            self.board.again()
+            self.machine = self.board.machine
         if first and self.link.simulated:
             self.machine.prepare()  # a board in this process starts with the arm at home
         return self.machine
 
-    def _plug(self) -> Port:
-        """The port, open."""
-        if isinstance(self.board, Foreign):
-            baud = self.baud or self.board.board.baud
-            return Paced(self.board.simulated()) if self.port == SIM else SerialPort(self.port, baud)
-        levels = switches(self.arm, self.board)
-        return open_port(self.port, board=self.board.board, baud=self.baud or BAUD, paced=True, switches=levels)
-
     def _watch(self) -> bool:
         """Asked at every turn of a session: tell where the pins are now, and whether to stop."""
         if self.machine is not None and time.monotonic() - self._told_at >= _TELL:
-            if isinstance(self.machine, Machine):
-                self.machine.heard()
+            self.board.heard()
             self._publish()
         return self._stop.is_set()
 
@@ -197,8 +184,8 @@ class BoardThread:
         self._stop.clear()
 
     def _stopped(self, error: StoppedError) -> None:
-        if isinstance(self.machine, Machine) and error.status is not None:
-            self.machine.status = error.status
+        if self.machine is not None:
+            self.board.stopped(error)
         self._error = "stopped"
         self._stop.clear()
 
@@ -227,7 +214,7 @@ class BoardThread:
         machine = self.machine
         found: dict[str, Any] = {
             "port": self.port,
-            "board": self.board.board.kind,
+            "board": self.board.kind,
             "simulated": self.port == SIM,
             "connected": machine is not None,
             "doing": self._doing,

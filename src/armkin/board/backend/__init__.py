@@ -1,5 +1,7 @@
 """What every kind of board can do for an arm. Our own firmware is one of several.
 
+board.py     what a kind is: one class, with capabilities
+missing_keys.py  what a robot file lacks for its board
 starting.py  where a motion begins: what every trajectory that becomes counts is held to
 job.py       a trajectory for a board that is sent positions, not segments
 record.py    what armkin last left on a board that other programs write to

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware import missing_keys
+from armkin.board.backend import missing_keys
 from armkin.board.firmware.gripper_counts import Grip, as_axis
 from armkin.board.firmware.protocol import AxisImage, GuardImage, Image, RowImage
 from armkin.board_kinds import BOARDS, DRIVERS, Board, Driver

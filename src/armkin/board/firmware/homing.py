@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.board.backend.board import LostSteps
 from armkin.board.firmware import protocol
 from armkin.board.firmware.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
@@ -21,14 +22,12 @@ from armkin.model.units import scale
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Progress
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
     from armkin.board.firmware.protocol import Status
     from armkin.model.arm import Arm
 
 _SLOW = 26  # /256: the second approach runs at a tenth
-_GENTLE = 0.25  # of max_speed, on the way to the home pose
 _MOST = 2**30  # of counts and counts/s
 _MARGIN = 1.25  # of the joint's range: how far a switch may be
 
@@ -57,15 +56,6 @@ class Search:
             time=self.time,
             rate=self.rate,
         )
-
-
-@dataclass(frozen=True)
-class Lost:
-    """What a switch that was met again tells of the counts."""
-
-    joint: str
-    steps: int | None  # of its motor, that the counts were ahead of the arm; None: its position was not known
-    difference: float | None  # the same [rad | mm]
 
 
 def searches(
@@ -101,7 +91,7 @@ def home(
     announce: Callable[[str], None] = lambda name: None,
     *,
     rest_at_home: bool = False,
-) -> list[Lost]:
+) -> list[LostSteps]:
     """Home joints and tell the board where they stand; all positions of theirs are lost until then.
 
     rest_at_home: the joints that have no switch stand in their home pose, says the operator. Counts go on through
@@ -132,16 +122,16 @@ def home(
     return found
 
 
-def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> Lost:
+def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> LostSteps:
     """The counts at a switch's edge, against where the robot file says that it is."""
     arm, j = machine.arm, search.joint
     if not known:
-        return Lost(arm.joint_names[j], None, None)
+        return LostSteps(arm.joint_names[j], None, None)
     counts = [edge.counts[axis] for axis in machine.configuration.axes]
     gain = arm.motor_gain[:, j]
     leader = gain[np.abs(gain).argmax()]
     steps = round(float((joints(arm, counts)[j] - _at(arm, j)) * leader))
-    return Lost(arm.joint_names[j], steps, steps / float(leader))
+    return LostSteps(arm.joint_names[j], steps, steps / float(leader))
 
 
 def _found(machine: Machine, search: Search) -> tuple[Status, Status]:
@@ -164,11 +154,6 @@ def lost_joints(machine: Machine) -> list[str]:
     lost = [not known >> axis & 1 for axis in machine.configuration.axes]
     moved = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
     return [name for name, unknown in zip(arm.joint_names, moved, strict=True) if unknown]
-
-
-def go_home(machine: Machine, progress: Progress = lambda done, total: None) -> None:
-    """Move an arm whose position is known to its home pose, at a quarter of its speed."""
-    machine.run([machine.plan(machine.counts(), machine.arm.home[None], speed=_GENTLE)], progress)
 
 
 def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[int]], bool]:

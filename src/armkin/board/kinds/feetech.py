@@ -3,36 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.feetech import registers
+from armkin.board.backend.board import Board, Gripped
+from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
 from armkin.board.feetech.machine import ServoMachine, job, servo_ids
-from armkin.board.kinds.foreign import Foreign
-from armkin.errors import UsageError
+from armkin.board_kinds import ForeignBoard
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend, Planned
+    from armkin.board.backend import Planned
     from armkin.board.ports import Port
     from armkin.motion.trajectory import Trajectory
 
+KIND = ForeignBoard("feetech", "bus", "bus", ())
 
-class ServoBusBoard(Foreign):
+
+class ServoBusBoard(Board):
     """The bus of an arm's servos."""
 
+    baud = 1_000_000
+    gripper_drive = KIND.gripper
     gripper_taken = "it takes gripper: {kind: bus, id: 6, ...}"
+    lacks: ClassVar = {"home": "bus servos know their position: there is nothing to home"}
+    machine: ServoMachine
 
     def check(self) -> None:
         """Raise UsageError if the arm's motors are no servos of one bus."""
         servo_ids(self.arm)
 
-    def lay(self, trajectory: Trajectory, counts: NDArray[np.int64]) -> Planned:
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
-        return job(trajectory, counts)
+        return job(trajectory, start)
 
     def simulated(self) -> Port:
         """A bus in this process, with the arm's servos at its home pose and its gripper's."""
@@ -45,7 +51,7 @@ class ServoBusBoard(Foreign):
             servos.append(Servo(gripper.id))
         return ServoBus(servos)
 
-    def machine(self, port: Port, stop: Callable[[], bool]) -> ServoMachine:
+    def attach(self, port: Port, stop: Callable[[], bool]) -> ServoMachine:
         """The arm on the bus behind an open port."""
         return ServoMachine(port, self.arm, stop)
 
@@ -56,11 +62,19 @@ class ServoBusBoard(Foreign):
             bus.read(number, registers.MODEL)  # asks until it is answered, LinkError if it is not
         return not stop()
 
-    def home(self, machine: Backend) -> None:
-        """Raise UsageError: servos need no homing."""
-        raise UsageError("bus servos know their position: there is nothing to home")
+    def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
+        """Move the gripper, and tell where it comes to rest."""
+        target = self.grip_value(value)
+        return Gripped(self.machine.grip(self.gripper(), target), target, "deg", measured=True)
 
-    def grip(self, machine: Backend, value: str | float) -> float:
-        """Move the gripper, and return where it comes to rest."""
-        assert isinstance(machine, ServoMachine)
-        return machine.grip(self.gripper(), self.grip_value(value))
+    def relax(self) -> None:
+        """Switch the servos off."""
+        self.machine.relax()
+
+    def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
+        """The servos' counts; and the gripper's, and its `zero` if it stands at a value."""
+        jaw = None if gripper is None else gripping.zero(self.machine.bus, self.gripper(), gripper)
+        return list(self.machine.counts()), jaw
+
+
+BOARD = ServoBusBoard

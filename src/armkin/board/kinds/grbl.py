@@ -2,40 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.board import Board, Gripped
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.gcode import job
 from armkin.board.grbl.machine import GrblMachine
 from armkin.board.grbl.session import Session
 from armkin.board.grbl.settings import wanted
-from armkin.board.kinds.foreign import Foreign
+from armkin.board_kinds import ForeignBoard
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend, Planned
+    from armkin.board.backend import Planned
     from armkin.board.ports import Port
     from armkin.motion.trajectory import Trajectory
 
+KIND = ForeignBoard("grbl", "stepper", "spindle", ("X", "Y", "Z", "A", "B", "C"))
 
-class GrblBoard(Foreign):
+
+class GrblBoard(Board):
     """A GRBL board that drives an arm's steppers."""
 
+    baud = 115_200
+    gripper_drive = KIND.gripper
     gripper_taken = "it takes gripper: {kind: spindle, open: 0, closed: 200}, S words of M3"
+    machine: GrblMachine
 
     def check(self) -> None:
         """Raise UsageError if the arm's motors cannot be GRBL's axes."""
         axes_of(self.arm)
 
-    def lay(self, trajectory: Trajectory, counts: NDArray[np.int64]) -> Planned:
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
-        return job(trajectory, counts)
+        return job(trajectory, start)
 
     def simulated(self) -> Port:
         """GRBL in this process, set up for the arm, which stands at home."""
@@ -46,7 +52,7 @@ class GrblBoard(Foreign):
         count = max(axis.index for axis in axes) + 1
         return Grbl(axes=count, settings=settings, ends=dict.fromkeys(range(count), 0))
 
-    def machine(self, port: Port, stop: Callable[[], bool]) -> GrblMachine:
+    def attach(self, port: Port, stop: Callable[[], bool]) -> GrblMachine:
         """The arm on GRBL behind an open port."""
         return GrblMachine(port, self.arm, stop)
 
@@ -55,23 +61,43 @@ class GrblBoard(Foreign):
         Session(link).wake()
         return True
 
-    def home(self, machine: Backend) -> None:
-        """Home all axes by GRBL's cycle, $H.
-
-        Raises UsageError, before anything moves, for joints without `homing` or whose switch is that of no single
-        motor.
-        """
-        assert isinstance(machine, GrblMachine)
+    def check_home(self, joints: Sequence[str] = (), *, rest_at_home: bool = False) -> None:
+        """Raise UsageError for joints without `homing`, or whose switch is that of no single motor."""
+        super().check_home(joints, rest_at_home=rest_at_home)
         arm = self.arm
         lacks = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
         if lacks:
             raise UsageError(f"joints without homing: {', '.join(lacks)}; GRBL homes all axes or none")
         if np.count_nonzero(arm.motor_gain) != arm.n:
             raise UsageError("GRBL homes motors, not joints: this arm's motors turn several joints at once")
-        at = units.joints_in(arm, [homing.at for homing in arm.homing if homing is not None])
-        machine.home(pulses(arm, at).tolist())
 
-    def grip(self, machine: Backend, value: str | float) -> float:
-        """Move the gripper, and return what was sent: GRBL measures nothing."""
-        assert isinstance(machine, GrblMachine)
-        return machine.grip(self.gripper(), self.grip_value(value))
+    def home(
+        self,
+        joints: Sequence[str] = (),
+        announce: Callable[[str], None] = lambda name: None,
+        *,
+        rest_at_home: bool = False,
+    ) -> None:
+        """Home all axes by GRBL's cycle, $H."""
+        self.check_home(joints, rest_at_home=rest_at_home)
+        at = units.joints_in(self.arm, [homing.at for homing in self.arm.homing if homing is not None])
+        self.machine.home(pulses(self.arm, at).tolist())
+
+    def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
+        """Move the gripper, and tell what was sent: GRBL measures nothing."""
+        target = self.grip_value(value)
+        return Gripped(self.machine.grip(self.gripper(), target), target, "S")
+
+    def settings(self) -> list[dict[str, Any]]:
+        """Settings that are not as the robot file wants them."""
+        return [
+            {"setting": d.number, "what": d.what, "found": d.found, "wanted": d.wanted, "serious": d.serious}
+            for d in self.machine.wrong()
+        ]
+
+    def write_settings(self) -> None:
+        """Write the settings that differ, and read them back; the position is lost with it."""
+        self.machine.setup()
+
+
+BOARD = GrblBoard

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,10 +15,7 @@ from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.gripper_counts import Grip
-    from armkin.board.kinds import Foreign
-    from armkin.cli.answers import Grip as Answer
-    from armkin.model.arm import Arm
+    from armkin.board.backend.board import Board, Gripped
 
 
 _WORD = {"open": "open", "closed": "closed", "close": "closed", "shut": "closed"}
@@ -41,69 +38,44 @@ def grip(
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
-    from armkin.board.firmware import gripping
-    from armkin.board.firmware.machine import Machine
-    from armkin.board.kinds import Foreign
-
     arm = inputs.load(robot)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
-    if isinstance(board, Foreign):
-        _grip_other(arm, board, value, port, baud, not no_reset, json)
-        return
-    gripper = gripping.gripper_of(arm.name, board)
-    target = _count(gripper, value, "VALUE")
-    start = None if assume is None else _count(gripper, assume, "--assume")
-    with board_link.backend(arm, board, port, baud, reset=not no_reset) as machine:
-        assert isinstance(machine, Machine)
-        gripping.prepare(machine, gripper, start)
-        at = gripping.grip(machine, gripper, target)
-    if at != target:
-        there, wanted = _said(arm, gripper, at), _said(arm, gripper, target)
-        raise LinkError(f"the gripper stands at {there} instead of {wanted}: please report this as a bug")
-    found: Answer = {
-        **render.head(arm),
-        "port": machine.port.name,
-        "gripper": gripper.value(at),
-        "counts": at,
-    }
+    target = _value(board, value, "VALUE")
+    start = None if assume is None else _value(board, assume, "--assume")
+    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+        done = board.grip(target, start)
+    if done.counts is not None and done.at != done.target:
+        raise LinkError(
+            f"the gripper stands at {render.short(done.at)} instead of {render.short(done.target)} {done.unit}: "
+            "please report this as a bug"
+        )
+    found: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": done.at}
+    if done.counts is None:
+        found |= {"target": done.target, "measured": done.measured}
+    else:
+        found["counts"] = done.counts
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else f"gripper: {_said(arm, gripper, at)}\n")
+        write(render.to_json(found) + "\n" if json else f"gripper: {_said(done)}\n")
 
 
-def _grip_other(
-    arm: Arm, other: Foreign, value: str, port: str | None, baud: int | None, reset: bool, json: bool
-) -> None:
-    """A gripper on a board of another kind: a servo may close on something before it is where it was sent."""
-    gripper = other.gripper()
-    target = other.grip_value(_WORD[value] if value in _WORD else number(value, "VALUE"))
-    with board_link.backend(arm, other, port, baud, reset=reset) as machine:
-        at = other.grip(machine, target)
-    unit = "S" if gripper.kind == "spindle" else "deg"
-    measured = gripper.kind == "bus"
-    found = {**render.head(arm), "port": machine.port.name, "gripper": at, "target": target, "measured": measured}
-    with output.destination(None) as write:
-        held = "" if abs(at - target) < 1.5 else f" of {render.short(target)}: it holds something, or is blocked"
-        said = f"gripper: {render.short(at)} {unit}{held if measured else ', as sent: nothing measures it'}\n"
-        write(render.to_json(found) + "\n" if json else said)
+def _said(done: Gripped) -> str:
+    """Where a gripper has come to rest, in words: ``29.97 deg (833 us)``."""
+    text = f"{render.short(done.at)} {done.unit}"
+    if done.counts is not None:
+        return f"{text} ({done.counts} {done.count_unit})"
+    if not done.measured:
+        return f"{text}, as sent: nothing measures it"
+    held = abs(done.at - done.target) >= 1.5
+    return text + f" of {render.short(done.target)}: it holds something, or is blocked" * held
 
 
-def _said(arm: Arm, gripper: Grip, count: int) -> str:
-    """A count in words: ``29.97 deg (833 us)``."""
-    drive = arm.gripper
-    assert drive is not None
-    unit = "deg" if drive.lead is None else "mm"
-    return f"{render.short(gripper.value(count))} {unit} ({count} {'us' if drive.kind == 'servo' else 'steps'})"
-
-
-def _count(gripper: Grip, text: str, what: str) -> int:
-    named = {"open": gripper.open, "closed": gripper.closed}
-    if text in named:
-        return named[text]
-    if not is_number(text) and (close := get_close_matches(text.lower(), (*named, "close", "shut"), 1)):
+def _value(board: Board, text: str, what: str) -> str | float:
+    """A gripper's value: open, closed, or a number within them. Raises UsageError for others."""
+    board.grip_value("open")  # is there a gripper?
+    if text in _WORD:
+        return _WORD[text]
+    if not is_number(text) and (close := get_close_matches(text.lower(), _WORD, 1)):
         raise UsageError(f"{what}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
-    count = gripper.count(number(text, what))
-    low, high = sorted(named.values())
-    if not low <= count <= high:
-        ends = sorted((gripper.value(low), gripper.value(high)))
-        raise UsageError(f"{what}: {text} is outside of the gripper's {ends[0]:g} to {ends[1]:g}")
-    return count
+    value = number(text, what)
+    board.grip_value(value)
+    return value

@@ -11,12 +11,10 @@ from armkin.cli import board_link, completion, inputs, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
-from armkin.errors import HomingIncompleteError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.homing import Lost
-    from armkin.board.firmware.machine import Machine
+    from armkin.board.backend.board import LostSteps
     from armkin.model.arm import Arm
 
 _REHEARSAL = "the simulated arm starts in its home pose; its switches are where the robot file says"
@@ -47,64 +45,25 @@ def home(
     steps lost since are told. Keep clear of it: it moves as far as it must. With
     --port sim the switches are where the robot file says.
     """
-    from armkin.board.firmware import homing
-    from armkin.board.firmware.machine import Machine
-    from armkin.board.kinds import Foreign
     from armkin.board.planner import where
 
     arm = inputs.load(robot)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
-    if isinstance(board, Foreign):
-        _refuse_choice(board.board.kind, joints, rest_at_home)
-        simulated = board_link.AT_HOME
-    else:
-        homing.searches(arm, board, joints or (), rest_at_home=rest_at_home)  # refuses before a port is opened
-        simulated = _REHEARSAL
-    with board_link.backend(arm, board, port, baud, simulated=simulated, reset=not no_reset) as machine:
+    board.check_home(joints or (), rest_at_home=rest_at_home)  # refuses before a port is opened
+    with board_link.backend(board, port, baud, simulated=_REHEARSAL, reset=not no_reset) as machine:
         told: dict[str, Any] = {}
-        if isinstance(board, Foreign):
-            board.home(machine)
-        else:
-            assert isinstance(machine, Machine)
-            told["lost_steps"] = _told(arm, _home(machine, joints or (), rest_at_home))
+        lost = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
+        if lost is not None:
+            told["lost_steps"] = _told(arm, lost)
         if not stay:
             output.note("moving to the home pose")
-            if isinstance(board, Foreign):
-                board.go_home(machine)
-            else:
-                assert isinstance(machine, Machine)
-                homing.go_home(machine)
+            board.go_home()
         found = {**render.head(arm), "port": machine.port.name, **where(machine), **told}
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
 
 
-def _refuse_choice(kind: str, joints: Sequence[str] | None, rest_at_home: bool) -> None:
-    """Raise UsageError for joints or --rest-at-home on a board that homes by itself, all joints at once."""
-    if extra := [*(joints or ()), *["--rest-at-home"] * rest_at_home]:
-        raise UsageError(f"boards of kind {kind} home all joints at once: leave {' '.join(extra)} out")
-
-
-def _home(machine: Machine, joints: Sequence[str], rest_at_home: bool) -> list[Lost]:
-    """Home joints on a board with armkin's firmware. Raises HomingIncompleteError if others are still lost."""
-    from armkin.board.firmware import homing
-
-    arm = machine.arm
-    steps = homing.home(machine, joints, lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
-    lost = homing.lost_joints(machine)
-    if lost:
-        done = [name for name in arm.joint_names if name not in lost]
-        raise HomingIncompleteError(
-            f"homed {', '.join(done) or 'nothing'}; the position of {', '.join(lost)} is still lost",
-            advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
-            joints=lost,
-            homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
-            robot_file=arm.path,
-        )
-    return steps
-
-
-def _told(arm: Arm, found: Sequence[Lost]) -> list[dict[str, Any]]:
+def _told(arm: Arm, found: Sequence[LostSteps]) -> list[dict[str, Any]]:
     """What the switches tell of the counts, as JSON; a warning where more than a step is missing."""
     told = []
     for one in found:

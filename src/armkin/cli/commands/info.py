@@ -33,7 +33,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
 
 
 def _answer(arm: Arm, task: str | None) -> Info:
-    from armkin.board.firmware.missing_keys import lines_to_add, needs
+    from armkin.board.backend.missing_keys import lines_to_add, needs
 
     file = arm.file
     assert file is not None  # it was read from one

@@ -32,9 +32,6 @@ def jog(
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
     itself when this command falls silent, and before the joint limits if the position is known.
     """
-    from armkin.board.firmware import jogging
-    from armkin.board.firmware.machine import Machine
-    from armkin.board.kinds import Foreign
     from armkin.board.planner import where
     from armkin.model.lock import joint_index
 
@@ -48,17 +45,13 @@ def jog(
     top = float(units.joints_out(arm, arm.max_speed)[j])
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
-    with board_link.backend(arm, board, port, baud, reset=not no_reset) as machine:
-        if isinstance(board, Foreign):
-            board.jog(machine, j, float(units.joints_in(arm, [rate] * arm.n)[j]), time)
-        else:
-            assert isinstance(machine, Machine)
-            jogging.prepare(machine)
-            slow = top / jogging.SLOW
-            if machine.position() == "lost" and abs(rate) > slow:
-                rate = slow if rate > 0 else -slow
-                output.warn(f"the position is lost: {abs(rate):g} instead of {speed}, and no limits")
-            jogging.jog(machine, jogging.rates(machine, j, rate), time)
+    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+        wanted = float(units.joints_in(arm, [rate] * arm.n)[j])
+        allowed = board.ready_to_jog(j, wanted)
+        if allowed != wanted:
+            slower = abs(rate * allowed / wanted)
+            output.warn(f"the position is lost: {slower:g} instead of {speed}, and no limits")
+        board.jog(j, allowed, time)
         found = {**render.head(arm), "port": machine.port.name, **where(machine)}
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))

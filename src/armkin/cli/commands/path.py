@@ -165,26 +165,26 @@ def _carried_out(
     json: bool,
 ) -> None:
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
-    from armkin.board import path_run, resuming
+    from armkin.board import path_run
     from armkin.board.planner import where
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
     board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed(arm, link.assume)
     simulated = board_link.simulated(link.assume)
-    with board_link.backend(arm, board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
+    with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
         board_link.prepare(arm, machine, link.assume, stands)
-        held = board_link.held(machine, link.resume)
+        held = board_link.held(board, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
             plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
-            laid = path_run.parts(plan, began, machine.lay)
+            laid = path_run.parts(plan, began, board.lay)
             _files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
-        with resuming.under_way(machine, laid, held) as (left, first, note), board_link.told(left, note) as tell:
-            path_run.follow(machine, plan, left, tell, first)
+        with board.under_way(laid, held) as (left, first, note), board_link.told(left, note) as tell:
+            path_run.follow(board, plan, left, tell, first)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
         if held is not None:
             found.pop("approach", None)  # where it began, that motion is over
@@ -249,24 +249,16 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
 
     rehearsal: a gripper that could not do its part is refused, too.
     """
-    from functools import partial
-
     from armkin.board import path_run
-    from armkin.board.firmware.trajectory_to_counts import cut
-    from armkin.board.kinds import Foreign
     from armkin.motors import pulses
 
     try:
-        there = board_link.board_of(plan.arm, rehearsal=True)
+        board = board_link.board_of(plan.arm, rehearsal=True)
     except UsageError:
         return None
     if rehearsal:
-        path_run.check_gripper(plan, there)
-    start = pulses(plan.arm, (plan.approach or plan.motion).start).tolist()
-    if isinstance(there, Foreign):
-        return path_run.parts(plan, start, there.lay)
-    board = there.board
-    return path_run.parts(plan, start, partial(cut, clock=board.clock, min_interval=board.min_interval))
+        path_run.check_gripper(plan, board)
+    return path_run.parts(plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.lay)
 
 
 def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:

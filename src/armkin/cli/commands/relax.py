@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,10 @@ from armkin.cli.options import Out, Robot
 from armkin.columns.cells import csv_line
 from armkin.errors import UsageError
 from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.board.backend.board import Board
+    from armkin.model.arm import Arm
 
 _LONGEST = 3600.0  # [s]
 _RATE = 10  # [rows/s]
@@ -34,24 +38,27 @@ def relax(
     Hold the arm: without its motors it falls. Prints joint values as CSV with a header, one row, or ten a second
     for --seconds; `armkin send ROBOT --batch FILE` plays them back.
     """
-    from armkin.board.feetech.machine import ServoMachine
-    from armkin.board.kinds import foreign
-
     arm = inputs.load(robot)
-    other = foreign(arm)
-    if other is None or other.board.kind != "feetech":
-        raise UsageError(f"{arm.name} has no bus servos: other motors cannot be moved by hand and read")
+    board = _with_servos(arm)
     time = number(seconds, "--seconds")
     if not 0 <= time <= _LONGEST:
         raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
-    with board_link.backend(arm, other, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
-        assert isinstance(machine, ServoMachine)
-        machine.relax()
+    with board_link.backend(board, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
+        board.relax()
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")
         write(csv_line(arm.joint_names) + "\n")
         begin, rows = machine.port.now(), 0
-        while rows <= _RATE * time and machine.wait(begin + rows / _RATE):
-            write(csv_line(units.joints_out(arm, machine.read()).tolist()) + "\n")
+        while rows <= _RATE * time and board.wait(begin + rows / _RATE):
+            machine.refresh()
+            write(csv_line(units.joints_out(arm, machine.joints()).tolist()) + "\n")
             rows += 1
     if out not in (None, "-"):
         output.note(f"{rows} row{'s' * (rows != 1)} in {out}")
+
+
+def _with_servos(arm: Arm) -> Board:
+    """The arm's board. Raises UsageError if its motors cannot be moved by hand and read."""
+    board = board_link.board_of(arm, rehearsal=True)
+    if not board.can("relax"):
+        raise UsageError(f"{arm.name} has no bus servos: other motors cannot be moved by hand and read")
+    return board

@@ -29,7 +29,7 @@ def robots(json: Json = False, out: Out = None) -> None:
 
 def _entry(name: str) -> ShippedRobot:
     import armkin
-    from armkin.board.firmware.missing_keys import needs
+    from armkin.board.backend.missing_keys import needs
 
     arm = armkin.load(name)
     task, labels, refused = _task(arm)

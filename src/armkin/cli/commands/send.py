@@ -18,9 +18,8 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend, Planned
+    from armkin.board.backend import Planned
     from armkin.board.planner import Planner, Stream
-    from armkin.board.resuming import Note
     from armkin.cli.send_goals import Goals
     from armkin.model.arm import Arm
 
@@ -88,7 +87,6 @@ def send(
     All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
     its path; its position stays known.
     """
-    from armkin.board.firmware.machine import Machine
     from armkin.board.planner import Planner, Stream, where
     from armkin.board.stopping import planning
 
@@ -134,18 +132,14 @@ def send(
         if rehearsal and all(line.startswith("max_accel") for line in error.fields.get("lines_to_add", ["no"])):
             error.fields["option"] = "--accel"
         raise
-    planner, stands = Planner(arm, board, fraction, radius), board_link.assumed(arm, assume)
+    planner, stands = Planner(board, fraction, radius), board_link.assumed(arm, assume)
     if dry_run:
         _dry_run(planner, goals, start, trace, json)
         return
-    with board_link.backend(
-        arm, board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset
-    ) as machine:
+    with board_link.backend(board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset) as machine:
         board_link.prepare(arm, machine, assume, stands)
-        held = board_link.held(machine, resume)
+        held = board_link.held(board, resume)
         began = machine.counts() if held is None else held.start
-        if isinstance(machine, Machine):
-            planner.use(machine.info.clock, machine.info.min_interval)
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
                 machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
@@ -154,7 +148,7 @@ def send(
                 plans = _all(planner, goals, began)  # every refusal before anything moves
                 _write_trace(arm, plans, trace)
             began = machine.counts()
-            _carry_out(machine, planner, plans, held)
+            _carry_out(planner, plans, held)
         planned = planner.done.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
     problem = goals.problem if isinstance(goals, Stream) else None
@@ -183,12 +177,11 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
         write(render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed))
 
 
-def _carry_out(machine: Backend, planner: Planner, plans: Sequence[Planned], held: Note | None) -> None:
+def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:
     """Move through the plans, or through what is left of them since they were held."""
-    from armkin.board import resuming
-
-    with resuming.under_way(machine, plans, held) as (left, _, note), board_link.told(left, note) as tell:
-        machine.run(planner.noted(left), tell)
+    board = planner.board
+    with board.under_way(plans, held) as (left, _, note), board_link.told(left, note) as tell:
+        board.machine.run(planner.noted(left), tell)
 
 
 def _accelerated(arm: Arm, value: float) -> Arm:

@@ -23,11 +23,11 @@ def status(
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
-    with board_link.backend(arm, board, port, baud, simulated=new, reset=not no_reset) as machine:
+    with board_link.backend(board, port, baud, simulated=new, reset=not no_reset) as machine:
         found = {
             **render.head(arm),
             "port": machine.port.name,
-            "board": board.board.kind,
+            "board": board.kind,
             **where(machine),
             **machine.report(),
         }

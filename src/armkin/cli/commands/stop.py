@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import board_link, output
 from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName, port_name
+from armkin.cli.default_port import PortName, only
 from armkin.errors import LinkError, UsageError
 
 _PATIENCE = 15.0  # [s] for an arm to come to rest
@@ -63,14 +63,17 @@ def stop(
 
 def _port(given: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
-    from armkin.board.firmware.find_boards import likely
+    from armkin.board.firmware.find_boards import answering, likely
     from armkin.board.ports import holder
+    from armkin.board.stopping import stoppable
 
     if given is None:
         held = [name for name in likely() if holder(name) is not None]
         if len(held) == 1:
             return held[0]
-    return port_name(given, None, baud, reset=reset)
+        with stoppable() as stop:
+            return only(answering(None, baud, stop, reset=reset), "a board")
+    return given
 
 
 def _end(process: int, port: str) -> None:

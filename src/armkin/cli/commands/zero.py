@@ -40,9 +40,6 @@ def zero(
     """
     import numpy as np
 
-    from armkin.board.feetech import gripping
-    from armkin.board.feetech.machine import ServoMachine
-    from armkin.board.kinds import foreign
     from armkin.model import units
     from armkin.motors import motor_names
     from armkin.robot_file import parse
@@ -50,15 +47,14 @@ def zero(
     from armkin.robot_file.edit import replaced
 
     arm = inputs.load(robot)
-    other = foreign(arm)
-    if other is None or other.board.kind != "feetech" or np.count_nonzero(arm.motor_gain) != arm.n:
+    board = board_link.board_of(arm, rehearsal=True)
+    if not board.can("zero") or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
     q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
-    jaw = None if gripper is None else other.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
-    with board_link.backend(arm, other, port, baud, reset=not no_reset) as machine:
-        assert isinstance(machine, ServoMachine)
-        counts, name = list(machine.counts()), machine.port.name
-        grips = None if jaw is None else gripping.zero(machine.bus, other.gripper(), jaw)
+    jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
+    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+        name = machine.port.name
+        counts, grips = board.zero(jaw)
     found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
     names = motor_names(arm)
     if out is not None:
@@ -78,6 +74,6 @@ def zero(
         for joint, count, new, motor in zip(names, counts, found, arm.motors, strict=True):
             rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
         if grips is not None:
-            rows.append(["gripper", *map(str, grips), f"{other.gripper().zero:g}"])
+            rows.append(["gripper", *map(str, grips), f"{board.gripper().zero:g}"])
         with output.destination(None) as write:
             write(render.to_json(answer) + "\n" if json else render.table(rows) + "\n")

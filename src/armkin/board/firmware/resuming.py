@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.protocol import STEP
 from armkin.board.firmware.trajectory_to_counts import Cut
 from armkin.board.ports import note_path, read_note, remove_note, write_note
@@ -27,7 +26,7 @@ from armkin.motion.trajectory import Trajectory
 from armkin.motors import places
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend, Planned
+    from armkin.board.firmware.machine import Machine
 
 _NEAR = 1.5  # steps that every motor of an arm on its plan is within
 _SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
@@ -109,16 +108,12 @@ class Trip:
 
 @contextmanager
 def under_way(
-    machine: Backend, parts: Sequence[Planned], note: Note | None
-) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
+    machine: Machine, cuts: Sequence[Cut], note: Note | None
+) -> Iterator[tuple[Sequence[Cut], int, Callable[[float], None]]]:
     """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
 
-    note: of the motion that is gone on with; None: all of it. Other boards than ours keep no note.
+    note: of the motion that is gone on with; None: all of it.
     """
-    if not isinstance(machine, Machine):
-        yield parts, 0, lambda seconds: None
-        return
-    cuts = [part for part in parts if isinstance(part, Cut)]
     place = None if note is None else find(machine, note, cuts)
     left = cuts if place is None else rest(machine, cuts, place)
     started = None if note is None or place is None else (note, place.done)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.board_kinds import BOARDS, DRIVERS, FOREIGN
+from armkin import installed_kinds
+from armkin.board_kinds import BOARDS, DRIVERS
 from armkin.errors import UsageError
 from armkin.motion.plan import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
@@ -84,7 +85,8 @@ def _drive_lines(arm: Arm, still: list[str], board: bool) -> list[str]:
 def _axes(arm: Arm) -> tuple[str, ...]:
     """Names of the stepper axes of the arm's board, or of the one that `without_board` proposes."""
     kind = _board_for(arm) if arm.board is None else arm.board.kind
-    return FOREIGN[kind].axes if kind in FOREIGN else BOARDS[kind].steppers
+    other = installed_kinds.foreign(kind)
+    return BOARDS[kind].steppers if other is None else other.axes
 
 
 def _board_for(arm: Arm) -> str:
@@ -100,10 +102,10 @@ def without_board(arm: Arm) -> list[Lack]:
     if arm.board is None:
         kind = _board_for(arm)
         driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven(arm) else ""
-        choice = f"kinds: {', '.join([*BOARDS, *FOREIGN])}; drivers: {', '.join(DRIVERS)}"
+        choice = f"kinds: {', '.join(installed_kinds.names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
     found: list[Lack] = []
-    if (foreign := FOREIGN.get(arm.board.kind)) is not None:  # it has its own drivers and settings
+    if (foreign := installed_kinds.foreign(arm.board.kind)) is not None:  # it has its own drivers and settings
         bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
         if bare:
             add = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"

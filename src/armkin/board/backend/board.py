@@ -1,0 +1,320 @@
+"""An arm's board: what armkin asks of every kind, our own firmware's among them.
+
+A kind is one class: what can be said without a port (does the arm fit, what does a trajectory become, where may
+such a board be), and, once `connect` has been called, what the board does. Some of that is a capability, which a kind
+has or lacks: it is asked for by its name (`can`, `need`), never by the kind.
+
+    board = board_of(arm)                    # UsageError if the arm cannot be driven
+    machine = board.connect(board.open(name), stop)
+    machine.prepare(); machine.run([machine.plan(machine.counts(), q)])     # Backend
+    board.need("home"); board.home()                                        # capabilities: CAPABILITIES
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.board.backend.job import planned
+from armkin.board.backend.starting import check_jog
+from armkin.board.ports import BAUD, SIM
+from armkin.errors import LinkError, UsageError
+from armkin.motion.plan import rate_lines, straight
+from armkin.motion.trajectory import Trajectory
+from armkin.motors import settled
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Backend, Planned, StoppedError
+    from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.robot_file.model import Gripper
+
+Never = Callable[[], bool]
+JOG_PIECE = 0.3  # [s] of one piece of a jog on a board that cannot be told to go on
+
+CAPABILITIES = {
+    "home": "find the limit switches",
+    "grip": "move a gripper",
+    "relax": "switch the motors off and read where the arm is moved by hand",
+    "zero": "tell the counts that a drive's zero is made of",
+    "settings": "compare its settings with the robot file",
+    "write_settings": "write those that differ",
+    "recall": "tell where a motion was held: --resume is for boards with armkin's firmware",
+}
+
+
+class LostSteps(NamedTuple):
+    """What a switch that was met again tells of the counts."""
+
+    joint: str
+    steps: int | None  # of its motor, that the counts were ahead of the arm; None: its position was not known
+    difference: float | None  # the same [rad | mm]
+
+
+class Gripped(NamedTuple):
+    """Where a gripper was sent, and where it came to rest, both in its drive's units."""
+
+    at: float
+    target: float
+    unit: str  # deg, mm, or S of a spindle's output
+    counts: int | None = None  # where the board counts them
+    count_unit: str = ""
+    measured: bool = False  # it may have closed on something before it was where it was sent
+
+
+class Board(ABC):
+    """An arm's board of some kind."""
+
+    baud: ClassVar[int] = BAUD
+    gripper_drive: ClassVar[str] = "none"  # the kind of drive of a gripper that it moves
+    gripper_taken: ClassVar[str] = "it moves none"  # which gripper this kind moves, for an error
+    lacks: ClassVar[Mapping[str, str]] = {}  # capability -> why there is none, for people
+    hint: ClassVar[str] = "armkin ports lists them"  # where the names of its ports are found
+    home_speed: ClassVar[float] = 1.0  # fraction of the joints' speeds on the way to the home pose
+    machine: Backend  # once connected
+    stop: Never
+
+    def __init__(self, arm: Arm, *, rehearsal: bool = False) -> None:
+        """Raises UsageError, naming what is missing, if such an arm cannot be planned or driven.
+
+        rehearsal: for a plan or a simulated board.
+        """
+        self.arm = arm
+        if lines := rate_lines(arm):
+            raise UsageError(
+                f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:"
+                + "".join(f"\n  {line}" for line in lines),
+                robot_file=arm.path,
+                lines_to_add=lines,
+            )
+        self.check()
+
+    # What each kind does in its own way
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise UsageError if the arm's drives are not for this kind of board."""
+
+    @abstractmethod
+    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+        """A trajectory that starts at counts (motors,)."""
+
+    @abstractmethod
+    def simulated(self) -> Port:
+        """A board of this kind in this process, set up for the arm, which stands at home."""
+
+    @abstractmethod
+    def attach(self, port: Port, stop: Never) -> Backend:
+        """The arm on the board behind an open port. Raises LinkError if no such board answers there."""
+
+    @abstractmethod
+    def replies(self, link: Port, stop: Never) -> bool:
+        """Whether such a board replies behind an open port. Raises LinkError, too, if none does."""
+
+    # The same for most
+
+    @property
+    def kind(self) -> str:
+        """The kind's name, as in a robot file."""
+        return self.arm.board.kind if self.arm.board is not None else "none"
+
+    @property
+    def called(self) -> str:
+        """The kind in words."""
+        return f"a {self.kind} board"
+
+    @property
+    def settings_file(self) -> str | None:
+        """What its owner writes into a file of the board's, where it has one."""
+        return None
+
+    def plan(self, start: Sequence[int], targets: Array, speed: float = 1.0) -> Planned:
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        return self.lay(*planned(self.arm, start, targets, speed))
+
+    def likely(self) -> list[str]:
+        """Names of the ports where such a board may be: Arduinos, and the chips of ESP32s and adapters."""
+        from armkin.board.ports import list_ports
+
+        return [port.device for port in list_ports() if port.board or port.adapter]
+
+    def open(self, name: str, baud: int | None = None, *, reset: bool = True) -> Port:
+        """The port of that name; `sim`: a board of this kind in this process."""
+        from armkin.board.ports import SerialPort
+
+        return self.simulated() if name == SIM else SerialPort(name, baud or self.baud, reset=reset)
+
+    def answers(self, name: str, baud: int | None = None, stop: Never = lambda: False, *, reset: bool = True) -> bool:
+        """Whether such a board answers at a port. Nothing moves."""
+        try:
+            link = self.open(name, baud, reset=reset)
+        except LinkError:
+            return False
+        try:
+            return self.replies(link, stop)
+        except LinkError:
+            return False
+        finally:
+            link.close()
+
+    # Connected
+
+    def connect(self, port: Port, stop: Never = lambda: False) -> Backend:
+        """The arm on the board behind an open port, `machine` from now on. Raises as `attach` does.
+
+        stop: asked all the time; when it says yes, the arm is held and StoppedError raised.
+        """
+        self.stop = stop
+        self.machine = self.attach(port, stop)
+        return self.machine
+
+    def again(self) -> None:
+        """Begin another job on the machine: what ended the one before is over."""
+        self.machine.refresh()
+
+    def wait(self, until: float) -> bool:
+        """Wait for a moment of the port's clock; False if a stop was asked for before."""
+        port = self.machine.port
+        while port.now() < until and not self.stop():
+            port.read(0.01)
+        return not self.stop()
+
+    def heard(self) -> None:
+        """Take the newest word of where the arm is while it moves."""
+        return
+
+    def stopped(self, error: StoppedError) -> None:
+        """Take the word of where the arm came to rest."""
+        return
+
+    @contextmanager
+    def under_way(
+        self, parts: Sequence[Planned], note: Any
+    ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
+        """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
+
+        note: of `recall`, the motion that is gone on with; None: all of it.
+        """
+        yield parts, 0, lambda seconds: None
+
+    def go_home(self) -> None:
+        """Move to the home pose from where the arm stands."""
+        self.machine.prepare()
+        self.machine.run([self.plan(self.machine.counts(), self.arm.home[None], self.home_speed)])
+
+    def ready_to_jog(self, joint: int, rate: float) -> float:
+        """Get ready to move one joint; the rate [rad/s | mm/s] that it may be moved at.
+
+        Raises NoSolutionError if it would go farther outside its limits.
+        """
+        self.machine.prepare()
+        check_jog(self.arm, self.machine.joints(), joint, rate)
+        return rate
+
+    def jog(self, joint: int, rate: float, seconds: float, more: Callable[[], bool] | None = None) -> None:
+        """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most.
+
+        more: asked again and again; the motion ends when it says no. `ready_to_jog` comes first.
+        """
+        arm, left = self.arm, seconds
+        while left > 0 and (more is None or more()):
+            piece = left if more is None else min(JOG_PIECE, left)
+            counts = self.machine.counts()
+            here = settled(arm, self.machine.joints())
+            goal, end = here.copy(), (arm.upper if rate > 0 else arm.lower)[joint]
+            goal[joint] = np.clip(here[joint] + rate * piece, *sorted((here[joint], end)))
+            way = straight(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
+            if not way.duration:
+                return  # at its limit
+            self.machine.run([self.lay(Trajectory(arm, way.start, (way,)), np.array(counts))])
+            left -= piece
+
+    # Capabilities
+
+    def can(self, capability: str) -> bool:
+        """Whether this kind has a capability of CAPABILITIES."""
+        return getattr(type(self), capability) is not getattr(Board, capability)
+
+    def need(self, capability: str) -> None:
+        """Raise UsageError, saying why, if this kind lacks a capability."""
+        if not self.can(capability):
+            raise UsageError(self.lacks.get(capability) or f"{self.called} does not {CAPABILITIES[capability]}")
+
+    def check_home(self, joints: Sequence[str] = (), *, rest_at_home: bool = False) -> None:
+        """Raise UsageError, before a port is opened, for what does not home, or not this arm, or not so."""
+        self.need("home")
+        if extra := [*joints, *["--rest-at-home"] * rest_at_home]:
+            raise UsageError(f"boards of kind {self.kind} home all joints at once: leave {' '.join(extra)} out")
+
+    def home(
+        self,
+        joints: Sequence[str] = (),
+        announce: Callable[[str], None] = lambda name: None,
+        *,
+        rest_at_home: bool = False,
+    ) -> list[LostSteps] | None:
+        """Find the limit switches of joints (all, by default); what they tell of the counts, where they do.
+
+        rest_at_home: joints without a switch stand in their home pose, on the operator's word.
+        """
+        self.need("home")
+        raise NotImplementedError
+
+    def gripper(self) -> Gripper:
+        """The arm's gripper. Raises UsageError if it has none that this kind of board moves."""
+        gripper = self.arm.gripper
+        if gripper is None or gripper.kind != self.gripper_drive:
+            raise UsageError(
+                f"{self.arm.name} has no gripper that a board of kind {self.kind} moves; {self.gripper_taken}"
+            )
+        return gripper
+
+    def grip_value(self, value: str | float) -> float:
+        """Where the gripper is to go: open, closed, or a value between them. Raises UsageError for others."""
+        gripper = self.gripper()
+        low, high = sorted((gripper.open, gripper.closed))
+        wanted = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
+        if not low <= wanted <= high:
+            raise UsageError(f"grip: {wanted:g} is outside of the gripper's {low:g} to {high:g}")
+        return wanted
+
+    def grip_known(self) -> bool:
+        """Whether the gripper may be moved without somebody's word for where it stands."""
+        return True
+
+    def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
+        """Move the gripper, and return where it comes to rest; assume: where a lost one stands."""
+        self.gripper()
+        self.need("grip")
+        raise NotImplementedError
+
+    def relax(self) -> None:
+        """Switch the motors off: the arm can be moved by hand, and falls if nobody holds it."""
+        self.need("relax")
+
+    def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
+        """Counts of the arm's motors; and the gripper's count, and its `zero` if it stands at a value."""
+        self.need("zero")
+        raise NotImplementedError
+
+    def settings(self) -> list[dict[str, Any]]:
+        """Settings that are not as the robot file wants them, as JSON: setting, found, wanted, ..."""
+        self.need("settings")
+        raise NotImplementedError
+
+    def write_settings(self) -> None:
+        """Write the settings that differ, and read them back; the position is lost with it."""
+        self.need("write_settings")
+
+    def recall(self) -> Any:
+        """The note of the motion that was held on this board: `start`, the counts where it began.
+
+        Raises UsageError if there is none, LinkError if the arm has moved since.
+        """
+        self.need("recall")
