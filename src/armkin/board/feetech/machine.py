@@ -169,7 +169,7 @@ class ServoMachine(JobMachine):
     def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = done = 0.0
-        for one in plans if isinstance(plans, list) else ():
+        for one in filter(None, plans if isinstance(plans, list) else ()):
             self._check_limits(one)  # all of them, before anything moves
         for job in from_counts(plans, self._measured, tolerance=STRAY):
             if job is None:
