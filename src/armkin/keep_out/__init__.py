@@ -5,6 +5,8 @@ bodies.py     the arm's bodies: capsules along its skeleton
 shapes/       what stands around it: one file a shape
 guard.py      which pairs count, and how far apart each is in a posture
 clearance.py  `armkin.clearance`, and hits in words
+levers.py     how far a body moves when joints do; way.py: a motion as its geometry alone
+proof.py      a motion proved free between its samples
 report.py     what `armkin info` tells
 
 Nothing here knows boards. An arm without keep-outs comes no farther than `loading`.

@@ -55,6 +55,7 @@ class Arm:
     body_radius: Array | None = None  # (n + 1,) [mm] of the base and of what each joint moves, nan where not said
     keep_out: tuple[Entry, ...] = ()  # of the robot file, then of the scene
     clearance: float = 0.0  # [mm] that is kept from them
+    ignores_keep_out: bool = False  # motions are not proved: on the operator's word
     scene: str = ""  # the scene's file, as given
     scene_sha256: str = ""  # of its bytes
     whole: tuple[Arm, Mapping[str, float]] | None = None  # with keep-outs: what `lock` was given

@@ -16,6 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
 from armkin.model.limits import SLACK
+from armkin.motion.free import hit_samples as motion_hits
 from armkin.motion.linked_branches import ENDS, Columns, Int, turns_of
 
 if TYPE_CHECKING:
@@ -84,9 +85,23 @@ class Chain:
     @cached_property
     def reach(self) -> Int:
         """The last sample that each sample's run carries to, absolute; one less than itself: illegal. (len,)."""
-        if all(end is None for _, end in self._copies):
+        if self.hit_from is None and all(end is None for _, end in self._copies):
             return np.full(len(self.q), self.last)
-        return np.asarray(self._joint_reach.min(axis=1) - 1 + self.first)
+        reach = self._joint_reach.min(axis=1)
+        return np.asarray((reach if self.hit_from is None else np.minimum(reach, self.hit_from)) - 1 + self.first)
+
+    @cached_property
+    def hit_from(self) -> Int | None:
+        """The first sample, counted from `first`, at which the arm hits something, from each on; None: nowhere."""
+        hit = motion_hits(self.arm, self.q)
+        if hit is None or not hit.any():
+            return None
+        at = np.where(hit, np.arange(len(hit)), len(hit))
+        return np.asarray(np.minimum.accumulate(at[::-1])[::-1])
+
+    def hits(self, i: int) -> bool:
+        """Whether a run from sample i ends because the arm hits something."""
+        return self.hit_from is not None and self.hit_from[i - self.first] < self._joint_reach[i - self.first].min()
 
     def carries(self, i: int) -> int:
         """Last sample of a run from sample i, i - 1 if there is none."""
@@ -203,6 +218,8 @@ def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, 
     e = chain.carries(i)
     beyond = min(max(e + 1, 0), len(columns.s) - 1)
     status = Status(int(columns.status[beyond])).name.lower()
+    if chain.hits(i):
+        return "hit", None, None, status
     joint = chain.stopper(i)
     arm = chain.arm
     if joint is not None:

@@ -10,6 +10,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branch_chains import Chain, why_ended
+from armkin.motion.free import hits_said
 from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
 
 if TYPE_CHECKING:
@@ -73,13 +74,16 @@ def _break(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Recon
     """Where and why a run from a sample ends."""
     why, joint, value, beyond = why_ended(c, chain, first)
     e = max(chain.carries(first), 0)
+    hit = hits_said(arm, chain.q[min(e + 1, chain.last) - chain.first]) if why == "hit" else ""
     return Reconfiguration(
-        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond
+        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond, hit
     )
 
 
 def words(arm: Arm, where: Reconfiguration) -> str:
     """Why a branch carries no farther."""
+    if where.hit:
+        return where.hit
     if where.index is None or where.value is None:
         return _WHY[where.why]
     size, unit = (1.0, "mm") if arm.prismatic[where.index] else (units.DEGREE, "deg")
@@ -138,6 +142,7 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
         **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
+        **({} if plan.clearance is None else {"clearance": plan.clearance}),
     }
 
 

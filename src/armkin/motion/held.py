@@ -14,6 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.free import checked
 from armkin.motion.path import path
 from armkin.motion.path_plan import PathPlan
 from armkin.motion.plan import approach, check_jerk, check_rates
@@ -59,7 +60,7 @@ def path_held(
     for k, (_, base) in plan.on_path.items():
         whole.along(k, made[k], base)
     whole.approach = approach(arm, here, begun, plan.speed, options.get("accel", 1.0), check_jerk(arm, jerk))
-    return whole.finished(begun, made, plan.markers)
+    return checked(whole.finished(begun, made, plan.markers))
 
 
 def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:

@@ -23,6 +23,7 @@ from armkin.model.limits import check_limits, outside, said
 from armkin.motion import branch_report, geometry, path_numbers
 from armkin.motion.branch_path import Pace, carry, deviation, stretches
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.free import checked
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.path_plan import Marker, PathPlan
 from armkin.motion.plan import approach, check_jerk, check_rates, check_share, straight
@@ -103,7 +104,7 @@ def path(
     if arm.motors and not undriven(arm):
         here = settled(arm, here)
     near = None if near is None else np.asarray(near, dtype=float)
-    return _Walk(arm, file, pace, here, _Wishes(task, blend, near, branch, split, samples)).walked()
+    return checked(_Walk(arm, file, pace, here, _Wishes(task, blend, near, branch, split, samples)).walked())
 
 
 @dataclass(frozen=True)
@@ -345,14 +346,17 @@ class _Walk:
         """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
         found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
         meant = find(found.names, wanted) if (wanted := branch or self.wishes.branch) else None
+        free = found.clear if self.arm.keep_out and not self.arm.ignores_keep_out else None
         for b in found.order:
             named = meant is None or found.branch[b] in meant
-            if found.valid[b] and found.within_limits[b] and named:
+            if found.valid[b] and found.within_limits[b] and named and (free is None or free[b]):
                 return np.asarray(found.q[b])
         what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
         if found.status == Status.UNREACHABLE:
             raise NoSolutionError(f"{what} is out of reach: nothing was moved")
         on = f" on branch '{wanted}'" if wanted else ""
+        if free is not None and (found.within_limits & ~free).any():
+            raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
         raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
 
 

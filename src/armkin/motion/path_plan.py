@@ -38,11 +38,12 @@ class Reconfiguration:
     """Where a run ends before the path does."""
 
     s: float  # [mm]
-    why: str  # limit, reach, boundary, singularity
+    why: str  # limit, reach, boundary, singularity, hit
     joint: str | None
     index: int | None
     value: float | None  # [rad | mm] the limit
     beyond: str  # the inverse kinematics' status just behind
+    hit: str = ""  # what hits what
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class PathPlan:
     markers: list[Marker] = field(default_factory=list)
     trajectory: Trajectory | None = None
     approach: Trajectory | None = None  # the joint move from where the arm stands to the start, no part of the motion
+    clearance: dict[str, Any] | None = None  # mm (a lower bound), s_mm, body, with: where there are keep-outs
     on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
 
     def along(self, number: int, stretch: Stretch, base: float) -> None:

@@ -54,7 +54,7 @@ class Reconfiguration(TypedDict):
     """Where a run ends before the path does."""
 
     s_mm: float
-    why: Annotated[str, "limit, reach, boundary, singularity or end"]
+    why: Annotated[str, "limit, reach, boundary, singularity, hit (a keep-out) or end"]
     joint: Annotated[str | None, "whose limit it is"]
     value: Annotated[float | None, "the limit [deg or mm]"]
     status_beyond: Annotated[str, "exact, boundary, singular or unreachable"]
@@ -83,6 +83,18 @@ class Approach(TypedDict):
     duration_s: float
 
 
+# Where a path is nearest to what it must not touch.
+PathClearance = TypedDict(
+    "PathClearance",
+    {
+        "mm": Annotated[float | None, "a lower bound of the whole motion; negative: a hit; null: nothing counts"],
+        "s_mm": Annotated[float, "where it is least, or where the first hit is"],
+        "body": str,
+        "with": str,
+    },
+)
+
+
 class Path(Head):
     """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
 
@@ -103,6 +115,7 @@ class Path(Head):
     nearest_singularity: NearestSingularity | None
     segments: Annotated[int | None, "that a board is sent; null without drives"]
     approach: Annotated[NotRequired[Approach], "absent where the arm stands at the path's start"]
+    clearance: Annotated[NotRequired[PathClearance], "where there are keep-outs"]
     dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]
 
 

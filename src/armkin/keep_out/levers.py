@@ -1,0 +1,50 @@
+"""How far a body moves at most when joints do: no farther than the sum of |dq_j| times its lever on axis j."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+
+if TYPE_CHECKING:
+    from armkin.keep_out.guard import Guard
+
+
+def levers(held: Guard, out: Array) -> Array:
+    """Of every pair how far its bodies come nearer, at most, for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
+
+    out: (n,) [mm] how far a slide is out at most during the motion. Seen from the earlier body (an obstacle: from
+    the base) only the joints after it move the later one. A point's distance from axis j is at most the way that
+    leads from that axis to it along the chain, each link stretched out; of the first link only the part across
+    the axis counts.
+    """
+    arm, form = held.arm, held.bodies
+    found = np.zeros((arm.n, len(held.pairs)))
+    of_body = {body: _of(held, body, out) for body in {pair.body for pair in held.pairs}}
+    for k, pair in enumerate(held.pairs):
+        found[pair.other or 0 :, k] = of_body[pair.body][pair.other or 0 :]
+        if pair.other and (form.slide & (form.owner == pair.other)).any():
+            found[pair.other - 1, k] = 1.0  # the earlier body's slide grows, seen from its own end
+    return found * np.abs(arm.ratio)[:, None]
+
+
+def _of(held: Guard, body: int, out: Array) -> Array:
+    """Levers of a body on every axis: (n,); 0 on those behind it."""
+    arm, form = held.arm, held.bodies
+    own = form.owner == body
+    ends = np.concatenate([form.end[own], form.begin[own & ~form.slide]])
+    across, far = float(np.hypot(ends[:, 0], ends[:, 1]).max()), float(np.linalg.norm(ends, axis=1).max())
+    found = np.zeros(arm.n)
+    for j in range(body - 1, -1, -1):  # axis j is joint j + 1's: `across` it, and `far` from its origin
+        found[j] = 1.0 if arm.prismatic[j] else across
+        if arm.prismatic[j]:
+            far += out[j] * abs(float(arm.ratio[j]))
+        if j == body - 1 and (own & form.slide).any():  # where a slide begins stands before its motion
+            starts = form.begin[own & form.slide]
+            far = max(far, float(np.linalg.norm(starts, axis=1).max()))
+        shift = arm.link[j][:3, 3]
+        across = float(np.hypot(shift[0], shift[1])) + far
+        far += float(np.linalg.norm(shift))
+    return found

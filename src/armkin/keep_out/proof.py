@@ -1,0 +1,151 @@
+"""A motion proved free between its samples.
+
+Between two places no pair comes nearer than half the sum of its clearances there, less half of how far its bodies
+move in between: from either end they can have used up only what they moved. Where that is not enough the interval
+is halved; what is still open when the bodies move less than `STEP` is a hit.
+
+A pair that is too near at the start may only get farther: its depth grows nowhere by more than `STEP`, and once free
+it stays free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.keep_out.levers import levers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armkin.keep_out.guard import Guard
+    from armkin.keep_out.way import Way
+
+STEP = 0.01  # [mm] of motion that is not looked into any further
+_FIRST = 16  # intervals to begin with
+_AT_ONCE = 1024  # intervals that are halved together, the earliest ones: a hit is found before all is looked into
+_LEAST = 1e-9  # of a cell: no interval is halved below this
+_STRIDES = (64, 8, 1)  # samples that are looked at first, and in between
+_ROUGH = (0.5, 0.05)  # [mm], share of the least clearance: how far the bound may be below what was seen
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What was found of a motion.
+
+    free: nothing is hit, pairs that were too near at the start apart. place: of the first hit, or of the least
+    clearance; pair: its index, None where nothing counts; mm: a lower bound of the clearance of all other pairs over
+    the whole motion, or the clearance at the hit; escaping: pairs that were too near at the start; postures: looked at.
+    """
+
+    free: bool
+    place: float
+    pair: int | None
+    mm: float
+    escaping: tuple[int, ...]
+    postures: int
+
+
+def prove(held: Guard, way: Way, *, tight: bool = False, allowed: tuple[int, ...] | None = None) -> Proof:
+    """Prove a motion free, or find its first hit.
+
+    tight: look on until the bound of the clearance is near the least that was seen. allowed: pairs that may be too
+    near to begin with, by default those that are.
+    """
+    if not held.pairs:
+        return Proof(True, 0.0, None, np.inf, (), 0)
+    places = np.unique(np.round(np.linspace(0.0, way.cells, min(way.cells, _FIRST) + 1)))
+    q = way.at(places)
+    out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
+    lever = levers(held, out)
+    apart = held.clearances(q)
+    start = apart[0] < 0.0
+    if allowed is not None:
+        start = start & np.isin(np.arange(len(start)), allowed)
+    while True:
+        round_ = _Round(places, apart, way.variation(places[:-1], places[1:]) @ lever, start)
+        middle = round_.to_halve(tight)
+        if not len(middle):
+            return round_.result()
+        q = way.at(middle)
+        where = np.searchsorted(places, middle)
+        places = np.insert(places, where, middle)
+        apart = np.insert(apart, where, held.clearances(q), axis=0)
+
+
+def hit_samples(held: Guard, q: Array) -> NDArray[np.bool_]:
+    """Which of many neighbouring postures (N, n) hit something; most are told by those that stand some way off."""
+    count = len(q)
+    hit: NDArray[np.bool_] = np.zeros(count, np.bool_)
+    if not held.pairs or not count:
+        return hit
+    gone = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
+    lever = levers(held, np.abs(q).max(axis=0))
+    known = np.arange(0, count, _STRIDES[0])
+    known = np.append(known, count - 1) if known[-1] < count - 1 else known
+    apart = held.clearances(q[known])
+    for stride in (*_STRIDES[1:], 0):
+        hit[known] = (apart < 0).any(axis=1)
+        free = (apart[:-1] + apart[1:] >= (gone[known[1:]] - gone[known[:-1]]) @ lever).all(axis=1)
+        rows = np.flatnonzero(~free & (np.diff(known) > 1))
+        if not stride or not len(rows):
+            break
+        more = np.concatenate([np.arange(known[k] + stride, known[k + 1], stride) for k in rows])
+        where = np.searchsorted(known, more)
+        known, apart = np.insert(known, where, more), np.insert(apart, where, held.clearances(q[more]), axis=0)
+    return hit
+
+
+class _Round:
+    """What is known once clearances `apart` (N, pairs) stand at places (N,), with bodies moving by `moved` between."""
+
+    def __init__(self, places: Array, apart: Array, moved: Array, start: NDArray[np.bool_]) -> None:
+        self.places, self.apart, self.start = places, apart, start
+        self.bound = (apart[:-1] + apart[1:] - moved) / 2
+        best = np.maximum.accumulate(apart, axis=0)
+        least = np.where(start & (best < 0.0), best - STEP, 0.0)  # what a pair has to keep from here on
+        here = np.concatenate([least[:1], least[:-1]])
+        bad = (apart < here).any(axis=1)
+        self.hit = int(np.argmax(bad)) if bad.any() else len(places)  # the first place that is one
+        self.open: NDArray[np.bool_] = np.asarray((self.bound < least[:-1]).any(axis=1))
+        self.open[self.hit :] = False
+        wide = np.diff(places) > _LEAST
+        stuck = self.open & ~((self.bound < least[:-1]) & (moved >= STEP) & wide[:, None]).any(axis=1)
+        self.stuck = int(np.argmax(stuck)) if stuck.any() else len(places)  # the first interval that ends undecided
+        self.open[self.stuck :] = False
+        self.lacking = np.where(self.bound < least[:-1], self.bound - least[:-1], np.inf)
+
+    def to_halve(self, tight: bool) -> Array:
+        """Places between, of the intervals that are still open; none when all is known."""
+        rows = np.flatnonzero(self.open)
+        if tight and not len(rows) and self.hit == self.stuck == len(self.places):
+            others = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
+            seen = float(np.where(self.start, np.inf, self.apart).min(initial=np.inf))
+            rows = np.flatnonzero(others < seen - max(_ROUGH[0], _ROUGH[1] * seen)) if np.isfinite(seen) else rows
+        rows = rows[:_AT_ONCE]
+        low, high = self.places[rows], self.places[rows + 1]
+        whole = np.round((low + high) / 2)  # a cell's end, where several cells are between
+        middle = np.where(high - low > 1.0, np.clip(whole, np.floor(low) + 1, np.ceil(high) - 1), (low + high) / 2)
+        return np.asarray(middle[(middle > low) & (middle < high)])
+
+    def result(self) -> Proof:
+        """What has come out."""
+        escaping = tuple(np.flatnonzero(self.start).tolist())
+        count = len(self.places)
+        if self.stuck < count:
+            pair = int(np.argmin(self.lacking[self.stuck]))
+            found = float(self.apart[self.stuck : self.stuck + 2, pair].min())
+            return Proof(False, float(self.places[self.stuck]), pair, found, escaping, count)
+        if self.hit < count:
+            pair = int(np.argmin(self.apart[self.hit]))
+            return Proof(False, float(self.places[self.hit]), pair, float(self.apart[self.hit, pair]), escaping, count)
+        bound = np.where(self.start, np.inf, self.bound)
+        if not len(bound) or not np.isfinite(bound).any():
+            pair = int(np.argmin(self.apart[0]))
+            return Proof(True, 0.0, pair, float(self.apart[:, pair].min()), escaping, count)
+        row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
+        nearer = row + int(self.apart[row + 1, pair] < self.apart[row, pair])
+        return Proof(True, float(self.places[nearer]), pair, float(bound[row, pair]), escaping, count)

@@ -1,0 +1,257 @@
+"""Motions that hit nothing: a trajectory's geometry, the proof that it is free, and why it is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import NoSolutionError
+from armkin.formula.arrays import Array
+from armkin.keep_out.clearance import hits, whole_arm
+from armkin.keep_out.guard import Guard, guard
+from armkin.keep_out.proof import Proof, prove
+from armkin.keep_out.proof import hit_samples as find_hits
+from armkin.keep_out.way import Cubics, Way
+from armkin.model import units
+from armkin.model.lock import unlock
+from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.trajectory import Straight, Stretch, Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a proof has found of a trajectory.
+
+    proof: of the part with the first hit, or with the least clearance; stretch: its number there, share: how far into
+    that stretch's cells; joints: (n,) [rad | mm] there; body, other: names of the pair, empty where nothing counts;
+    escaping: pairs that were too near at the start.
+    """
+
+    free: bool
+    mm: float
+    stretch: int
+    cell: float
+    joints: Array
+    body: str
+    other: str
+    escaping: tuple[tuple[str, str], ...]
+    postures: int
+
+
+class _OfCurve:
+    """A smoothed curve as a way in time, one cell a grid interval of the curve."""
+
+    def __init__(self, smoothed: Smoothed) -> None:
+        self.smoothed, self.curve = smoothed, smoothed.curve
+        self.inner = Cubics(_points(smoothed.curve))
+        self.step = float(np.median(np.diff(self.curve.times))) or smoothed.duration
+        self.cells = max(int(np.ceil(smoothed.duration / self.step)), 1)
+
+    @cached_property
+    def _sums(self) -> Array:
+        return self.inner._sums
+
+    def at(self, place: Array) -> Array:
+        return self.smoothed.at(self._time(place))
+
+    def variation(self, begin: Array, end: Array) -> Array:
+        """The mean over a window goes no farther than the curve does within the windows that it sees.
+
+        Its speed is what the curve moves within the window, by the window; so between two times it goes at most
+        the share dt / window of the curve's way from the earlier window's begin to the later one's end.
+        """
+        t0, t1 = self._time(begin), self._time(end)
+        after = np.searchsorted(self.curve.times, t1, side="left")
+        before = np.searchsorted(self.curve.times, t0 - self.smoothed.window, side="right") - 1
+        last = len(self.curve.times) - 1
+        way = self._sums[np.clip(after, 0, last)] - self._sums[np.clip(before, 0, last)]
+        return np.asarray(np.minimum((t1 - t0) / self.smoothed.window, 1.0)[:, None] * way)
+
+    def _time(self, place: Array) -> Array:
+        return np.minimum(place / self.cells, 1.0) * self.smoothed.duration
+
+
+def _points(stretch: Stretch) -> Array:
+    """Control points (4, cells, n) of a stretch that is no mean."""
+    if isinstance(stretch, Curve):
+        q, h = stretch.path.q, stretch.path.h[:, None]
+        d = stretch.path.d
+        return np.array([q[:-1], q[:-1] + h * d[:-1] / 3, q[1:] - h * d[1:] / 3, q[1:]])
+    share = np.arange(4)[:, None, None] / 3
+    return np.asarray(stretch.start + share * (stretch.end - stretch.start)).reshape(4, 1, -1)
+
+
+def proved(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
+    """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove`."""
+    arm = trajectory.arm
+    whole, _ = whole_arm(arm, trajectory.start[None])
+    if not whole.keep_out:
+        return None
+    held, allowed, found, postures = guard(whole), None, None, 0
+    escaping: tuple[int, ...] = ()
+    for first, way in _ways(trajectory):
+        lifted = _Lifted(arm, way)
+        proof = prove(held, lifted, tight=tight, allowed=allowed)
+        postures += proof.postures
+        if allowed is None:
+            escaping = proof.escaping
+        allowed = proof.escaping
+        here = _found(trajectory, held, first, proof, escaping, postures, way)
+        if not proof.free:
+            return here
+        if found is None or here.mm < found.mm:
+            found = here
+    if found is None:  # no stretch: the arm stays where it is
+        return None
+    return Found(**{**vars(found), "postures": postures})
+
+
+def check_free(trajectory: Trajectory, place: str = "") -> None:
+    """Raise NoSolutionError, naming body, obstacle and place, if a motion is not proved free of what it must not touch.
+
+    Costs nothing for an arm without keep-outs, or one that ignores them.
+    """
+    if trajectory.arm.keep_out and not trajectory.arm.ignores_keep_out:
+        found = proved(trajectory)
+        if found is not None and not found.free:
+            raise refusal(trajectory, found, place)
+
+
+def checked(plan: PathPlan) -> PathPlan:
+    """A planned path with its clearance noted. Raises NoSolutionError, with the plan, if it is not proved free.
+
+    Nor may its approach hit anything.
+    """
+    found = proved(plan.motion, tight=True)
+    if found is None:
+        return plan
+    s = float(plan.s(seconds(plan.motion, found)))
+    mm = found.mm if np.isfinite(found.mm) else None
+    plan.clearance = {"mm": mm, "s_mm": s, "body": found.body, "with": found.other}
+    if found.free or plan.arm.ignores_keep_out:
+        if plan.approach is not None:
+            check_free(plan.approach, " on the way to the path's start")
+        return plan
+    error = refusal(plan.motion, found, f" at {s:.3f} mm of the path", s_mm=s)
+    error.plan = plan
+    raise error
+
+
+def refusal(trajectory: Trajectory, found: Found, place: str = "", **fields: object) -> NoSolutionError:
+    """Why a motion is refused; place: where on a path."""
+    arm = trajectory.arm
+    values = units.joints_out(arm, found.joints).tolist()
+    at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
+    stands = (found.body, found.other) in found.escaping
+    many = f" on the way to waypoint {found.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
+    what = "would go deeper into" if stands else "would hit"
+    told = {"body": found.body, "with": found.other, "joints": values, **fields}
+    return NoSolutionError(f"{found.body} {what} {found.other}{place or many}, at {at}: nothing was moved", **told)
+
+
+def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:
+    """Which of neighbouring postures (N, n) hit something; None for an arm that need not look."""
+    if not arm.keep_out or arm.ignores_keep_out:
+        return None
+    whole, full = whole_arm(arm, q)
+    return find_hits(guard(whole), full)
+
+
+def hits_said(arm: Arm, q: Array) -> str:
+    """What a posture (n,) hits: ``q3 hits table``."""
+    [(_, found)] = hits(arm, q[None])
+    return f"{found[0]['body']} hits {found[0]['with']}" if found else "the arm hits something"
+
+
+@dataclass(frozen=True)
+class _Lifted:
+    """The way of the whole arm, where joints are held."""
+
+    arm: Arm
+    way: Way
+
+    @property
+    def cells(self) -> int:
+        return self.way.cells
+
+    def at(self, place: Array) -> Array:
+        return whole_arm(self.arm, self.way.at(place))[1]
+
+    def variation(self, begin: Array, end: Array) -> Array:
+        arm, found = self.arm, self.way.variation(begin, end)
+        while arm.whole is not None:
+            arm, held = arm.whole
+            found = unlock(arm, dict.fromkeys(held, 0.0), found)
+        return found
+
+
+def _ways(trajectory: Trajectory) -> list[tuple[int, Way]]:
+    """The stretches' geometry, those that are cubics together; and the number of the first stretch of each."""
+    found: list[tuple[int, Way]] = []
+    numbered = enumerate(trajectory.stretches)
+    for smooth, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
+        part = list(group)
+        if smooth:
+            found += [(k, _OfCurve(stretch)) for k, stretch in part if isinstance(stretch, Smoothed)]
+        else:
+            found.append((part[0][0], Cubics(np.concatenate([_points(stretch) for _, stretch in part], axis=1))))
+    return found
+
+
+def _found(
+    trajectory: Trajectory, held: Guard, first: int, proof: Proof, escaping: tuple[int, ...], postures: int, way: Way
+) -> Found:
+    """A proof in the terms of the trajectory."""
+    stretch, cell = first, proof.place
+    if isinstance(way, Cubics):
+        sizes = [_cells(one) for one in trajectory.stretches[first:]]
+        while cell >= sizes[stretch - first] and stretch + 1 < len(trajectory.stretches):
+            if not isinstance(trajectory.stretches[stretch + 1], Straight | Curve):
+                break
+            cell -= sizes[stretch - first]
+            stretch += 1
+    body, other = ("", "") if proof.pair is None else held.of(proof.pair)
+    joints = way.at(np.array([proof.place]))[0]
+    pairs = tuple(held.of(k) for k in escaping)
+    return Found(proof.free, proof.mm, stretch, cell, joints, body, other, pairs, postures)
+
+
+def _cells(stretch: Stretch) -> int:
+    return len(stretch.path.h) if isinstance(stretch, Curve) else 1
+
+
+def seconds(trajectory: Trajectory, found: Found) -> float:
+    """When, after the beginning, a trajectory is at the place that a proof has found [s]."""
+    stretch = trajectory.stretches[found.stretch]
+    begin = float(trajectory.begins[found.stretch])
+    if isinstance(stretch, Smoothed):
+        return begin + min(found.cell / _OfCurve(stretch).cells, 1.0) * stretch.duration
+    if isinstance(stretch, Curve):
+        times = stretch.times
+        i = min(int(found.cell), len(times) - 2)
+        return begin + float(times[i] + (found.cell - i) * (times[i + 1] - times[i]))
+    return begin + _of_share(stretch, found.cell)
+
+
+def _of_share(stretch: Stretch, share: float) -> float:
+    """When a straight line has gone so far: its law never goes back."""
+    low, high = 0.0, stretch.duration
+    way = stretch.end - stretch.start
+    j = int(np.argmax(np.abs(way)))
+    if way[j] == 0.0:
+        return 0.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        gone = float((stretch.at(np.array([middle]))[0, j] - stretch.start[j]) / way[j])
+        low, high = (middle, high) if gone < share else (low, middle)
+    return low

@@ -1,0 +1,161 @@
+"""Motions proved free between their samples, against thousands of samples of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import NoSolutionError
+from armkin.formula.arrays import Array
+from armkin.keep_out.guard import guard
+from armkin.keep_out.levers import levers
+from armkin.keep_out.proof import hit_samples
+from armkin.keep_out.way import Cubics
+from armkin.model.arm import Arm
+from armkin.motion.free import check_free, proved, seconds
+from armkin.motion.plan import plan
+from armkin.motion.trajectory import Trajectory
+
+TABLE = "keep_out:\n  - self\n  - floor: -20\n  - box: {min: [300, -400, 0], max: [700, 400, 180]}\n    name: table\n"
+RAIL = """
+name: rail
+convention: standard
+keep_out: [self, floor: -50, box: {min: [150, -80, 0], max: [300, 80, 150]}]
+joints:
+  - {name: q1, dh: {alpha: -90, a: 0, d: 100}, limits: [-170, 170], max_speed: 60, max_accel: 100}
+  - {name: q2, type: prismatic, dh: {alpha: 90, a: 0, d: 60}, limits: [0, 300], max_speed: 60, max_accel: 100}
+  - {name: q3, dh: {alpha: 0, a: 150, d: 0}, limits: [-170, 170], max_speed: 60, max_accel: 100}
+  - {name: q4, dh: {alpha: 90, a: 120, d: 0}, limits: [-170, 170], max_speed: 60, max_accel: 100}
+"""
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    path = tmp_path / "table.yaml"
+    path.write_text(TABLE)
+    return path
+
+
+def _arm(kind: str, table: Path) -> Arm:
+    if kind == "rail":
+        path = table.parent / "rail.yaml"
+        path.write_text(RAIL)
+        return armkin.load(path)
+    arm = armkin.load(kind, scene=table)
+    return replace(arm, max_speed=np.ones(arm.n), max_accel=np.ones(arm.n))
+
+
+def _postures(arm: Arm, count: int, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(arm.lower, -300.0), np.minimum(arm.upper, 300.0)
+    low, high = (np.where(arm.prismatic, x, np.clip(x, -3.0, 3.0)) for x in (low, high))
+    q = rng.uniform(low, high, (count, arm.n))
+    return q[np.asarray(armkin.clearance(arm, q).mm) >= 0]
+
+
+@pytest.mark.parametrize("kind", ["three_dof", "ur5e", "rail"])
+def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: Path) -> None:
+    arm = _arm(kind, table)
+    held, q = guard(arm), _postures(arm, 400, 5)
+    share, free = np.linspace(0.0, 1.0, 1500)[:, None], 0
+    for a, b in zip(q[:60], q[-60:], strict=True):
+        found = proved(plan(arm, a, b))
+        assert found is not None
+        least = float(held.clearances(a + share * (b - a)).min())
+        assert least >= 0.0 if found.free else least < 0.05
+        assert found.postures < 2000
+        free += found.free
+    assert 5 < free < 60
+
+
+def test_a_body_moves_no_farther_than_its_levers(table: Path) -> None:
+    for kind in ("ur5e", "rail"):
+        arm = _arm(kind, table)
+        held, rng = guard(arm), np.random.default_rng(7)
+        q = _postures(arm, 2000, 6)
+        step = rng.normal(size=q.shape) * np.where(arm.prismatic, 1.0, 0.01)
+        moved = np.abs(held.distances(q + step) - held.distances(q))
+        bound = np.abs(step) @ levers(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
+        assert (moved <= bound + 1e-9).all()
+        assert (moved.max(axis=0) > 0.2 * bound.max(axis=0)).any()  # and the bound is no guess in the sky
+
+
+def test_parts_of_cubics_go_no_farther_than_told() -> None:
+    rng = np.random.default_rng(8)
+    way = Cubics(rng.normal(size=(4, 7, 2)))
+    way.points[0, 1:] = way.points[3, :-1]
+    begin = rng.uniform(0, 7, 200)
+    end = begin + rng.uniform(0, 1, 200) * (7 - begin)
+    told = way.variation(begin, end)
+    places = begin[:, None] + np.linspace(0, 1, 400) * (end - begin)[:, None]
+    gone = np.abs(np.diff(way.at(places.ravel()).reshape(200, 400, 2), axis=1)).sum(axis=1)
+    assert (gone <= told + 1e-12).all()
+    whole = way.variation(np.zeros(1), np.full(1, 7.0))[0]
+    assert whole == pytest.approx(np.abs(np.diff(way.points, axis=0)).sum(axis=(0, 1)))
+
+
+def test_a_path_tells_a_lower_bound_of_its_clearance(table: Path) -> None:
+    arm = armkin.load("three_dof", scene=table)
+    for jerk in (None, 8.0):
+        found = armkin.path(arm, [[390, 80, 300], [390, -80, 200], [300, -80, 250]], blend=5, jerk=jerk)
+        assert found.clearance is not None
+        sampled = float(np.min(armkin.clearance(arm, found.q(np.linspace(0, found.duration, 5000))).mm))
+        assert 0 <= found.clearance["mm"] <= sampled <= found.clearance["mm"] + 1.0
+        assert found.clearance["with"] == "table"
+
+
+def test_a_path_through_the_table_is_refused_with_the_place(table: Path) -> None:
+    arm = armkin.load("three_dof", scene=table)
+    with pytest.raises(NoSolutionError, match="then q3 hits table"):
+        armkin.path(arm, [[390, 80, 300], [390, -80, 150]])
+    with pytest.raises(NoSolutionError, match=r"q3 would hit table at 0\.000 mm of the path") as raised:
+        armkin.path(arm, {"moves": [{"joint": [0, 0, -30]}]})
+    assert raised.value.plan.clearance["with"] == "table"
+    ignoring = replace(arm, ignores_keep_out=True)
+    assert armkin.path(ignoring, [[390, 80, 300], [390, -80, 150]]).clearance is not None
+
+
+def test_the_first_hit_is_where_the_clearance_runs_out(table: Path) -> None:
+    arm = armkin.load("three_dof", scene=table)
+    way = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([[30, 90, -90], [30, 0, -45]]))
+    found = proved(way)
+    assert found is not None
+    assert (found.free, found.stretch, found.body, found.other) == (False, 1, "q3", "table")
+    at = seconds(way, found)
+    assert way.q(at) == pytest.approx(found.joints, abs=1e-6)
+    assert abs(float(armkin.clearance(arm, found.joints).mm)) < 0.02
+    with pytest.raises(NoSolutionError, match="q3 would hit table on the way to waypoint 2"):
+        check_free(way)
+
+
+def test_an_arm_in_a_hit_may_leave_it_and_not_go_deeper(table: Path) -> None:
+    arm = armkin.load("three_dof", scene=table)
+    inside, free = np.deg2rad([0, 20, -45]), np.deg2rad([0, 90, -90])
+    assert armkin.clearance(arm, inside).mm < -5
+    found = proved(plan(arm, inside, free))
+    assert found is not None
+    assert found.free
+    assert found.escaping == (("q3", "table"),)
+    with pytest.raises(NoSolutionError, match="q3 would go deeper into table"):
+        check_free(plan(arm, inside, np.deg2rad([0, 15, -45])))
+    with pytest.raises(NoSolutionError, match="q3 would"):  # out, and in again
+        check_free(plan(arm, inside, np.stack([free, inside])))
+
+
+def test_hits_of_a_chain_are_those_of_each_sample(table: Path) -> None:
+    arm = armkin.load("ur5e", scene=table)
+    held, q = guard(arm), _postures(arm, 60, 9)
+    chain = np.concatenate([np.linspace(a, b, 97)[:-1] for a, b in pairwise(q[:9])])
+    assert hit_samples(held, chain).tolist() == (held.clearances(chain) < 0).any(axis=1).tolist()
+
+
+def test_without_keep_outs_nothing_is_proved() -> None:
+    arm = armkin.load("three_dof")
+    way = plan(arm, arm.home, np.zeros((1, 3)))
+    assert proved(way) is None
+    check_free(Trajectory(arm, arm.home, ()))
