@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints
-from armkin.keep_out.guard import CHUNK, Guard, guard
 from armkin.model.lock import unlock
 
 if TYPE_CHECKING:
+    from armkin.keep_out.guard import Guard
     from armkin.model.arm import Arm
+
+CHUNK = 512  # postures at once: what stays in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
     if not whole.keep_out:
         nothing = np.full(lead, "", dtype="<U1")
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
-    held = guard(whole)
+    held = _guard(whole)
     mm, which = least(held, full)
     bodies, others = (np.array([held.of(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
     return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
@@ -76,14 +78,14 @@ def clear(arm: Arm, q: Array) -> NDArray[np.bool_]:
     whole, full = whole_arm(arm, q.reshape(-1, arm.n))
     free: NDArray[np.bool_] = np.asarray(np.isfinite(full).all(axis=1))
     if whole.keep_out:
-        free[free] = least(guard(whole), full[free])[0] >= 0.0
+        free[free] = least(_guard(whole), full[free])[0] >= 0.0
     return free.reshape(q.shape[:-1])
 
 
 def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     """Of each posture (N, n) the least clearance [mm] (None: nothing counts) and its hits, the deepest first."""
     whole, full = whole_arm(arm, q)
-    held = guard(whole)
+    held = _guard(whole)
     found = []
     for row in held.clearances(full):
         deep = [k for k in np.argsort(row, kind="stable") if row[k] < 0]
@@ -111,5 +113,12 @@ def assumed(arm: Arm) -> list[tuple[str, float]]:
     whole = whole_arm(arm, np.empty((0, arm.n)))[0]
     if not whole.keep_out:
         return []
-    form = guard(whole).bodies
+    form = _guard(whole).bodies
     return [(name, float(r)) for name, r, so in zip(form.names, form.radius, form.assumed, strict=True) if so]
+
+
+def _guard(arm: Arm) -> Guard:
+    """The pairs of an arm with keep-outs; what they need is imported for such arms alone."""
+    from armkin.keep_out.guard import guard
+
+    return guard(arm)

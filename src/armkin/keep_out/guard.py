@@ -11,6 +11,7 @@ import numpy as np
 from armkin.errors import RobotFileError
 from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, ends
+from armkin.keep_out.clearance import CHUNK
 from armkin.keep_out.shapes import Shape, shape_of
 from armkin.keep_out.shapes.segments import between
 from armkin.robot_file.keep_out import SELF, names, problems
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 POSTURES = 256  # in which a pair that always overlaps is looked for, home among them
-CHUNK = 512  # postures at once: what stays in the cache
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
 

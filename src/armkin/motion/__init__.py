@@ -20,4 +20,5 @@ corners.py          waypoints without a stop
 What both make, and boards take:
 
 trajectory.py       stretches from rest to rest; curve.py: a curved one; remainder.py: the rest of one that was held
+free.py             proofs that one hits nothing
 """
