@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from armkin.keep_out.guard import Guard
     from armkin.model.arm import Arm
 
-CHUNK = 512  # postures at once: what stays in the cache
-
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
@@ -49,7 +47,7 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
         nothing = np.full(lead, "", dtype="<U1")
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
     held = _guard(whole)
-    mm, which = least(held, full)
+    mm, which = held.least(full)
     bodies, others = (np.array([held.of(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
     return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
 
@@ -62,23 +60,12 @@ def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
     return arm, q
 
 
-def least(held: Guard, q: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Least clearance and its pair: q (N, n) -> (N,), (N,); nan where a joint value is, inf where nothing counts."""
-    mm, which = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
-    for k in range(0, len(q) if held.pairs else 0, CHUNK):
-        apart = held.clearances(q[k : k + CHUNK])
-        which[k : k + CHUNK] = apart.argmin(axis=1)
-        mm[k : k + CHUNK] = apart.min(axis=1)
-    mm[np.isnan(q).any(axis=1)] = np.nan
-    return mm, which
-
-
 def clear(arm: Arm, q: Array) -> NDArray[np.bool_]:
     """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); a row of nan is none."""
     whole, full = whole_arm(arm, q.reshape(-1, arm.n))
     free: NDArray[np.bool_] = np.asarray(np.isfinite(full).all(axis=1))
     if whole.keep_out:
-        free[free] = least(_guard(whole), full[free])[0] >= 0.0
+        free[free] = _guard(whole).least(full[free])[0] >= 0.0
     return free.reshape(q.shape[:-1])
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from armkin.errors import RobotFileError
 from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, ends
-from armkin.keep_out.clearance import CHUNK
 from armkin.keep_out.shapes import Shape, shape_of
 from armkin.keep_out.shapes.segments import between
 from armkin.robot_file.keep_out import SELF, names, problems
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
+CHUNK = 512  # postures at once: what stays in the cache
 POSTURES = 256  # in which a pair that always overlaps is looked for, home among them
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
@@ -74,6 +74,16 @@ class Guard:
     def clearances(self, q: Array) -> Array:
         """The same with `clearance` taken off: negative is a hit."""
         return self.distances(q) - self.arm.clearance
+
+    def least(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least clearance and its pair: q (N, n) -> (N,), (N,); nan where a joint value is, inf where none counts."""
+        mm, which = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
+        for k in range(0, len(q) if self.pairs else 0, CHUNK):
+            apart = self.clearances(q[k : k + CHUNK])
+            which[k : k + CHUNK] = apart.argmin(axis=1)
+            mm[k : k + CHUNK] = apart.min(axis=1)
+        mm[np.isnan(q).any(axis=1)] = np.nan
+        return mm, which
 
     def of(self, pair: int) -> tuple[str, str]:
         """The names of a pair: body, and what it is held against."""

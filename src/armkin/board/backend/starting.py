@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, said
+from armkin.motion.free import check_free
 from armkin.motion.trajectory import Straight
 from armkin.motors import joints, pulses, settled
 
@@ -46,13 +47,14 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
     """Raise if a trajectory may not be carried out from counts (motors,).
 
     StartError: it begins elsewhere. NoSolutionError, naming joint, value and limit: it begins outside the limits,
-    and takes a joint farther out.
+    and takes a joint farther out, or it is not proved free of keep-outs.
     """
     arm = trajectory.arm
     first = pulses(arm, trajectory.start)
     # Of more motors than joints the joints are a least squares fit, which may round to the next count.
     if np.abs(first - start).max(initial=0) > (len(arm.motor_gain) > arm.n):
         raise StartError(f"a plan that begins at {first.tolist()} counts was made for an arm at {list(start)}")
+    check_free(trajectory)
     out = beyond(arm, trajectory.start)
     if not out.any():
         return
