@@ -74,6 +74,7 @@ class Link:
     assume: str | None
     resume: bool
     reset: bool
+    no_scene: bool = False
 
 
 @contextmanager

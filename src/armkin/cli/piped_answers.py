@@ -24,6 +24,8 @@ class Piped:
     robot_file: str
     robot_sha256: str
     poses: list[Pose]
+    scene: str | None = None
+    scene_sha256: str | None = None
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,10 @@ def read(robot: str | None) -> Piped:
             raise UsageError("the answers on standard input are of different robot files: send one at a time")
     if robot is not None and robot != first["robot_file"]:
         raise UsageError(f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input")
-    return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers])
+    scenes = {(answer.get("scene"), answer.get("scene_sha256")) for answer in answers}
+    if len(scenes) > 1:
+        raise UsageError("the answers on standard input are of different scenes: send one at a time")
+    return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers], *scenes.pop())
 
 
 def poses(robot: str | None, words: Sequence[str] | None, scene: str | None = None) -> tuple[Arm, list[list[float]]]:

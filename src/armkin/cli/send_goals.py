@@ -26,6 +26,7 @@ def goals(
     batch: str | None,
     lock: Sequence[str] | None = None,
     near: str | None = None,
+    scene: str | None = None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     import numpy as np
@@ -38,10 +39,10 @@ def goals(
     if target is None and (branch is not None or task is not None or near is not None or lock):
         raise UsageError("--branch, --task, --near and --lock belong to --target")
     if not given:
-        return _from_pipe(robot)
+        return _from_pipe(robot, scene)
     if robot is None:
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
-    arm = inputs.load(robot)
+    arm = inputs.load(robot, scene)
     if target is not None:
         from armkin.inverse.tasks.fitting import task_for
 
@@ -85,8 +86,12 @@ class Goals:
         from armkin.inverse import choose
 
         at = units.joints_out(arm, near).tolist() if self.near is None else self.near
-        request = choose.Request(arm=arm, task=self.task, near=at, branch=self.branch, held=self.held)
+        request = choose.Request(
+            arm=arm, task=self.task, near=at, branch=self.branch, held=self.held, ignore=arm.ignores_keep_out
+        )
         [answer] = choose.solve(request, self.target)  # type: ignore[arg-type]
+        if answer.best is None and answer.within_limits and answer.refused is None:
+            raise choose.blocked(request, answer)
         if answer.best is None:
             nearest = choose.closest(request, self.target[0])  # type: ignore[index]
             raise choose.refusal(request, answer, nearest.distance)
@@ -107,13 +112,18 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
     return Goals(joints, rows)
 
 
-def _from_pipe(robot: str | None) -> tuple[Arm, Goals]:
+def _from_pipe(robot: str | None, scene: str | None) -> tuple[Arm, Goals]:
     import numpy as np
 
     import armkin
 
     answer = piped_answers.read(robot)
-    arm = inputs.load(answer.robot_file)
+    arm = inputs.load(answer.robot_file, scene)
+    if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
+        raise FileError(
+            f"the answer on standard input was computed in the scene {answer.scene}; "
+            + (f"{arm.scene} is another one, or it has changed" if arm.scene else f"give --scene {answer.scene}")
+        )
     if arm.sha256 != answer.robot_sha256:
         raise FileError(
             f"{answer.robot_file} is not the file that the answer on standard input was computed with: "

@@ -18,6 +18,7 @@ from armkin.keep_out.way import Cubics, Way
 from armkin.model import units
 from armkin.model.lock import unlock
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.profile import trapezoid
 from armkin.motion.trajectory import Straight, Stretch, Trajectory
 
 if TYPE_CHECKING:
@@ -159,6 +160,17 @@ def refusal(trajectory: Trajectory, found: Found, place: str = "", **fields: obj
     what = "would go deeper into" if stands else "would hit"
     told = {"body": found.body, "with": found.other, "joints": values, **fields}
     return NoSolutionError(f"{found.body} {what} {found.other}{place or many}, at {at}: nothing was moved", **told)
+
+
+def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | None]:
+    """How far a straight line in joint space from q to goal, (n,), is proved free, 0 to 1; and why no farther."""
+    if not arm.keep_out or arm.ignores_keep_out or np.array_equal(q, goal):
+        return 1.0, None
+    way = Trajectory(arm, q, (Straight(q, goal, trapezoid(1.0, 1.0, 1.0)),))
+    found = proved(way)
+    if found is None or found.free:
+        return 1.0, None
+    return found.cell, refusal(way, found)
 
 
 def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:

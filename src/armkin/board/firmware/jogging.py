@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from armkin.board.backend.starting import check_jog
 from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import DeviceError
-from armkin.errors import PositionLostError, UsageError
+from armkin.errors import NoSolutionError, PositionLostError, UsageError
 from armkin.model import units
+from armkin.motion.free import free_way
 
 if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine
 
+HANDLE = 0.25  # [s] that the board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
+_LONGEST = 60.0  # [s] of a jog that is looked at
 SLOW = 8  # a lost position: at most an eighth of max_speed
 
 
@@ -50,6 +56,28 @@ def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
     if not any(found.values()):
         raise UsageError(f"SPEED: {speed:g} is less than one count a second")
     return found
+
+
+def free_seconds(machine: Machine, joint: int, rate: float) -> float:
+    """How long a joint may be told to jog at a rate [rad/s | mm/s] so that it stands before it hits anything.
+
+    Raises NoSolutionError if it could not stand before. inf where nothing is in the way, or nobody knows.
+    """
+    arm = machine.arm
+    if not arm.keep_out or machine.position() == "lost":
+        return math.inf
+    q = machine.joints()
+    goal = q.copy()
+    goal[joint] += rate * _LONGEST
+    goal[joint] = np.clip(goal[joint], *sorted((q[joint], (arm.lower, arm.upper)[rate > 0][joint])))
+    free, why = free_way(arm, q, goal)
+    if why is None:
+        return math.inf
+    left = free * abs(float(goal[joint] - q[joint])) - rate**2 / (2.0 * float(arm.max_accel[joint]))
+    seconds = left / abs(rate) - HANDLE
+    if seconds <= 0.0:
+        raise NoSolutionError(f"{why.message} (at this speed it would not stand before it)", **why.fields)
+    return seconds
 
 
 def jog(machine: Machine, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> None:

@@ -146,7 +146,8 @@ class FirmwareBoard(Board):
     def jog(self, joint: int, rate: float, seconds: float, more: Callable[[], bool] | None = None) -> None:
         """Move one joint [rad/s | mm/s] for a time; the board stops it at its limits, if it knows where it stands."""
         rates = jogging.rates(self.machine, joint, self._shown(joint, rate))
-        jogging.jog(self.machine, rates, seconds, more or (lambda: True))
+        free = jogging.free_seconds(self.machine, joint, rate)
+        jogging.jog(self.machine, rates, min(seconds, free), more or (lambda: True))
 
     def _shown(self, joint: int, rate: float) -> float:
         return rate if self.arm.prismatic[joint] else rate / units.DEGREE

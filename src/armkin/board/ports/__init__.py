@@ -1,6 +1,7 @@
 """Bytes to and from a board.
 
 port.py         what every port can do
+scene_note.py   the scene that a port was last used with
 port_lock.py    the lock that keeps two programs from one arm
 notes.py        small files beside it
 serial_port.py  serial ports

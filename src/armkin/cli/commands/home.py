@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, completion, inputs, output, render
+from armkin.cli import board_link, completion, keep_outs, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
-from armkin.cli.options import Json, Robot
+from armkin.cli.keep_outs import NoScene
+from armkin.cli.options import Json, Robot, Scene
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ def home(
         typer.Option("--rest-at-home", help="The joints without a switch stand in their home pose: take my word."),
     ] = False,
     stay: Annotated[bool, typer.Option("--stay", help="Stay at the switches; do not move to the home pose.")] = False,
+    scene: Scene = None,
+    no_scene: NoScene = False,
     baud: Baud = None,
     no_reset: NoReset = False,
     json: Json = False,
@@ -47,11 +50,14 @@ def home(
     """
     from armkin.board.planner import where
 
-    arm = inputs.load(robot)
+    arm = keep_outs.moving(robot, scene)
+    if arm.keep_out:
+        output.note("the search for the switches is not proved free of keep-outs; the move after it is")
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     board.check_home(joints or (), rest_at_home=rest_at_home)  # refuses before a port is opened
     with board_link.backend(board, port, baud, simulated=_REHEARSAL, reset=not no_reset) as machine:
         told: dict[str, Any] = {}
+        keep_outs.check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
         lost = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
         if lost is not None:
             told["lost_steps"] = _told(arm, lost)

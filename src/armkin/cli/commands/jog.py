@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import board_link, completion, inputs, output, render
+from armkin.cli import board_link, completion, keep_outs, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
+from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import Json, Robot
+from armkin.cli.options import Json, Robot, Scene
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -22,6 +23,9 @@ def jog(
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="The joint's name.", autocompletion=completion.joints)],
     speed: Annotated[str, typer.Argument(metavar="SPEED", help="In deg/s (prismatic joints: mm/s), signed.")],
     port: PortName = None,
+    scene: Scene = None,
+    no_scene: NoScene = False,
+    ignore_keep_out: Ignore = False,
     seconds: Annotated[str, typer.Option("--seconds", metavar="S", help="How long; Ctrl-C ends it earlier.")] = "0.5",
     baud: Baud = None,
     no_reset: NoReset = False,
@@ -30,12 +34,12 @@ def jog(
     """Move one joint at a constant speed, for a short time.
 
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
-    itself when this command falls silent, and before the joint limits if the position is known.
+    itself when this command falls silent, and before the joint limits and keep-outs if the position is known.
     """
     from armkin.board.planner import where
     from armkin.model.lock import joint_index
 
-    arm = inputs.load(robot)
+    arm = keep_outs.moving(robot, scene, ignore_keep_out)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
@@ -46,6 +50,7 @@ def jog(
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+        keep_outs.check_start(machine, arm, no_scene)
         wanted = float(units.joints_in(arm, [rate] * arm.n)[j])
         allowed = board.ready_to_jog(j, wanted)
         if allowed != wanted:

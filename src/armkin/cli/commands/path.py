@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import board_link, inputs, lock_and_sweep, output, render
+from armkin.cli import board_link, inputs, keep_outs, lock_and_sweep, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
+from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import listed, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, TaskName
+from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -53,6 +54,9 @@ def path(
         typer.Option("--jerk", metavar="DEG/S3", help="Greatest jerk of every joint. [default: its max_jerk]"),
     ] = None,
     near: Near = None,
+    scene: Scene = None,
+    no_scene: NoScene = False,
+    ignore_keep_out: Ignore = False,
     start: Annotated[
         str | None,
         typer.Option("--start", metavar="Q,...", help="Where the arm stands, for a plan. [default: the home pose]"),
@@ -90,7 +94,7 @@ def path(
 
     import armkin
 
-    arm = inputs.load(robot)
+    arm = keep_outs.moving(robot, scene, ignore_keep_out)
     locked = {
         name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
         for name, value in lock_and_sweep.locks(arm, lock).items()
@@ -121,12 +125,12 @@ def path(
         _files(plan, out, plot)
         _print(plan, found, json=json, out=out)
         return
-    link = board_link.Link(port, baud, assume, resume, reset=not no_reset)
+    link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     _carried_out(arm, moves, locked, options, link, out, plot, json=json)
 
 
 def sent(
-    robot: str | None,
+    arm: Arm,
     file: str,
     link: Link,
     speed: str,
@@ -137,9 +141,6 @@ def sent(
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
-    if robot is None:
-        raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
-    arm = inputs.load(robot)
     moves = _moves(arm, file, None, None)
     options: dict[str, Any] = {"speed": inputs.percent(speed, "--speed")}
     if not dry_run:
@@ -174,6 +175,7 @@ def _carried_out(
     simulated = board_link.simulated(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
         board_link.prepare(arm, machine, link.assume, stands)
+        keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.held(board, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
@@ -236,12 +238,15 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
         if locked:
             from armkin.motion.held import path_held
 
-            return path_held(arm, moves, locked, **options)
-        return armkin.path(arm, moves, **options)
+            plan = path_held(arm, moves, locked, **options)
+        else:
+            plan = armkin.path(arm, moves, **options)
     except NoSolutionError as error:
         if error.plan is not None:
             _print(error.plan, _found(error.plan, None), json=json)
         raise
+    keep_outs.tell_ignored([plan.motion] if plan.approach is None else [plan.approach, plan.motion])
+    return plan
 
 
 def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | None:
@@ -331,6 +336,12 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         rows = [["branch at the start", "carries/mm", ""]]
         rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]
         lines += ["", render.table(rows, left=(0, 2))]
+    if "clearance" in found:
+        near = found["clearance"]
+        how = "inside" if (near["mm"] or 0.0) < 0 else "nearest to"
+        size = "nothing counts" if near["mm"] is None else f"at least {near['mm']:.1f} mm"
+        size = f"{-near['mm']:.1f} mm deep" if (near["mm"] or 0.0) < 0 else size
+        lines.append(f"  at {near['s_mm']:.3f} mm: {near['body']} {how} {near['with']}, {size}")
     if found["limits"] is not None:
         rows = [["share of", *arm.joint_names]]
         rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in found["limits"].items()]

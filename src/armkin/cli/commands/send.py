@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, output, render
+from armkin.cli import board_link, inputs, keep_outs, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.default_port import PortName
+from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, TaskName
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -58,6 +59,9 @@ def send(
     path: Annotated[
         str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
     ] = None,
+    scene: Scene = None,
+    no_scene: NoScene = False,
+    ignore_keep_out: Ignore = False,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
     assume: Assume = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan from --from, move nothing.")] = False,
@@ -119,11 +123,15 @@ def send(
         given = [name for name, what in others.items() if what]
         if given:
             raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        link = board_link.Link(port, baud, assume, resume, reset=not no_reset)
-        sent(robot, path, link, speed, start, trace, dry_run=dry_run, json=json)
+        if robot is None:
+            raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
+        link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
+        arm = keep_outs.moving(robot, scene, ignore_keep_out)
+        sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near)
+    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene)
+    arm = keep_outs.marked(arm, ignore_keep_out)
     if accel is not None:
         arm = _accelerated(arm, number(accel, "--accel"))
     try:
@@ -138,6 +146,7 @@ def send(
         return
     with board_link.backend(board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset) as machine:
         board_link.prepare(arm, machine, assume, stands)
+        keep_outs.check_start(machine, arm, no_scene)
         held = board_link.held(board, resume)
         began = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
@@ -216,7 +225,9 @@ def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[
     if isinstance(goals, Stream):
         return goals.whole(planner, start)
     near = armkin.joints(planner.arm, list(start))
-    return [planner.plan(start, goals.resolve(planner.arm, near))]
+    plans = [planner.plan(start, goals.resolve(planner.arm, near))]
+    keep_outs.tell_ignored([plan.trajectory for plan in plans])
+    return plans
 
 
 def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:

@@ -1,0 +1,38 @@
+"""The scene that a port was last used with: a note beside its lock, so that no motion forgets the table."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+
+from armkin.board.ports.port_lock import note_path
+
+_LONGEST = 4096  # bytes of a file's name
+
+
+def keep(port: str, scene: str) -> None:
+    """Note the scene's file."""
+    path = _path(port)
+    with suppress(OSError):
+        os.unlink(path)  # whatever stands there, and be it a link to somewhere else
+    with open(path, "x", encoding="utf-8") as file:
+        file.write(os.path.abspath(scene))
+
+
+def last(port: str) -> str:
+    """The file that was noted last; empty if there is none."""
+    try:
+        with open(_path(port), encoding="utf-8") as file:
+            return file.read(_LONGEST)
+    except (OSError, ValueError):
+        return ""
+
+
+def forget(port: str) -> None:
+    """Forget it."""
+    with suppress(OSError):
+        os.unlink(_path(port))
+
+
+def _path(port: str) -> str:
+    return f"{note_path(port)}.scene"

@@ -1,0 +1,98 @@
+"""What commands that move an arm share about keep-outs: radii that are assumed, a port's scene, what is ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armkin.cli import inputs, output
+from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.board.backend import Backend
+    from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
+
+Ignore = Annotated[
+    bool,
+    typer.Option("--ignore-keep-out", help="Move without the proof that nothing is hit, this once."),
+]
+NoScene = Annotated[
+    bool,
+    typer.Option("--no-scene", help="Forget the scene that this port was last used with."),
+]
+_SHOWN = 4001  # postures of a motion in which hits that are ignored are looked for
+
+
+def moving(robot: str, scene: str | None, ignore: bool = False) -> Arm:
+    """The arm of a command that moves it; radii that are assumed are named."""
+    return marked(inputs.load(robot, scene), ignore)
+
+
+def marked(arm: Arm, ignore: bool) -> Arm:
+    """The same arm, its motions not proved if keep-outs are ignored; radii that are assumed are named."""
+    if not arm.keep_out:
+        return arm
+    from dataclasses import replace
+
+    from armkin.keep_out.clearance import assumed
+
+    if guessed := assumed(arm):
+        names = ", ".join(name for name, _ in guessed)
+        output.note(f"no file states the radius of {names}: {guessed[0][1]:.4g} mm are assumed, 2 % of the reach")
+    return replace(arm, ignores_keep_out=True) if ignore else arm
+
+
+def check_port(port: str, arm: Arm, no_scene: bool, *, simulated: bool = False) -> None:
+    """Keep the scene of a port's motion, or refuse one without the scene that the port was last used with."""
+    from armkin.board.ports import scene_note
+
+    if simulated:
+        return
+    if arm.scene:
+        scene_note.keep(port, arm.scene)
+    elif no_scene:
+        scene_note.forget(port)
+    elif last := scene_note.last(port):
+        raise UsageError(
+            f"{port} was last used with the scene {last}, and this motion has none: give --scene {last}, "
+            "or --no-scene if it no longer stands there",
+            port=port,
+            scene=last,
+        )
+
+
+def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
+    """As `check_port`, for a board that is open; also tells if the arm stands in a hit."""
+    check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
+    if not arm.keep_out or machine.position() == "lost":
+        return
+    from armkin.keep_out.clearance import hits, said
+
+    [(_, found)] = hits(arm, machine.joints()[None])
+    if found:
+        more = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
+        output.note(f"the arm stands in a hit: it {said(found)}{more}")
+
+
+def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
+    """What motions pass through under `--ignore-keep-out`."""
+    import numpy as np
+
+    from armkin.keep_out.clearance import said
+    from armkin.keep_out.guard import guard
+
+    deepest: dict[tuple[str, str], float] = {}
+    for one in trajectories:
+        if not one.arm.keep_out or not one.arm.ignores_keep_out:
+            return
+        held = guard(one.arm)
+        apart = held.clearances(one.q(np.linspace(0.0, one.duration, _SHOWN))).min(axis=0, initial=np.inf)
+        for k in np.flatnonzero(apart < 0).tolist():
+            deepest[held.of(k)] = max(deepest.get(held.of(k), 0.0), float(-apart[k]))
+    if deepest:
+        ordered = sorted(deepest.items(), key=lambda item: -item[1])
+        words = said([{"body": body, "with": other, "depth_mm": mm} for (body, other), mm in ordered])
+        output.warn(f"--ignore-keep-out: this motion {words}")

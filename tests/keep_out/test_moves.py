@@ -1,0 +1,103 @@
+"""No command and no kind of board takes an arm through a keep-out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from command_line import run
+
+TABLE = "keep_out:\n  - box: {min: [300, -400, 0], max: [700, 400, 180]}\n    name: table\n"
+KINDS = ["three_dof", "tests/robots/three_dof_grbl.yaml", "tests/robots/three_dof_klipper.yaml"]
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> str:
+    path = tmp_path / "table.yaml"
+    path.write_text(TABLE)
+    return str(path)
+
+
+@pytest.mark.parametrize("robot", KINDS)
+def test_a_motion_through_the_table_is_refused_and_one_above_it_is_made(robot: str, table: str) -> None:
+    words = [robot, "--port", "sim", "--scene", table]
+    got = run("send", *words, "0", "10", "-30")
+    assert (got.code, got.out) == (3, "")
+    assert "q3 would hit table" in got.err
+    assert "nothing was moved" in got.err
+    assert run("send", *words, "40", "80", "-80").code == 0
+    assert "q2, q3: 12.51 mm are assumed" in run("send", *words, "40", "80", "-80").err
+    assert run("send", *words, "--target", "420,40,150").code == 3
+    path = run("path", robot, "--via", "390,80,300", "--via", "390,-80,150", "--scene", table, "--port", "sim")
+    assert (path.code, "then q3 hits table" in path.err) == (3, True)
+
+
+@pytest.mark.parametrize("robot", KINDS)
+def test_a_jog_stands_before_the_hit(robot: str, table: str) -> None:
+    got = run("jog", robot, "q3", "30", "--seconds", "60", "--port", "sim", "--scene", table, "--json")
+    free = run("jog", robot, "q2", "-30", "--seconds", "60", "--port", "sim", "--scene", table, "--json")
+    assert (got.code, free.code) == (0, 0), got.err + free.err
+    for answer in (got.json, free.json):
+        arm = armkin.load(robot, scene=table)
+        assert armkin.clearance(arm, np.deg2rad(answer["joints"])).mm >= 0.0
+    assert free.json["joints"][1] < 70.0  # it went until the table was near
+
+
+def test_ignoring_is_told_and_lasts_for_one_command(table: str) -> None:
+    words = ["send", "three_dof", "0", "10", "-30", "--port", "sim", "--scene", table]
+    got = run(*words, "--ignore-keep-out")
+    assert got.code == 0
+    assert "--ignore-keep-out: this motion hits table by" in got.err
+    assert run(*words).code == 3
+    path = run(
+        "path", "three_dof", "--via", "390,80,300", "--via", "390,-80,150", "--scene", table, "--ignore-keep-out"
+    )
+    assert (path.code, "this motion hits table" in path.err) == (0, True)
+
+
+def test_a_piped_answer_keeps_its_scene(table: str, tmp_path: Path) -> None:
+    answer = run("ik", "three_dof", "390", "80", "300", "--scene", table, "--json").out.encode()
+    assert b'"scene_sha256"' in answer
+    refused = run("send", "--port", "sim", stdin=answer)
+    assert refused.code == 1
+    assert f"was computed in the scene {table}; give --scene {table}" in refused.err
+    assert run("send", "--port", "sim", "--scene", table, stdin=answer).code == 0
+    Path(table).write_text(TABLE + "  - floor: 0\n")
+    assert "is another one, or it has changed" in run("send", "--port", "sim", "--scene", table, stdin=answer).err
+
+
+def test_a_port_remembers_its_scene(table: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from armkin.cli import keep_outs
+    from armkin.errors import UsageError
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    bare, inside = armkin.load("three_dof"), armkin.load("three_dof", scene=table)
+    keep_outs.check_port("/dev/ttyX", bare, False)
+    keep_outs.check_port("/dev/ttyX", inside, False)
+    with pytest.raises(UsageError, match=r"was last used with the scene .*table.yaml, and this motion has none"):
+        keep_outs.check_port("/dev/ttyX", bare, False)
+    keep_outs.check_port("/dev/ttyY", bare, False)
+    keep_outs.check_port("/dev/ttyX", bare, True)
+    keep_outs.check_port("/dev/ttyX", bare, False)
+    keep_outs.check_port("sim", inside, False, simulated=True)
+    keep_outs.check_port("sim", bare, False)
+
+
+def test_path_tells_its_clearance(table: str) -> None:
+    got = run("path", "three_dof", "--via", "390,80,300", "--via", "390,-80,230", "--scene", table, "--json").json
+    assert set(got["clearance"]) == {"mm", "s_mm", "body", "with"}
+    assert 0 < got["clearance"]["mm"] < 60
+    assert "clearance" not in run("path", "three_dof", "--via", "390,80,300", "--via", "390,-80,230", "--json").json
+    hit = run("path", "three_dof", "-", "--scene", table, "--json", stdin=b"moves:\n  - joint: [0, 10, -30]\n")
+    assert hit.code == 3
+    assert hit.json["clearance"]["with"] == "table"
+
+
+def test_rows_that_stream_in_are_proved_one_by_one(table: str) -> None:
+    rows = b"20,80,-80\n0,10,-30\n"
+    got = run("send", "three_dof", "--batch", "-", "--port", "sim", "--scene", table, stdin=rows)
+    assert got.code == 3
+    assert "row 2: q3 would hit table" in got.err
