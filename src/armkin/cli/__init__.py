@@ -14,6 +14,7 @@ inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or 
 rows.py            many of them in chunks; csv_rows.py: from CSV; pieces.py: shared out; batch.py: their answers
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
 default_port.py    the port; board_link.py: an open machine, signals
+keep_outs.py       radii that are assumed, the scene of a port, hits that are ignored
 
 What is printed:
 
