@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.job import planned
-from armkin.board.backend.starting import check_jog
+from armkin.board.backend.starting import before_keep_outs, check_jog
 from armkin.board.ports import BAUD, SIM
 from armkin.errors import LinkError, UsageError
-from armkin.motion.free import free_way
 from armkin.motion.plan import rate_lines, straight
 from armkin.motion.trajectory import Trajectory
-from armkin.motors import resolution, settled
+from armkin.motors import settled
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, StoppedError
@@ -230,12 +229,7 @@ class Board(ABC):
             here = settled(arm, self.machine.joints())
             goal, end = here.copy(), (arm.upper if rate > 0 else arm.lower)[joint]
             goal[joint] = np.clip(here[joint] + rate * piece, *sorted((here[joint], end)))
-            free, why = free_way(arm, here, goal)
-            if why is not None:  # two steps before it, so that rounded counts do not stand in it
-                free = max(free - 2 * float(resolution(arm)[joint] / abs(goal[joint] - here[joint])), 0.0)
-                goal = here + free * (goal - here)
-            if why is not None and not free and left == seconds:
-                raise why
+            goal = before_keep_outs(arm, here, goal, joint, refuse=left == seconds)
             way = straight(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:
                 return  # at its limit, or before a keep-out

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, said
-from armkin.motion.free import check_free
+from armkin.motion.free import check_free, free_way
 from armkin.motion.trajectory import Straight
-from armkin.motors import joints, pulses, settled
+from armkin.motors import joints, pulses, resolution, settled
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -64,6 +64,22 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
         farther = beyond(arm, reached).max(axis=0) > out + SLACK
         if farther.any():
             raise _farther(arm, int(farther.argmax()), trajectory.start)
+
+
+def before_keep_outs(arm: Arm, here: Array, goal: Array, joint: int, *, refuse: bool) -> Array:
+    """How far a joint may go from here to a goal, (n,) each: to two steps before what it would hit.
+
+    refuse: raise NoSolutionError if it may not move at all.
+    """
+    free, why = free_way(arm, here, goal)
+    if why is None:
+        return goal
+    left = free - 2 * float(
+        resolution(arm)[joint] / abs(goal[joint] - here[joint])
+    )  # rounded counts do not stand in it
+    if left <= 0 and refuse:
+        raise why
+    return np.asarray(here + max(left, 0.0) * (goal - here))
 
 
 def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
