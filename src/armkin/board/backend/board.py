@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.job import planned
-from armkin.board.backend.starting import before_keep_outs, check_jog
+from armkin.board.backend.starting import check_jog, jog_goal
 from armkin.board.ports import BAUD, SIM
 from armkin.errors import LinkError, UsageError
 from armkin.motion.plan import rate_lines, straight
@@ -227,9 +227,7 @@ class Board(ABC):
             piece = left if more is None else min(JOG_PIECE, left)
             counts = self.machine.counts()
             here = settled(arm, self.machine.joints())
-            goal, end = here.copy(), (arm.upper if rate > 0 else arm.lower)[joint]
-            goal[joint] = np.clip(here[joint] + rate * piece, *sorted((here[joint], end)))
-            goal = before_keep_outs(arm, here, goal, joint, refuse=left == seconds)
+            goal = jog_goal(arm, here, joint, rate * piece, refuse=left == seconds)
             way = straight(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:
                 return  # at its limit, or before a keep-out

@@ -66,20 +66,20 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
             raise _farther(arm, int(farther.argmax()), trajectory.start)
 
 
-def before_keep_outs(arm: Arm, here: Array, goal: Array, joint: int, *, refuse: bool) -> Array:
-    """How far a joint may go from here to a goal, (n,) each: to two steps before what it would hit.
+def jog_goal(arm: Arm, here: Array, joint: int, change: float, *, refuse: bool) -> Array:
+    """Where a joint may go from here, (n,), by a change: to its limit, and to two steps before what it would hit.
 
-    refuse: raise NoSolutionError if it may not move at all.
+    refuse: raise NoSolutionError if something is hit at once.
     """
+    goal, end = here.copy(), (arm.upper if change > 0 else arm.lower)[joint]
+    goal[joint] = np.clip(here[joint] + change, *sorted((here[joint], end)))
     free, why = free_way(arm, here, goal)
     if why is None:
         return goal
-    left = free - 2 * float(
-        resolution(arm)[joint] / abs(goal[joint] - here[joint])
-    )  # rounded counts do not stand in it
-    if left <= 0 and refuse:
+    step = float(resolution(arm)[joint] / abs(goal[joint] - here[joint]))
+    if free <= 2 * step and refuse:
         raise why
-    return np.asarray(here + max(left, 0.0) * (goal - here))
+    return np.asarray(here + max(free - 2 * step, 0.0) * (goal - here))
 
 
 def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
