@@ -34,6 +34,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_what_is_left_of_a_curve_keeps_to_the_joints_limits",
     ),
     "board/test_smooth.py": ("test_no_tick_is_faster_than_102_percent_however_short_the_ramp",),
+    "board/test_board_plugin.py": (),
     "board/test_starts.py": (
         "test_a_path_sent_from_elsewhere_is_on_its_way_from_the_first_step",
         "test_both_reports_of_a_false_start",

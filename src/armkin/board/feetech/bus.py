@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from armkin.board.feetech import packet
 from armkin.board.feetech.packet import Reply, Splitter
-from armkin.board.feetech.registers import STATE, TORQUE, Register
+from armkin.board.feetech.registers import GOAL_POSITION, STATE, TORQUE, Register
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ _TRIES = 8  # of a question before a servo counts as gone
 
 class Bus:
     """Servos behind a port, by their numbers."""
+
+    TORQUE, GOAL_POSITION = TORQUE, GOAL_POSITION
 
     def __init__(self, port: Port) -> None:
         self.port = port

@@ -65,9 +65,11 @@ def servo_ids(arm: Arm) -> list[int]:
 
 
 class ServoMachine(JobMachine):
-    """An arm of bus servos behind an open port."""
+    """An arm of bus servos behind an open port; what depends on the servos' make stands at its end."""
 
-    differences = (
+    firmware = "STS servo bus"
+    limits_at = "registers 9 and 11"
+    differences: tuple[str, ...] = (
         "servos hold a position within about a degree; they count no steps",
         "when the computer falls silent every servo goes to the last position it was sent, 20 ms ahead",
         "the bus has an 8-bit checksum: one damaged packet in some hundred passes it, and the next puts it right",
@@ -76,7 +78,7 @@ class ServoMachine(JobMachine):
     def __init__(self, port: Port, arm: Arm, stop: Callable[[], bool] = lambda: False) -> None:
         self.arm, self.port, self._stop = arm, port, stop
         self.ids = servo_ids(arm)
-        self.bus = Bus(port)
+        self.bus = self._bus(port)
         missing = [str(number) for number in self.ids if not self.bus.ping(number)]
         if missing:
             raise LinkError(
@@ -110,21 +112,17 @@ class ServoMachine(JobMachine):
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
         self._read()
-        servos = []
-        for number, name in zip(self.ids, motor_names(self.arm), strict=True):
-            state = self._states[number]
-            servos.append(
-                {
-                    "name": name,
-                    "id": number,
-                    "torque": bool(self.bus.read(number, registers.TORQUE)),
-                    "load_percent": self._value(registers.LOAD, state) / 10,
-                    "voltage": self._value(registers.VOLTAGE, state) / 10,
-                    "temperature": self._value(registers.TEMPERATURE, state),
-                    "errors": registers.errors(self.bus.errors.get(number, 0)),
-                }
-            )
-        return {"firmware": "STS servo bus", "servos": servos}
+        servos = [
+            {
+                "name": name,
+                "id": number,
+                "torque": bool(self.bus.read(number, self.bus.TORQUE)),
+                **self._told(number),
+                "errors": self._faults(number),
+            }
+            for number, name in zip(self.ids, motor_names(self.arm), strict=True)
+        ]
+        return {"firmware": self.firmware, "servos": servos}
 
     # Getting ready
 
@@ -137,7 +135,7 @@ class ServoMachine(JobMachine):
         self._check()
         self._send(self._counts, np.zeros(len(self.ids)))  # so that none jumps to an old goal
         for number, count in zip(self.ids, self._counts, strict=True):
-            self.bus.write(number, registers.GOAL_POSITION, int(count))
+            self.bus.write(number, self.bus.GOAL_POSITION, int(count))
         self.bus.torque(self.ids, on=True)
         return False
 
@@ -187,17 +185,11 @@ class ServoMachine(JobMachine):
         """Stay where the arm stands."""
         self._read()
         for number, count in zip(self.ids, self._counts, strict=True):
-            self.bus.write(number, registers.GOAL_POSITION, int(count))
+            self.bus.write(number, self.bus.GOAL_POSITION, int(count))
 
     def grip(self, gripper: Gripper, value: float) -> float:
         """Move the gripper and return where it comes to rest, both in its drive's degrees."""
         return gripping.grip(self.bus, gripper, value, self._stop)
-
-    def _own_limits(self) -> NDArray[np.int64]:
-        """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
-        found = self.bus.read_all(self.ids, *registers.LIMITS)
-        pairs = [[self._limit(registers.LEAST, found[n]), self._limit(registers.MOST, found[n])] for n in self.ids]
-        return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
 
     def _check_limits(self, job: Job) -> None:
         """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out where it stands so."""
@@ -209,12 +201,8 @@ class ServoMachine(JobMachine):
                 least, most = self._limits[k].tolist()
                 raise NoSolutionError(
                     f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {goals[row, k]} counts is outside its own "
-                    f"limits {least} to {most} (registers 9 and 11): nothing was moved"
+                    f"limits {least} to {most} ({self.limits_at}): nothing was moved"
                 )
-
-    @staticmethod
-    def _limit(register: registers.Register, data: bytes) -> int:
-        return register.unpack(data, registers.LIMITS[0])
 
     def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
@@ -277,7 +265,7 @@ class ServoMachine(JobMachine):
     def _check(self) -> None:
         """Raise LinkError for a servo that reports an error."""
         for number, name in zip(self.ids, motor_names(self.arm), strict=True):
-            if found := registers.errors(self.bus.errors.get(number, 0)):
+            if found := self._faults(number):
                 raise LinkError(
                     f"servo {number} ({name}) reports {', '.join(found)}: switch the power off, find the cause\n"
                     f"{self.standing()}"
@@ -287,6 +275,35 @@ class ServoMachine(JobMachine):
         if self._stop():
             self.hold()
             raise StoppedError
+
+    # What depends on the servos' make
+
+    def _bus(self, port: Port) -> Bus:
+        """The servos behind an open port."""
+        return Bus(port)
+
+    def _faults(self, number: int) -> list[str]:
+        """What a servo says is wrong with it, by its last answer."""
+        return registers.errors(self.bus.errors.get(number, 0))
+
+    def _told(self, number: int) -> dict[str, Any]:
+        """What a servo says of itself, by its last state."""
+        state = self._states[number]
+        return {
+            "load_percent": self._value(registers.LOAD, state) / 10,
+            "voltage": self._value(registers.VOLTAGE, state) / 10,
+            "temperature": self._value(registers.TEMPERATURE, state),
+        }
+
+    def _own_limits(self) -> NDArray[np.int64]:
+        """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
+        found = self.bus.read_all(self.ids, *registers.LIMITS)
+        pairs = [[self._limit(registers.LEAST, found[n]), self._limit(registers.MOST, found[n])] for n in self.ids]
+        return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
+
+    @staticmethod
+    def _limit(register: registers.Register, data: bytes) -> int:
+        return register.unpack(data, registers.LIMITS[0])
 
     def _send(self, counts: NDArray[np.int64], rates: Array) -> None:
         """Goal positions for all servos at one moment, with the speed that reaches them; 0: as fast as it can."""

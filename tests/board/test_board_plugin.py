@@ -1,0 +1,146 @@
+"""examples/board_plugin, installed as a package of its own: a kind of board that armkin does not know."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import armkin
+from armkin import installed_kinds
+from armkin.board import path_run
+from armkin.board.backend.board import Board
+from armkin.board.kinds import board_of
+from armkin.errors import NoSolutionError, RobotFileError
+from command_line import ROOT, process, run
+
+WIDOW_X = {"waist": 1, "shoulder": 2, "elbow": 4, "forearm_roll": 6, "wrist_angle": 7, "wrist_rotate": 8}
+
+
+@pytest.fixture(scope="module")
+def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that the package was installed into."""
+    folder = tmp_path_factory.mktemp("packages")
+    words = ["-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(folder)]
+    subprocess.run([sys.executable, *words, str(ROOT / "examples/board_plugin")], check=True)
+    return folder
+
+
+@pytest.fixture
+def installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The package is installed here."""
+    monkeypatch.syspath_prepend(str(packages))
+    installed_kinds._offered.cache_clear()
+    yield
+    installed_kinds._offered.cache_clear()
+
+
+def robots(folder: Path) -> list[Path]:
+    """The WidowX 250 and the OpenMANIPULATOR with their servos' drives."""
+    arm = folder / "open_manipulator.yaml"
+    found = process("import", "docs/open_manipulator.urdf", "--tip", "end_effector_link")
+    assert found.code == 0, found.err
+    files = []
+    for text, ids in ((found.out, {}), ((ROOT / "robots/wx250s.yaml").read_text(), WIDOW_X)):
+        data: dict[str, Any] = yaml.safe_load(text)
+        for k, joint in enumerate(data["joints"], 11):
+            low, high = joint.get("limits", (-180, 180))  # a turn has no count for 180 degrees
+            joint |= {"max_speed": 90, "max_accel": 200, "limits": [max(low, -179), min(high, 179)]}
+            joint["drive"] = {"kind": "bus", "id": ids.get(joint["name"], k), "counts": 4096, "zero": 2048}
+        data["board"] = {"kind": "dynamixel"}
+        arm = folder / f"{data['name']}_dynamixel.yaml"
+        arm.write_text(yaml.safe_dump(data, sort_keys=False))
+        files.append(arm)
+    return files
+
+
+def connected(arm: armkin.Arm, **noise: float) -> tuple[Board, Any]:
+    """The arm's board and its emulated servos."""
+    board = board_of(arm)
+    port: Any = board.simulated()
+    port._lost, port._damaged = noise.get("lost", 0.0), noise.get("damaged", 0.0)
+    board.connect(port).prepare()
+    return board, port
+
+
+def test_a_kind_that_is_not_installed_is_named_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="pico6, feetech, grbl or klipper, not the text 'dynamixel'"):
+        armkin.load(robots(tmp_path)[1])
+
+
+@pytest.mark.usefixtures("installed")
+def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
+    for file in robots(tmp_path):
+        arm = armkin.load(file)
+        board, port = connected(arm)
+        assert board.kind == "dynamixel"
+        rng = np.random.default_rng(1)
+        for _ in range(5):
+            goal = np.clip(rng.uniform(-1, 1, arm.n), arm.lower, arm.upper)
+            plan = board.plan(board.machine.counts(), goal[None])
+            port.log.clear()
+            board.machine.run([plan])
+            assert list(board.machine.counts()) == plan.end.tolist()
+            at = np.array([list(shafts.values()) for shafts in port.log])
+            way = np.array(plan.end - plan.start, dtype=float)
+            share = (at - plan.start) @ way / (way @ way)
+            assert np.abs(at - plan.start - share[:, None] * way).max() < 12  # a degree off the straight joint move
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
+    arm = armkin.load(robots(tmp_path)[1])
+    board, port = connected(arm, lost=0.01, damaged=0.01)
+    board.machine.run([board.plan(board.machine.counts(), np.full((1, 6), 0.3))])
+    board.machine.refresh()
+    moves = {"start": "home", "moves": [{"joint": [10, 20, -20, 5, 5, 5]}, {"offset": {"xyz": [0, 0, 20]}}]}
+    plan = armkin.path(arm, moves, start=board.machine.joints())
+    assert plan.approach is not None
+    path_run.follow(board, plan, path_run.parts(plan, board.machine.counts(), board.lay), lambda done, total: None)
+    off = np.array([servo.at for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
+    assert np.abs(off).max() <= 12
+
+
+@pytest.mark.usefixtures("installed")
+def test_the_servos_own_limits_zero_and_relax(tmp_path: Path) -> None:
+    arm = armkin.load(robots(tmp_path)[1])
+    board = board_of(arm)
+    port: Any = board.simulated()
+    for number in port.servos:
+        port.servos[number].table[48:52] = (2500).to_bytes(4, "little")
+    board.connect(port).prepare()
+    with pytest.raises(NoSolutionError, match="outside its own limits 0 to 2500"):
+        board.machine.run([board.machine.plan(board.machine.counts(), np.deg2rad([60, 0, 0, 0, 0, 0]))])
+    assert port.servos[1].at == 2048
+    assert board.can("relax")
+    assert not board.can("home")
+    board.relax()
+    port.servos[1].at = 2100
+    port.advance(0.001)
+    board.machine.refresh()
+    assert board.zero(None) == ([2100, 2048, 2048, 2048, 2048, 2048], None)
+
+
+@pytest.mark.usefixtures("installed")
+def test_the_command_line_tells_of_it(tmp_path: Path) -> None:
+    robot = robots(tmp_path)[1]
+    status = run("status", robot, "--port", "sim")
+    assert "wrist_rotate   8     off  0.0 %   12.0 V" in status.out, status.out + status.err
+    home = run("home", robot, "--port", "sim")
+    assert (home.code, "there is nothing to home" in home.err) == (2, True)
+    assert '"dynamixel"' in run("schema").out
+
+
+def test_the_command_line_knows_the_kind(packages: Path, tmp_path: Path) -> None:
+    robot = robots(tmp_path)[1]
+    there = {**os.environ, "PYTHONPATH": str(packages)}
+    done = process("send", robot, 10, -10, 10, 5, 5, 5, "--port", "sim", "--json", env=there)
+    assert done.code == 0, done.err
+    assert done.json["joints"] == pytest.approx([10, -10, 10, 5, 5, 5], abs=0.1)
