@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.feetech.machine import ServoMachine, servo_ids
+from armkin.board.backend.servo_arm import ServoArm, servo_ids
 from armkin.board.kinds.feetech import ServoBusBoard
 from armkin.board.ports import Port
 from armkin.board_kinds import ForeignBoard
@@ -23,13 +23,13 @@ from armkin_dynamixel.emulator import Emulator
 FAULTS = {0: "voltage", 2: "overheating", 3: "encoder", 4: "electrical shock", 5: "overload"}  # bits of FAULT
 
 
-class Servos(ServoMachine):
+class Servos(ServoArm):
     """An arm of servos behind an open port: armkin's stream of positions, other registers."""
 
     firmware = "Dynamixel X"
     limits_at = "registers 48 and 52"
     differences = ("servos hold a position within about a degree; they count no steps",)
-    bus: Bus  # type: ignore[assignment]
+    bus: Bus
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Switch the motors on where they stand; the plan says how fast, no profile of theirs."""
@@ -37,7 +37,7 @@ class Servos(ServoMachine):
             self.bus.write(servo, PROFILE, 0)
         return super().prepare(assume=assume)
 
-    def _bus(self, port: Port) -> Bus:  # type: ignore[override]
+    def _bus(self, port: Port) -> Bus:
         return Bus(port)
 
     def _own_limits(self) -> NDArray[np.int64]:

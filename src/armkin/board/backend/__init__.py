@@ -3,6 +3,7 @@
 board.py     what a kind is: one class, with capabilities
 missing_keys.py  what a robot file lacks for its board
 starting.py  where a motion begins: what every trajectory that becomes counts is held to
+servo_arm.py  an arm of bus servos of any make
 job.py       a trajectory for a board that is sent positions, not segments
 record.py    what armkin last left on a board that other programs write to
 

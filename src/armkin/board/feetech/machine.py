@@ -1,282 +1,38 @@
-"""An arm of bus servos, which know where they stand at all times.
-
-The host streams positions along the trajectory, each a little ahead of the moment it is meant for, to all servos
-at once; the servos' own regulators follow. A lost packet is made up for by the next.
-"""
+"""An arm of STS servos: what of `ServoArm` depends on their registers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, JobMachine, braking
-from armkin.board.backend.starting import from_counts
-from armkin.board.feetech import gripping, registers
+from armkin.board.backend.servo_arm import LAG, SETTLED, ServoArm, job, servo_ids
+from armkin.board.feetech import registers
 from armkin.board.feetech.bus import Bus
-from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
-from armkin.model.units import joints_out
-from armkin.motion.trajectory import Straight
-from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
-    from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
-    from armkin.robot_file.model import Gripper
 
-PERIOD = 0.02  # [s] between positions
-LATE = 0.05  # [s] that one goes on at most: a program that had no time for longer does not cut across its path
-WATCH = 0.1  # [s] between readings of position and errors in motion
-LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
-SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
-STRAY = 2 * SETTLED  # [counts] that a motion may begin from where the servos stand: they sag a little under load
-SETTLING = 1.0  # [s] that it may take
+__all__ = ["LAG", "SETTLED", "ServoMachine", "job", "servo_ids"]
+
 _ENDLESS = 1 << 30  # [counts] of a servo without limits
 EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
 
 
-def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-    """A trajectory from counts `start` (motors,) on, as positions."""
-    return Job(trajectory, start, int(np.ceil(trajectory.duration / PERIOD)))
-
-
-def servo_ids(arm: Arm) -> list[int]:
-    """Numbers of the arm's servos on their bus, in the motors' order. Raises UsageError for other motors."""
-    where = arm.path or arm.name
-    motors = arm.motors
-    if not motors:
-        raise UsageError(f"{where}: no joint has a drive")
-    for motor, name in zip(motors, motor_names(arm), strict=True):
-        if motor.kind != "bus" or motor.id is None:
-            raise UsageError(
-                f"{where}: motor {name} is a {motor.kind}; a servo bus needs drive: {{kind: bus, id: ...}}"
-            )
-    ids = [motor.id for motor in motors if motor.id is not None]
-    for number in ids:
-        if ids.count(number) > 1:
-            raise UsageError(f"{where}: two servos have id {number}; every servo of a bus has its own")
-    return ids
-
-
-class ServoMachine(JobMachine):
-    """An arm of bus servos behind an open port; what depends on the servos' make stands at its end."""
+class ServoMachine(ServoArm):
+    """An arm of STS servos behind an open port."""
 
     firmware = "STS servo bus"
     limits_at = "registers 9 and 11"
-    differences: tuple[str, ...] = (
+    differences = (
         "servos hold a position within about a degree; they count no steps",
         "when the computer falls silent every servo goes to the last position it was sent, 20 ms ahead",
         "the bus has an 8-bit checksum: one damaged packet in some hundred passes it, and the next puts it right",
     )
 
-    def __init__(self, port: Port, arm: Arm, stop: Callable[[], bool] = lambda: False) -> None:
-        self.arm, self.port, self._stop = arm, port, stop
-        self.ids = servo_ids(arm)
-        self.bus = self._bus(port)
-        missing = [str(number) for number in self.ids if not self.bus.ping(number)]
-        if missing:
-            raise LinkError(
-                f"no answer from servo{'s' * (len(missing) > 1)} {', '.join(missing)} on {port.name}: "
-                "is the bus powered, is every cable plugged in, has every servo its own id?"
-            )
-        self._counts = np.zeros(len(self.ids), dtype=np.int64)
-        self._states: dict[int, bytes] = {}
-        self._limits = self._own_limits()
-        self._read()
-
-    # Where it stands
-
-    def position(self) -> Position:
-        """Always known: the servos' encoders are absolute."""
-        return "known"
-
-    def counts(self) -> tuple[int, ...]:
-        """Counts of the arm's motors, as last read."""
-        return tuple(int(count) for count in self._counts)
-
-    def _measured(self) -> tuple[int, ...]:
-        """Counts of the arm's motors, read now."""
-        self._read()
-        return self.counts()
-
-    def standing(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
-        return f"the arm stands at {list(self.counts())} counts: the next command starts there"
-
-    def report(self) -> dict[str, Any]:
-        """What `armkin status` tells besides the position."""
-        self._read()
-        servos = [
-            {
-                "name": name,
-                "id": number,
-                "torque": bool(self.bus.read(number, self.bus.TORQUE)),
-                **self._told(number),
-                "errors": self._faults(number),
-            }
-            for number, name in zip(self.ids, motor_names(self.arm), strict=True)
-        ]
-        return {"firmware": self.firmware, "servos": servos}
-
-    # Getting ready
-
-    def prepare(self, *, assume: Array | None = None) -> bool:
-        """Switch the motors on where they stand; False: the position is always known."""
-        if assume is not None:
-            joints = joints_out(self.arm, self.joints()).tolist()
-            raise PositionKnownError("bus servos know their position: there is nothing to assume", joints=joints)
-        self._read()
-        self._check()
-        self._send(self._counts, np.zeros(len(self.ids)))  # so that none jumps to an old goal
-        for number, count in zip(self.ids, self._counts, strict=True):
-            self.bus.write(number, self.bus.GOAL_POSITION, int(count))
-        self.bus.torque(self.ids, on=True)
-        return False
-
-    def relax(self) -> None:
-        """Switch the motors off: the arm can be moved by hand, and falls if nobody holds it."""
-        self.bus.torque(self.ids, on=False)
-
-    def read(self) -> Array:
-        """Joint values where the arm stands now: (n,) [rad | mm]."""
-        self._read()
-        return self.joints()
-
-    def wait(self, until: float) -> bool:
-        """Wait for a moment of the port's clock; False if a stop was asked for before."""
-        while self.port.now() < until:
-            if self._stop():
-                return False
-            self.port.read(0.01)
-        return not self._stop()
-
-    # Moving
-
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-        """A trajectory that starts at counts (motors,). Raises NoSolutionError as `_check_limits` does."""
-        made = job(trajectory, start)
-        self._check_limits(made)
-        return made
-
-    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
-        """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
-        total = done = 0.0
-        for one in filter(None, plans if isinstance(plans, list) else ()):
-            self._check_limits(one)  # all of them, before anything moves
-        for job in from_counts(plans, self._measured, tolerance=STRAY):
-            if job is None:
-                self._heed()
-                self.port.read(PERIOD)
-                continue
-            self._check_limits(job)
-            total += job.duration
-            self._follow(job.trajectory, partial(_tell, progress, done, total))
-            self._arrive(job.end)
-            done = total
-            progress(done, total)
-
-    def hold(self) -> None:
-        """Stay where the arm stands."""
-        self._read()
-        for number, count in zip(self.ids, self._counts, strict=True):
-            self.bus.write(number, self.bus.GOAL_POSITION, int(count))
-
-    def grip(self, gripper: Gripper, value: float) -> float:
-        """Move the gripper and return where it comes to rest, both in its drive's degrees."""
-        return gripping.grip(self.bus, gripper, value, self._stop)
-
-    def _check_limits(self, job: Job) -> None:
-        """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out where it stands so."""
-        low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
-        for stretch in job.trajectory.stretches:
-            count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PERIOD)), 1)
-            goals = pulses(self.arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:]))
-            for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
-                least, most = self._limits[k].tolist()
-                raise NoSolutionError(
-                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {goals[row, k]} counts is outside its own "
-                    f"limits {least} to {most} ({self.limits_at}): nothing was moved"
-                )
-
-    def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
-        """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
-        begin = last = self.port.now()
-        watched, t, pace, stopping = begin, 0.0, 1.0, False
-        ramp = max(braking(trajectory), PERIOD)
-        while t < trajectory.duration and pace > 0.0:
-            now = self.port.now()
-            if now - last < PERIOD - 1e-4:
-                self.port.read(PERIOD - (now - last))
-                continue
-            stopping = stopping or self._stop()
-            passed, last = min(now - last, LATE), now
-            if stopping:
-                pace = max(0.0, pace - passed / ramp)
-            t = min(trajectory.duration, t + passed * pace)
-            ahead = min(trajectory.duration, t + PERIOD * pace)
-            self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
-            tell(t)
-            if now - watched > WATCH:
-                watched = now
-                self._watch(pulses(self.arm, trajectory.q(t)))
-        if stopping:
-            self.hold()
-            raise StoppedError
-
-    def _arrive(self, end: NDArray[np.int64]) -> None:
-        """Wait until all servos are where the move ends, sending the goal again."""
-        limit = self.port.now() + SETTLING
-        while True:
-            self._send(end, np.zeros(len(self.ids)))
-            self.port.read(PERIOD)
-            self._read()
-            self._check()
-            off = np.abs(self._counts - end)
-            if off.max() <= SETTLED:
-                return
-            if self.port.now() > limit:
-                k = int(off.argmax())
-                self.hold()
-                raise LinkError(
-                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {off[k]} counts from its goal: is it "
-                    f"blocked or overloaded?\n{self.standing()}"
-                )
-            self._heed()
-
-    def _watch(self, expected: NDArray[np.int64]) -> None:
-        """Hold the arm if a servo reports an error or falls far behind."""
-        self._read()
-        off = np.abs(self._counts - expected)
-        if off.max() > LAG:
-            k = int(off.argmax())
-            self.hold()
-            raise LinkError(
-                f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) is {off[k]} counts behind: blocked or overloaded?\n"
-                f"{self.standing()}"
-            )
-        self._check()
-
-    def _check(self) -> None:
-        """Raise LinkError for a servo that reports an error."""
-        for number, name in zip(self.ids, motor_names(self.arm), strict=True):
-            if found := self._faults(number):
-                raise LinkError(
-                    f"servo {number} ({name}) reports {', '.join(found)}: switch the power off, find the cause\n"
-                    f"{self.standing()}"
-                )
-
-    def _heed(self) -> None:
-        if self._stop():
-            self.hold()
-            raise StoppedError
-
-    # What depends on the servos' make
+    bus: Bus
 
     def _bus(self, port: Port) -> Bus:
         """The servos behind an open port."""
@@ -329,7 +85,3 @@ class ServoMachine(JobMachine):
     @staticmethod
     def _value(register: registers.Register, state: bytes) -> int:
         return register.unpack(state, registers.STATE[0])
-
-
-def _tell(progress: Progress, done: float, total: float, t: float) -> None:
-    progress(done + t, total)

@@ -17,6 +17,7 @@ from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend import Planned
+    from armkin.board.backend.servo_arm import ServoArm
     from armkin.board.ports import Port
     from armkin.motion.trajectory import Trajectory
 
@@ -30,7 +31,7 @@ class ServoBusBoard(Board):
     gripper_drive = KIND.gripper
     gripper_taken = "it takes gripper: {kind: bus, id: 6, ...}"
     lacks: ClassVar = {"home": "bus servos know their position: there is nothing to home"}
-    machine: ServoMachine
+    machine: ServoArm
 
     def check(self) -> None:
         """Raise UsageError if the arm's motors are no servos of one bus."""
@@ -51,7 +52,7 @@ class ServoBusBoard(Board):
             servos.append(Servo(gripper.id))
         return ServoBus(servos)
 
-    def attach(self, port: Port, stop: Callable[[], bool]) -> ServoMachine:
+    def attach(self, port: Port, stop: Callable[[], bool]) -> ServoArm:
         """The arm on the bus behind an open port."""
         return ServoMachine(port, self.arm, stop)
 
@@ -65,7 +66,8 @@ class ServoBusBoard(Board):
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper, and tell where it comes to rest."""
         target = self.grip_value(value)
-        return Gripped(self.machine.grip(self.gripper(), target), target, "deg", measured=True)
+        at = gripping.grip(self.machine.bus, self.gripper(), target, self.stop)
+        return Gripped(at, target, "deg", measured=True)
 
     def relax(self) -> None:
         """Switch the servos off."""
