@@ -13,6 +13,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints, fk
 from armkin.forward import frames as joint_frames
+from armkin.keep_out.clearance import hits, said
 from armkin.model.limits import outside
 from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
 from armkin.reachability.volume import motion
@@ -25,6 +26,7 @@ MOST = 20_000  # poses of one path
 _DRAWN = 40  # of them, evenly spaced, that are drawn as arms
 _BETWEEN = 16  # points of the tip's way from one pose to the next
 _ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # of the eye [deg]
+_HIT, _SOLID = "#d62728", "#7a6a58"  # of an arm that hits something, of what it must not touch
 _AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # x, y, z of a frame
 
 
@@ -59,23 +61,26 @@ def plot_poses(
     bones = [skeleton(arm, pose) for pose in shown]
     with_frames = alone if frames is None else frames
     legal = [not outside(arm, pose).any() for pose in shown]
+    hit = [said(found) for _, found in hits(arm, shown)] if arm.keep_out else [""] * len(shown)
     legend = ["start", "end"]
     if names is not None:
         legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
+        legend = [name + (f" ({what})" if what else "") for name, what in zip(legend, hit, strict=True)]
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
+        drawing.keep_outs()
         # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
         widths = 2.4 + np.minimum(0.5, 3.0 / len(shown)) * np.arange(len(shown)) + _twins(bones)
         several = list(enumerate(bones)) if names is None else sorted(enumerate(bones), key=lambda k: -widths[k[0]])
         for k, bone in several:
             if alone:
-                drawing.single(bone)
+                drawing.single(bone, _HIT if hit[k] else PALETTE[0])
             elif names is None:
                 label = legend[k] if k < 1 else legend[1] if k == len(shown) - 1 else None
-                drawing.arm(bone, _along(k / (len(shown) - 1)), label, 2.6, dashed=not legal[k])
+                drawing.arm(bone, _HIT if hit[k] else _along(k / (len(shown) - 1)), label, 2.6, dashed=not legal[k])
             else:
-                drawing.arm(bone, _apart(k, len(shown)), legend[k], widths[k], dashed=not legal[k])
+                drawing.arm(bone, _HIT if hit[k] else _apart(k, len(shown)), legend[k], widths[k], dashed=not legal[k])
         if track is not None:
             drawing.track(track)
         if with_frames:
@@ -87,6 +92,7 @@ def plot_poses(
         if alone:
             notes.append("tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bones[0].tip, 1) + 0.0))
             notes += [] if legal[0] else ["outside the joint limits"]
+            notes += [hit[0]] if hit[0] else []
         if with_frames:
             notes.append("frames: x red, y green" + ("" if drawing.dimensions == 2 else ", z blue"))
         if alone:
@@ -119,6 +125,24 @@ class _Drawing:
             self.axes = space(figure, (0.02, 0.02, 0.96, 0.88), view or _from_the_side(arm))
             self.floor = min(float(self.points[:, 2].min()), float(arm.base[2, 3]))
 
+    def keep_outs(self) -> None:
+        """What the arm must not touch, translucent; a floor is drawn as far as the picture goes."""
+        if not self.robot.keep_out or self.dimensions == 2:
+            return
+        from armkin.keep_out.guard import guard
+        from armkin.keep_out.shapes.floor import Floor
+
+        surfaces = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
+        shapes = [shape for _, shape in guard(self.robot).obstacles]
+        for shape in sorted(shapes, key=lambda one: isinstance(one, Floor)):  # a floor is drawn under all others
+            solid = shape.triangles(1.0)
+            if isinstance(shape, Floor):
+                (x0, y0), (x1, y1) = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
+                z = shape.height
+                solid = np.array([[[x0, y0, z], [x1, y0, z], [x1, y1, z]], [[x0, y0, z], [x1, y1, z], [x0, y1, z]]])
+            self.points = np.concatenate([self.points, solid.reshape(-1, 3)])
+            self.axes.add_collection3d(surfaces(solid, color=_SOLID, alpha=0.16, linewidths=0))
+
     def name_joints(self, bone: Skeleton) -> None:
         """Each joint's name beside it; joints in one place share a line."""
         groups: list[tuple[Array, list[str]]] = []
@@ -142,13 +166,12 @@ class _Drawing:
     def line(self, points: Array, **style: Any) -> None:
         self.axes.plot(*points.T[: self.dimensions], **style)
 
-    def single(self, bone: Skeleton) -> None:
+    def single(self, bone: Skeleton, colour: str) -> None:
         """One pose: thick links, joints along their axes, a shadow that tells where over the floor it is."""
         if self.dimensions == 3:
             shadow = bone.path.copy()
             shadow[:, 2] = self.floor
             self.line(shadow, color=FAINT, linewidth=3.5, solid_capstyle="round", zorder=1)
-        colour = PALETTE[0]
         self._links(bone, colour, 5.0)
         if self.dimensions == 2:
             self._dots(bone, colour, 9.0)

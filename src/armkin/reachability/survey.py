@@ -14,6 +14,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
+from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.reachability import cloud as clouds
 from armkin.reachability.measures import MEASURES, measure
@@ -39,6 +40,7 @@ class Workspace:
     joints: Array  # (K, n) [rad | mm] a random choice of the samples, for pictures
     tips: Array  # (K, 3)
     values: dict[str, Array]  # (K,) their measures
+    free: int | None = None  # samples that hit nothing; None: the arm has no keep-outs
 
 
 def workspace(
@@ -101,7 +103,7 @@ class _Tally:
     """Bounds so far, and a random choice of the samples."""
 
     def __init__(self, arm: Arm, count: int, measures: int, keep: int, seed: int) -> None:
-        self.arm, self.done = arm, 0
+        self.arm, self.done, self.free = arm, 0, 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.near, self.far = np.inf, 0.0
         self.least, self.most = np.full(measures, np.inf), np.full(measures, -np.inf)
@@ -111,6 +113,8 @@ class _Tally:
 
     def add(self, q: Array, tip: Array, values: list[Array]) -> None:
         self.done += len(q)
+        if self.arm.keep_out:
+            self.free += int(clear(self.arm, q).sum())
         self.low, self.high = np.minimum(self.low, tip.min(axis=0)), np.maximum(self.high, tip.max(axis=0))
         distance = np.linalg.norm(tip - self.arm.base[:3, 3], axis=1)
         self.near, self.far = min(self.near, float(distance.min())), max(self.far, float(distance.max()))
@@ -137,4 +141,5 @@ class _Tally:
             joints=kept[:, :n],
             tips=kept[:, n : n + 3],
             values={name: kept[:, n + 3 + k] for k, name in enumerate(names)},
+            free=self.free if self.arm.keep_out else None,
         )

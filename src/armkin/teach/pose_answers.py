@@ -14,6 +14,8 @@ from armkin.forward import fk
 from armkin.inverse import choose, recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
+from armkin.keep_out.clearance import hits
+from armkin.keep_out.clearance import said as hits_said
 from armkin.model import units
 from armkin.model.limits import outside, said
 from armkin.model.rotation import rpy
@@ -123,7 +125,7 @@ def _solved(arm: Arm, question: Question) -> dict[str, Any]:
         return answer
     stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
     if found.within_limits:
-        answer["chosen"] = stay[0] if stay else 0
+        answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
         answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:
         nearest = choose.closest(request, goal)
@@ -142,6 +144,7 @@ def _row(arm: Arm, branch: choose.Branch) -> dict[str, Any]:
         "joints": branch.joints,
         "within_limits": branch.within_limits,
         "outside": [said(arm, i, float(branch.q[i])) for i in branch.outside],
+        "hits": hits_said(list(branch.hits)),
         "motion": branch.motion,
     }
 
@@ -156,5 +159,8 @@ def _same(branches: Sequence[choose.Branch], q: Array) -> int | None:
 
 
 def _words(arm: Arm, q: Array) -> list[str]:
-    """Each joint outside its limits, in words."""
-    return [said(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
+    """Each joint outside its limits, and what the pose hits, in words."""
+    found = [said(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
+    if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
+        found.append(f"it {hits_said(hit)}")
+    return found

@@ -154,6 +154,7 @@ class Workspace(Head):
     area_mm2: Annotated[NotRequired[float], "an arm that moves in a plane"]
     area_error_mm2: Annotated[NotRequired[float], "bound or estimate, see method"]
     method: Annotated[NotRequired[str], "how volume or area were found"]
+    free_share: Annotated[NotRequired[float], "of the samples, those that hit nothing, where there are keep-outs"]
     measures: Annotated[dict[str, list[float]], "each of --measure: [least, greatest]"]
     seconds: float
 

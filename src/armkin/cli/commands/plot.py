@@ -9,7 +9,7 @@ import typer
 from armkin.cli import inputs, lock_and_sweep, piped_answers, render
 from armkin.cli.csv_rows import batch_rows
 from armkin.cli.numbers import listed
-from armkin.cli.options import Joints, Lock, RobotOrPipe, TaskName
+from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -35,6 +35,7 @@ def plot(
     ] = None,
     task: TaskName = None,
     lock: Lock = None,
+    scene: Scene = None,
     frames: Annotated[
         bool | None,
         typer.Option("--frames/--no-frames", help="The joint frames. [default: for a single pose]"),
@@ -67,9 +68,9 @@ def plot(
         raise UsageError("--task and --lock belong to --target")
     style: dict[str, Any] = {"frames": frames, "view": None if view is None else _eye(view)}
     if target is None and batch is None and not q:
-        _piped(robot, out, **style)
+        _piped(robot, scene, out, **style)
         return
-    arm = inputs.load(inputs.named(robot))
+    arm = inputs.load(inputs.named(robot), scene)
     if target is not None and q:
         inputs.check_commas(arm, task, target, q)
     if sum((bool(q), target is not None, batch is not None)) > 1:
@@ -101,13 +102,13 @@ def _path(arm: Arm, poses: Any, out: str | None, **style: Any) -> None:
     plot_poses(arm, units.joints_in(arm, poses), out, title=f"{arm.name}: {len(poses)} poses", **style)
 
 
-def _piped(robot: str | None, out: str | None, **style: Any) -> None:
+def _piped(robot: str | None, scene: str | None, out: str | None, **style: Any) -> None:
     """What a command before the pipe has printed: its branches, or its poses."""
     from armkin.plot import plot_poses
 
-    found = piped_answers.answers(robot)
+    found = piped_answers.answers(robot, scene)
     if found is None:
-        arm = inputs.load(inputs.named(robot))
+        arm = inputs.load(inputs.named(robot), scene)
         names = " ".join(arm.joint_names)
         raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
     arm, answers = found

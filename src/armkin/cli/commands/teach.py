@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import inputs, output
+from armkin.cli import keep_outs, output
 from armkin.cli.board_link import SIM, Baud
-from armkin.cli.options import Robot
+from armkin.cli.keep_outs import NoScene
+from armkin.cli.options import Robot, Scene
 
 
 def teach(
@@ -19,6 +20,8 @@ def teach(
         str | None,
         typer.Option("--port", "-p", metavar="PORT", help="A board: device, COM port, pyserial URL, or sim."),
     ] = None,
+    scene: Scene = None,
+    no_scene: NoScene = False,
     baud: Baud = None,
     open: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
@@ -33,11 +36,12 @@ def teach(
     from armkin.teach.actions import Actions
     from armkin.teach.server import Server
 
-    arm = inputs.load(robot)
+    arm = keep_outs.moving(robot, scene)
     if port is not None and port != SIM:
         from armkin.board.ports.serial_port import check
 
         check(port)
+        keep_outs.check_port(port, arm, no_scene)
     actions = Actions(arm, port, baud)
     try:
         with Server(actions) as server, ExitStack() as stack:

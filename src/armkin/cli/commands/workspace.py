@@ -10,7 +10,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import is_number, whole
-from armkin.cli.options import Compiled, Json, Robot
+from armkin.cli.options import Compiled, Json, Robot, Scene
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def workspace(
             help="What colours the picture: manipulability (default), step_error, reach, z.",
         ),
     ] = None,
+    scene: Scene = None,
     compiled: Compiled = False,
     json: Json = False,
 ) -> None:
@@ -65,7 +66,7 @@ def workspace(
     from armkin.reachability import cloud
     from armkin.reachability.sampling import MOST
 
-    arm = inputs.load(robot)
+    arm = inputs.load(robot, scene)
     measures = list(dict.fromkeys(measure or ()))
     if out is not None:
         cloud.check(out)
@@ -131,6 +132,9 @@ def _answer(found: Workspace) -> Answer:
         "measures": {name: list(ends) for name, ends in found.measures.items()},
         "seconds": found.seconds,
     }
+    answer.update(render.scene(found.arm))
+    if found.free is not None:
+        answer["free_share"] = found.free / found.samples
     if found.extent is not None:
         size = found.extent
         answer["method"] = size.method
@@ -149,6 +153,8 @@ def _text(answer: Mapping[str, Any]) -> str:
         rows.append([name, render.fixed(low, 2), render.fixed(high, 2), note])
     for name, (low, high) in answer["measures"].items():
         rows.append([name.replace("_", " "), f"{low:.4g}", f"{high:.4g}", "mm" if name == "step_error" else ""])
+    if "free_share" in answer:
+        rows.append(["free", "", f"{100 * answer['free_share']:.1f}", "% of the samples hit nothing"])
     count = answer["samples"]
     text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left=(0, 3))}\n\n"
     what, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")

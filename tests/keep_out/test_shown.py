@@ -1,0 +1,48 @@
+"""Keep-outs in pictures, in the workspace and on the page; shipped bodies and benches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.keep_out.guard import guard, postures
+from armkin.teach.pose_answers import Question, look
+from command_line import run
+
+BENCHES = sorted(path.stem for path in Path("examples/scenes").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("robot", BENCHES)
+def test_a_bench_leaves_its_arm_room(robot: str) -> None:
+    arm = armkin.load(robot, scene=f"examples/scenes/{robot}.yaml")
+    assert armkin.clearance(arm, arm.home).mm > 0
+    assert 0.2 < (guard(arm).clearances(postures(arm)).min(axis=1) >= 0).mean() < 0.95
+    assert robot == "three_dof" or not guard(arm).bodies.assumed.any()
+    assert not armkin.load(robot).keep_out
+
+
+def test_a_hit_is_red_in_a_picture(tmp_path: Path) -> None:
+    out = tmp_path / "arm.svg"
+    scene = "examples/scenes/three_dof.yaml"
+    assert run("plot", "three_dof", "--target", "400,40,100", "--scene", scene, "-o", out).code == 0
+    drawn = out.read_text()
+    assert "hits table by 11.9 mm" in drawn
+    assert "#d62728" in drawn
+
+
+def test_the_workspace_tells_the_free_share() -> None:
+    words = ("workspace", "three_dof", "--samples", "500")
+    found = run(*words, "--scene", "examples/scenes/three_dof.yaml", "--json").json
+    assert 0.2 < found["free_share"] < 0.95
+    assert "free_share" not in run(*words, "--json").json
+
+
+def test_the_page_is_told_of_hits() -> None:
+    arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")
+    told = look(arm, Question(q=np.deg2rad([0.0, 0.0, -45.0])))
+    assert told["outside"][0].startswith("it hits table by 47.5 mm (q3)")
+    assert any(branch["hits"] for branch in told["branches"])
+    assert look(arm, Question(q=arm.home))["outside"] == []
