@@ -46,7 +46,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "joint_units": units.names(arm),
         "joints": [_joint(joint) for joint in file.joints],
         "poses": units.poses_out(arm),
-        "base": file.base.model_dump(exclude_none=True),
+        "base": file.base.model_dump(include={"xyz", "rpy"}),
         "tool": file.tool.model_dump(),
         "zero_pose": None if file.zero_pose is None else file.zero_pose.model_dump(),
         **_task(arm, task),
