@@ -77,6 +77,34 @@ def target(task: Task, now: Spot, value: Sequence[float]) -> Spot:
     return spot(task, made)
 
 
+def check_numbers(arm: Arm, file: PathFile) -> None:
+    """Raise UsageError where a move has too few or too many numbers for the arm; where they lead is planning's."""
+    task = None
+    for k, move in enumerate(file.moves):
+        kind = move.kind
+        try:
+            value = getattr(move, kind)
+            if kind == "joint":
+                joints(arm, arm.home, value)
+            elif kind == "grip":
+                check_grip(arm, value)
+            elif kind != "wait":
+                task = task or task_for(arm, file.task)
+                _check_targets(task, kind, value)
+        except UsageError as error:
+            raise error.within(file.place_of(k, k), move=k + 1) from None
+
+
+def _check_targets(task: Task, kind: str, value: Any) -> None:
+    here = spot(task, np.zeros(len(task.labels)))
+    targets = {"point": [value], "line": [value], "polyline": value, "spline": value}
+    places = {"arc": ("via",), "circle": ("centre", "normal"), "offset": ("xyz",)}
+    for one in targets.get(kind, [value.to] if kind == "arc" else []):
+        target(task, here, one)
+    for name in places.get(kind, ()):
+        place(task, getattr(value, name))
+
+
 def place(task: Task, value: Sequence[float]) -> Array:
     """A position or a direction, with as many coordinates as the task has."""
     if len(value) < task.position:

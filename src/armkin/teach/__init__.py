@@ -4,6 +4,7 @@ server.py           HTTP on 127.0.0.1: files, events, actions
 request_checks.py   who may ask, and whether a request's fields are what they must be
 tabs.py             the open pages: which one holds control, what each has still to hear
 actions.py          every action by its name; program_actions.py: those on the program
+playing.py          a plan as the page plays it, by error
 program.py          moves recorded one after another, in the words of a path file
 scene.py            what the page draws: links, bodies, limits
 pose_answers.py     one pose or one target: branches, limits, pulses

@@ -14,7 +14,7 @@ from armkin.inverse.recognise import solver
 from armkin.model import units
 from armkin.model.arm import actual
 from armkin.motors import pulse_range
-from armkin.teach.program import played
+from armkin.teach.playing import played
 from armkin.teach.scene import scene
 
 if TYPE_CHECKING:

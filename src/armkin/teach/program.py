@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import copy
-import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
+from armkin.motion.path_numbers import check_numbers
 from armkin.robot_file.writing import flow
 from armkin.teach import request_checks
 
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
     from armkin.path_file import PathFile
 
 MOST = 2000  # moves
-SAMPLES = 1500  # of a plan that the page plays
 _UNDO = 100
 _DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
 _SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
@@ -121,6 +118,7 @@ class Program:
 
         file = path_file.parse(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
+        check_numbers(self.arm, file)
         data = file.model_dump(exclude_unset=True, exclude_none=True)
         data.pop("robot", None)
         moves = data.pop("moves")
@@ -196,7 +194,9 @@ class Program:
         self.via = _rounded(fk(self.arm, q)[:3, 3].tolist())
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
-        self.names[self._index(fields)] = " ".join(request_checks.text(fields, "name", 60).replace("#", "").split())
+        given = request_checks.text(fields, "name", 60)  # as a comment of YAML may have it: what can be printed
+        kept = "".join(c if c.isprintable() else " " for c in given.replace("#", ""))
+        self.names[self._index(fields)] = " ".join(kept.split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
         at, to = self._index(fields), request_checks.whole(fields, "to", len(self.moves))
@@ -236,25 +236,6 @@ class Program:
 
     def _restore(self, before: tuple[Any, ...]) -> None:
         self.head, self.moves, self.names, self.via = before
-
-
-def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
-    """A plan as the page plays it: joint values over time, the tip's way, speeds as shares of the limits."""
-    count = int(min(SAMPLES, max(2, math.ceil(plan.duration / 0.02) + 1)))
-    begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
-    t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
-    q = plan.q(t)
-    with np.errstate(invalid="ignore"):
-        shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)
-    return {
-        "duration_s": plan.duration,
-        "length_mm": plan.length,
-        "time": t.round(4).tolist(),
-        "joints": units.joints_out(arm, q).round(5).tolist(),
-        "tips": fk(arm, q)[:, :3, 3].round(3).tolist(),
-        "shares": shares.round(4).T.tolist(),
-        "stops": [round(begin, 4) for begin in begins],
-    }
 
 
 def _kind(move: Mapping[str, Any]) -> str:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
-from armkin.teach.program import Program, played
+from armkin.teach.playing import played
+from armkin.teach.program import Program
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array

@@ -14,7 +14,7 @@ export class Board {
   /**
    * @param {import("./types.js").Arm} arm
    * @param {{pose: () => Promise<number[]>, show: (q: number[]) => void, moved: (state: import("./types.js").BoardState) => void,
-   *   trouble: (text: string) => void}} page
+   *   trouble: (text: string, source?: string) => void, begun: () => void}} page
    */
   constructor(arm, page) {
     this.arm = arm;
@@ -23,6 +23,7 @@ export class Board {
     this.state = null;
     this.open = true; // the gripper, as last told
     this.beating = 0;
+    this.lost = false; // the server does not answer
     get("gripper").hidden = arm.gripper === null;
     if (arm.gripper) {
       get("grip-unit").textContent = arm.gripper.unit;
@@ -108,7 +109,7 @@ export class Board {
   async ask(name, fields = {}) {
     // Before it is asked for: what the board says of it may come sooner than the answer.
     if (name !== "jog" || !this.beating) {
-      this.page.trouble("");
+      this.page.begun();
       get("arrived").textContent = "";
     }
     try {
@@ -156,7 +157,7 @@ export class Board {
       if (state.error && state.error !== "stopped") this.page.trouble(state.error);
     }
     if (state.error === "stopped") get("arrived").textContent = "stopped: the arm stands on its path, its position is known";
-    if (!state.connected && state.error) this.page.trouble(state.error);
+    this.page.trouble(state.connected ? "" : state.error, "port"); // as long as it is so
     const stop = "STOP is no emergency stop: for that, cut the motors' power.";
     if (state.simulated) get("how-safe").textContent = "A simulated board: nothing real moves.";
     else if (state.differences.length) get("how-safe").textContent = `${state.differences.join(". ")}. ${stop}`;
@@ -167,10 +168,24 @@ export class Board {
     this.page.moved(state);
   }
 
+  /** The server does not answer, or does again: what it said last is no news. @param {boolean} lost */
+  gone(lost) {
+    this.lost = lost;
+    if (!this.state) return;
+    if (!lost) {
+      this.show(this.state);
+      return;
+    }
+    get("standing").textContent = "armkin teach is gone: nobody knows where the arm is";
+    get("standing").dataset.position = "unknown";
+    get("position").textContent = get("arrived").textContent = "";
+    this.buttons();
+  }
+
   buttons() {
     const state = this.state;
     if (!state) return;
-    const busy = state.doing !== "" || !state.connected;
+    const busy = state.doing !== "" || !state.connected || this.lost;
     const consent = /** @type {HTMLInputElement} */ (get("consent")).checked;
     const off = (/** @type {string} */ id, /** @type {boolean} */ when) => {
       /** @type {HTMLButtonElement} */ (get(id)).disabled = when;
@@ -179,9 +194,10 @@ export class Board {
     off("run", busy);
     off("home", busy);
     off("grip", busy);
-    off("here", !state.joints);
+    off("here", !state.joints || this.lost);
+    for (const id of ["jog-down", "jog-up", "follow"]) off(id, !state.connected || this.lost);
     off("assume", busy || !consent);
     get("lost").hidden = state.position !== "lost";
-    get("connect").hidden = state.connected || state.doing !== "";
+    get("connect").hidden = state.connected || state.doing !== "" || this.lost;
   }
 }

@@ -16,18 +16,34 @@ function svg(tag, attributes) {
 }
 
 /**
+ * A long row as the picture can show it: of what falls on one point of its width, the highest.
+ * @param {number[]} time @param {number[]} row @param {number} duration
+ */
+function peaks(time, row, duration) {
+  /** @type {Map<number, {t: number, share: number}>} */
+  const found = new Map();
+  row.forEach((share, k) => {
+    const at = Math.round((2 * WIDTH * time[k]) / Math.max(duration, 1e-9));
+    const best = found.get(at);
+    if (!best || share > best.share) found.set(at, { t: time[k], share });
+  });
+  return [...found.values()];
+}
+
+/**
  * Draw a plan's speeds.
  * @param {import("./types.js").Played} plan
  * @param {string[]} names
  */
 export function chart({ time, shares, duration_s: duration }, names) {
-  const top = Math.max(1, ...shares.flat());
+  const highest = shares.map((row) => row.reduce((most, share) => Math.max(most, share), 0));
+  const top = Math.max(1, ...highest);
   const x = (/** @type {number} */ t) => ((t / Math.max(duration, 1e-9)) * WIDTH).toFixed(1);
   const y = (/** @type {number} */ share) => (HEIGHT - 2 - (share / top) * (HEIGHT - 12)).toFixed(1);
   const limit = svg("line", { x1: 0, x2: WIDTH, y1: y(1), y2: y(1), class: "limit" });
   const lines = shares.map((row, i) =>
     svg("polyline", {
-      points: row.map((share, k) => `${x(time[k])},${y(share)}`).join(" "), fill: "none",
+      points: peaks(time, row, duration).map(({ t, share }) => `${x(t)},${y(share)}`).join(" "), fill: "none",
       stroke: COLOURS[i % COLOURS.length], "stroke-width": 1.6,
     }),
   );
@@ -35,7 +51,7 @@ export function chart({ time, shares, duration_s: duration }, names) {
   const picture = get("speeds");
   picture.setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
   picture.replaceChildren(limit, ...lines, now);
-  const most = shares.map((row, i) => `${names[i]} ${Math.round(100 * Math.max(0, ...row))} %`);
+  const most = highest.map((share, i) => `${names[i]} ${Math.round(100 * share)} %`);
   const text = "Joint speeds against their limits (dashed), at most:";
   picture.setAttribute("aria-label", `${text} ${most.join(", ")}`);
   const keys = most.map((said, i) => {

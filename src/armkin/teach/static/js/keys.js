@@ -1,5 +1,19 @@
 // @ts-check
-/** Keys of the whole page; what is typed into a box is left alone, but for Esc. */
+/** Keys of the whole page; what an input has a use for itself is left to it, but for Esc. */
+
+const STEPS = /^(Arrow|Page)/;
+
+/**
+ * Whether an element has a use for a key: a box for all that is typed, a slider for the arrows.
+ * @param {EventTarget | null} at @param {string} key
+ */
+function used(at, key) {
+  if (at instanceof HTMLInputElement) {
+    if (["checkbox", "button", "file"].includes(at.type)) return false;
+    return at.type !== "range" || STEPS.test(key);
+  }
+  return at instanceof HTMLElement && ["SELECT", "TEXTAREA"].includes(at.tagName);
+}
 
 /**
  * @param {Object<string, () => void>} actions key -> what it does
@@ -23,9 +37,8 @@ export function keys(actions, nudge, stop) {
     true,
   );
   document.addEventListener("keydown", (event) => {
-    const at = event.target instanceof HTMLElement ? event.target.tagName : "";
     if (event.ctrlKey || event.altKey || event.metaKey || event.defaultPrevented) return;
-    if (["INPUT", "SELECT", "TEXTAREA"].includes(at)) return;
+    if (used(event.target, event.key)) return;
     const way = ways[event.key];
     const action = actions[event.key.toLowerCase()];
     if (way) nudge(way.map((value) => value * (event.shiftKey ? 0.1 : 1)));

@@ -9,6 +9,7 @@ import { Motors } from "./motors.js";
 import { Program } from "./program.js";
 import { act, enter } from "./server.js";
 import { Tip } from "./tip.js";
+import { begun, trouble } from "./trouble.js";
 
 /** @typedef {import("./types.js").Look} Look */
 
@@ -36,12 +37,12 @@ class Page {
       return this.q;
     };
     this.board = new Board(arm, {
-      pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text) => trouble(text, "board"),
+      pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text, source = "board") => trouble(text, source), begun,
     });
     this.program = new Program(arm, {
       pose, settled: () => this.refresh(), show: (q) => this.turn(q), played: (q) => this.played(q),
       trail: (tips) => this.view?.trail(tips),
-      trouble: (text) => trouble(text, "program"), mine: () => this.mine,
+      trouble: (text) => trouble(text, "program"), begun, mine: () => this.mine,
     });
     this.asking = new Latest((fields) => this.answer(fields));
     get("robot").textContent = arm.robot;
@@ -59,6 +60,7 @@ class Page {
 
   /** Turn the joints. @param {number[]} q @param {boolean} [goal] whether a person drags or types: an arm that follows goes there */
   turn(q, goal = false) {
+    begun();
     this.q = q;
     this.joints.show(q);
     if (!this.moving) this.view?.pose(q);
@@ -71,6 +73,7 @@ class Page {
    * @param {{dragging?: boolean, goal?: boolean}} [how] goal: as in `turn`
    */
   aim(target, { dragging = false, goal = false } = {}) {
+    begun();
     this.ask({ target, branch: this.branch, nearest: !dragging, goal });
   }
 
@@ -215,19 +218,6 @@ class Page {
 /** Whether a task's targets lie in the base's x-y plane. @param {string | null} task */
 const isFlat = (task) => task === "xy" || task === "xy_theta";
 
-/** @type {Map<string, string>} */
-const troubles = new Map();
-
-/**
- * Say what went wrong.
- * @param {string} text or nothing
- * @param {string} [source] the part of the page that it is about: each part clears its own text alone
- */
-export function trouble(text, source = "page") {
-  troubles.set(source, text);
-  get("trouble").textContent = [...troubles.values()].filter(Boolean).join("\n");
-}
-
 function theme(/** @type {string} */ name, /** @type {Page} */ page) {
   document.documentElement.dataset.theme = name;
   get("theme").textContent = name === "dark" ? "Light" : "Dark";
@@ -259,7 +249,10 @@ async function start() {
       program: (state) => here.page?.program.show(state),
       board: (state) => here.page?.board.show(state),
     },
-    (lost) => trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : "", "line"),
+    (lost) => {
+      trouble(lost ? "armkin teach does not answer: is it still running in its terminal?" : "", "line");
+      here.page?.board.gone(lost);
+    },
   );
   const one = new Page(opened.scene, opened.look);
   here.page = one;

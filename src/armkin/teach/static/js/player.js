@@ -3,6 +3,17 @@
 import { chart, mark } from "./chart.js";
 import { fixed, get } from "./dom.js";
 
+/** Number of the first value that is not below t, or of the last. @param {number[]} values @param {number} t */
+function first(values, t) {
+  let [low, high] = [0, values.length - 1];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (values[middle] < t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
 export class Player {
   /**
    * @param {import("./types.js").Arm} arm
@@ -90,8 +101,7 @@ export class Player {
     if (!this.plan) return;
     this.at = t;
     const { time, joints } = this.plan;
-    let k = time.findIndex((value) => value >= t);
-    if (k < 0) k = time.length - 1;
+    const k = first(time, t);
     const [before, after] = [time[Math.max(k - 1, 0)], time[k]];
     const share = after > before ? (t - before) / (after - before) : 0;
     const from = joints[Math.max(k - 1, 0)];

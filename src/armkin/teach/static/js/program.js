@@ -2,6 +2,7 @@
 /** The program: record, name, reorder, delete, undo; save and load the path file. */
 import { fixed, get, make } from "./dom.js";
 import { Latest } from "./latest.js";
+import { Rows } from "./moves.js";
 import { Player } from "./player.js";
 import { act } from "./server.js";
 
@@ -9,7 +10,7 @@ export class Program {
   /**
    * @param {import("./types.js").Arm} arm
    * @param {{pose: () => Promise<number[]>, settled: () => void, show: (q: number[]) => void, played: (q: number[]) => void,
-   *   trail: (tips: number[][]) => void, trouble: (text: string) => void, mine: () => boolean}} page
+   *   trail: (tips: number[][]) => void, trouble: (text: string) => void, begun: () => void, mine: () => boolean}} page
    */
   constructor(arm, page) {
     this.page = page;
@@ -19,6 +20,7 @@ export class Program {
     this.count = 0;
     this.carried = false; // the plan is part of the page
     this.shown = "";
+    this.rows = new Rows((fields) => this.edit(fields), (k) => this.goto(k), (k) => (this.chosen = k));
     /** @type {Promise<void>} */
     this.editing = Promise.resolve();
     this.planning = new Latest(() => this.plan());
@@ -75,9 +77,9 @@ export class Program {
 
   /** @param {string} action @param {object} fields */
   async changed(action, fields) {
+    this.page.begun();
     try {
       this.show(await act(action, fields));
-      this.page.trouble("");
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
     }
@@ -93,7 +95,10 @@ export class Program {
   take(plan) {
     this.player.load(plan);
     this.page.trail(plan.tips);
-    get("planned").textContent = `${fixed(plan.duration_s, 3)} s, ${fixed(plan.length_mm, 1)} mm on the tool's way`;
+    let text = `${fixed(plan.duration_s, 3)} s`;
+    if (plan.length_mm) text += `, ${fixed(plan.length_mm, 1)} mm on lines and arcs`;
+    if (plan.shown_mm > 0.5) text += `; it is long: the tip shown is up to ${fixed(plan.shown_mm, 1)} mm off`;
+    get("planned").textContent = text;
     get("planned").className = "";
   }
 
@@ -118,15 +123,16 @@ export class Program {
   /** Show the pose where a move ends; the next one is recorded behind it. @param {number} k */
   async goto(k) {
     this.chosen = k;
+    this.page.begun();
     try {
       this.page.show((await act("end", { index: k })).q);
-      this.page.trouble("");
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
     }
   }
 
   async save() {
+    this.page.begun();
     try {
       const { text, name } = await act("save");
       const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/yaml" })), download: name });
@@ -140,11 +146,12 @@ export class Program {
 
   /** @param {import("./types.js").ProgramState} state */
   show(state) {
+    const said = JSON.stringify(state);
+    if (said === this.shown) return; // the answer to an edit, and the news of it, are one
+    this.shown = said;
     this.count = state.moves.length;
     this.chosen = Math.min(this.chosen, this.count - 1);
-    const focused = document.activeElement?.closest("#moves") ? document.activeElement.id : "";
-    get("moves").replaceChildren(...state.moves.map((move, k) => this.row(move, k)));
-    if (focused) document.getElementById(focused)?.focus();
+    this.rows.show(state.moves);
     const off = (/** @type {string} */ id, /** @type {boolean} */ when) => {
       /** @type {HTMLButtonElement} */ (get(id)).disabled = when;
     };
@@ -157,9 +164,6 @@ export class Program {
       const box = /** @type {HTMLInputElement} */ (get(`program-${key}`));
       if (document.activeElement !== box) box.value = state[key] === null ? "" : String(state[key]);
     }
-    const said = JSON.stringify(state);
-    if (said === this.shown) return; // the answer to an edit, and the news of it, are one
-    this.shown = said;
     this.planning.push({});
   }
 
@@ -170,36 +174,5 @@ export class Program {
       await this.planning.idle();
     }
     this.player.toggle();
-  }
-
-  /** @param {import("./types.js").ProgramMove} move @param {number} k */
-  row(move, k) {
-    const said = `move ${k + 1}`;
-    const name = make("input", { type: "text", maxlength: "60", placeholder: move.said, "aria-label": `name of ${said}`, id: `name-${k}` });
-    name.value = move.name;
-    name.addEventListener("change", () => this.edit({ do: "rename", index: k, name: name.value }));
-    name.addEventListener("focus", () => (this.chosen = k));
-    const button = (/** @type {string} */ sign, /** @type {string} */ text, /** @type {object} */ fields, /** @type {boolean} */ off) => {
-      const one = make("button", { type: "button", "aria-label": `${text} ${said}`, id: `${text.replace(/ /g, "-")}-${k}` }, sign);
-      one.disabled = off;
-      one.addEventListener("click", () => this.edit({ ...fields, index: k }));
-      return one;
-    };
-    const moves = ["joint", "line", "arc", "point", "spline", "polyline", "circle", "offset"].includes(move.kind);
-    const blend = make("input", {
-      type: "number", min: "0", step: "1", placeholder: "blend", "aria-label": `blend radius of ${said} in mm`, id: `blend-${k}`,
-    });
-    blend.value = move.blend === null ? "" : String(move.blend);
-    blend.disabled = !moves;
-    blend.addEventListener("change", () => this.edit({ do: "blend", index: k, blend: blend.value === "" ? null : blend.valueAsNumber }));
-    const show = make("button", { type: "button", class: "kind", "aria-label": `show ${said}, ${move.kind}`, id: `show-${k}` }, `${k + 1} ${move.kind}`);
-    show.addEventListener("click", () => this.goto(k));
-    return make(
-      "li", { title: `${move.kind}: ${move.said}` },
-      show, name, blend,
-      button("↑", "move up", { do: "reorder", to: k - 1 }, k === 0),
-      button("↓", "move down", { do: "reorder", to: k + 1 }, k === this.count - 1),
-      button("✕", "delete", { do: "delete" }, false),
-    );
   }
 }

@@ -1,0 +1,92 @@
+"""What people ran into on the page, each in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from browsing import aim, chromium, opened, settled, until
+from playwright.sync_api import Browser
+from served import served, teaching
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as one:
+        yield one
+
+
+def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
+    with served(board="sim") as server, opened(browser, server.address) as page:
+        chosen = page.locator("#branches [aria-checked=true]")
+        aim(page, 390, 80, 300)
+        # Keys after a slider and a checkbox were touched; a slider keeps its own.
+        for touched in ("#sliders input[type=range]", "#best"):
+            page.locator(touched).first.focus()
+            for key, name in (("3", "left, elbow down"), ("4", "left, elbow up")):
+                page.keyboard.press(key)
+                settled(page)
+                assert name in chosen.inner_text()
+        page.locator("#sliders input[type=range]").first.focus()
+        z = page.input_value("#target label:nth-child(3) input")
+        page.keyboard.press("PageUp")
+        settled(page)
+        assert page.input_value("#target label:nth-child(3) input") == z
+        page.keyboard.press("r")
+        page.wait_for_selector("#name-0")
+        page.fill("#name-0", "")
+        page.keyboard.type("pr3")
+        page.keyboard.press("Tab")
+        until(page, "document.querySelector('#name-0').value === 'pr3' && !document.querySelector('#name-1')")
+        # What was refused is over when something else is begun.
+        page.wait_for_selector("#player:not([hidden])")
+        assert "mm" not in page.inner_text("#planned")  # a joint move has no way that was asked for
+        for button, then in (("#record", "#name-1"), ("#save", ""), ("#show-0", "")):
+            page.click("#home")  # it has no switches
+            until(page, "document.querySelector('#trouble').textContent.includes('homing')")
+            page.click(button)
+            until(page, "document.querySelector('#trouble').textContent === ''")
+            if then:
+                page.wait_for_selector(then)
+        # A file with too few numbers is refused, and the program stays.
+        file = tmp_path / "short.yaml"
+        file.write_text("moves:\n  - joint: [0, 0]\n")
+        page.set_input_files("#load", str(file))
+        until(page, "document.querySelector('#trouble').textContent.includes('3 joints')")
+        assert page.locator("#moves li").count() == 2
+
+
+def test_a_long_list_keeps_the_rows_that_stay(browser: Browser, tmp_path: Path) -> None:
+    with served() as server, opened(browser, server.address) as page:
+        file = tmp_path / "long.yaml"
+        file.write_text("moves:\n" + "".join(f"  - joint: [{k % 100}, 60, -60]\n" for k in range(300)))
+        page.set_input_files("#load", str(file))
+        until(page, "document.querySelectorAll('#moves li').length === 300")
+        page.evaluate("document.querySelectorAll('#moves li').forEach((row, k) => (row.mark = k))")
+        marks = "[...document.querySelectorAll('#moves li')].map((row) => row.mark)"
+        page.click("#delete-5")
+        until(page, "document.querySelectorAll('#moves li').length === 299")
+        assert page.evaluate(marks) == [k for k in range(300) if k != 5]
+        assert page.inner_text("#show-5") == "6 joint"
+        assert page.get_attribute("#show-5", "aria-label") == "show move 6, joint"
+        page.click("#undo")
+        until(page, "document.querySelectorAll('#moves li').length === 300")
+        assert [mark for mark in page.evaluate(marks) if mark is not None] == [k for k in range(300) if k != 5]
+        page.click("#move-down-0")
+        until(page, "document.querySelector('#moves li').title.includes('1.0')")
+        assert page.evaluate("document.activeElement.id") == "move-down-0"
+
+
+def test_a_server_that_is_gone_is_not_said_to_know_the_arm(browser: Browser) -> None:
+    with ExitStack() as running:
+        url = running.enter_context(teaching("three_dof", "--port", "sim"))
+        with opened(browser, url, quiet=False) as page:
+            until(page, "document.querySelector('#standing').textContent.startsWith('position known')")
+            assert page.is_enabled("#send")
+            running.close()
+            until(page, "document.querySelector('#standing').textContent.includes('is gone')")
+            assert page.is_disabled("#send")
+            assert page.inner_text("#position") == ""
+            assert "does not answer" in page.inner_text("#trouble")
