@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from armkin.board.backend import StoppedError
+from armkin.board.ports import LOG, traced
+from armkin.errors import ArmkinError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
@@ -26,11 +28,23 @@ def open_board(
 
     stop: asked all the time; when it says yes, the arm is held and StoppedError raised.
     """
-    link = board.open(port, baud, reset=reset)
+    link = traced(board.open(port, baud, reset=reset))
     try:
-        yield board.connect(link, stop)
+        LOG.info("%s opens %s as %s", board.arm.name, port, board.called)
+        machine = board.connect(link, stop)
+        _log("found", machine)
+        yield machine
+        _log("left", machine)
     except StoppedError as error:
         board.stopped(error)
+        _log("stopped", board.machine)
+        raise
+    except ArmkinError as error:
+        LOG.info("%s: %s", type(error).__name__, error.message)
         raise
     finally:
         link.close()
+
+
+def _log(when: str, machine: Backend) -> None:
+    LOG.info("%s: position %s, counts %s", when, machine.position(), list(machine.counts()))

@@ -43,6 +43,7 @@ CAPABILITIES = {
     "grip": "move a gripper",
     "relax": "switch the motors off and read where the arm is moved by hand",
     "zero": "tell the counts that a drive's zero is made of",
+    "offsets": "tell the offsets that are kept in its servos",
     "settings": "compare its settings with the robot file",
     "write_settings": "write those that differ",
     "recall": "tell where a motion was held: --resume is for boards with armkin's firmware",
@@ -300,6 +301,11 @@ class Board(ABC):
     def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
         """Counts of the arm's motors; and the gripper's count, and its `zero` if it stands at a value."""
         self.need("zero")
+        raise NotImplementedError
+
+    def offsets(self, servos: Sequence[int]) -> list[int]:
+        """Offsets [counts] that servos take off their encoders' positions, by their numbers."""
+        self.need("offsets")
         raise NotImplementedError
 
     def settings(self) -> list[dict[str, Any]]:

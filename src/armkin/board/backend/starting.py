@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, said
 from armkin.motion.free import check_free, free_way
@@ -135,4 +136,5 @@ def from_counts(
             if np.abs(plan.start - here).max(initial=0) > (tolerance or 0):
                 raise StartError(f"a plan begins at {plan.start.tolist()} counts, the arm stands at {here.tolist()}")
             at = plan.end
+            LOG.info("motion from %s to %s in %.3f s", plan.start.tolist(), plan.end.tolist(), plan.duration)
         yield plan

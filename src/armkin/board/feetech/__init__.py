@@ -4,4 +4,5 @@ packet.py     packets on the bus
 registers.py  a servo's registers
 bus.py        questions, asked again until they are answered
 machine.py    an arm of them; gripping.py: its gripper
+lerobot.py    zeros and limits from LeRobot's calibration file
 """

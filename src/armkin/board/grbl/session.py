@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from armkin.board.grbl import replies
 from armkin.board.grbl.replies import Report
+from armkin.board.ports import LOG
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Session:
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
         self._unseen: Report | None = None
+        self.state = ""  # as last told
         self.feed = 100  # [%] of feeds, as last told
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
@@ -257,6 +259,9 @@ class Session:
             self.was_reset = True
             self._sent.clear()
         elif (found := replies.report(line)) is not None:
+            if self.state != found.state:
+                LOG.info("GRBL: %s", found.state)
+                self.state = found.state
             self.report = self._unseen = found
             self.feed = self.feed if found.feed is None else found.feed
             self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself

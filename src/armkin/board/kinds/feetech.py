@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -77,6 +77,10 @@ class ServoBusBoard(Board):
         """The servos' counts; and the gripper's, and its `zero` if it stands at a value."""
         jaw = None if gripper is None else gripping.zero(self.machine.bus, self.gripper(), gripper)
         return list(self.machine.counts()), jaw
+
+    def offsets(self, servos: Sequence[int]) -> list[int]:
+        """What register 31 of servos says."""
+        return [self.machine.bus.read(number, registers.OFFSET) for number in servos]
 
 
 BOARD = ServoBusBoard

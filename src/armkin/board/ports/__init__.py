@@ -4,6 +4,7 @@ port.py         what every port can do
 scene_note.py   the scene that a port was last used with
 port_lock.py    the lock that keeps two programs from one arm
 notes.py        small files beside it
+traced.py       a port whose bytes are logged
 serial_port.py  serial ports
 socket_port.py  the Unix socket of a program on this computer
 """
@@ -13,9 +14,11 @@ from armkin.board.ports.port import BAUD, SIM, Port
 from armkin.board.ports.port_lock import holder, holder_rate, note_path, record_path
 from armkin.board.ports.serial_port import Found, SerialPort, list_ports
 from armkin.board.ports.socket_port import SocketPort, is_socket
+from armkin.board.ports.traced import LOG, traced
 
 __all__ = [
     "BAUD",
+    "LOG",
     "SIM",
     "Found",
     "Port",
@@ -29,5 +32,6 @@ __all__ = [
     "read_note",
     "record_path",
     "remove_note",
+    "traced",
     "write_note",
 ]

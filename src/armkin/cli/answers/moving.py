@@ -235,10 +235,13 @@ class SetupOfKlipper(Head):
 class Zero(Head):
     """`zero`: where the zero of bus servos is."""
 
-    port: str
-    counts: Annotated[list[int], "of every servo, in the pose given"]
-    zero: Annotated[list[int], "of every drive"]
-    gripper_zero: Annotated[int | None, "with --gripper"]
+    port: str | None
+    counts: Annotated[list[int] | None, "of every servo, in the pose given; null: --from"]
+    zero: Annotated[list[int | float], "of every drive"]
+    gripper_zero: Annotated[int | float | None, "with --gripper, or --from"]
+    limits: Annotated[NotRequired[list[list[float]]], "--from: of every joint [deg]"]
+    invert: Annotated[NotRequired[list[bool]], "--from: of every drive"]
+    gripper_ends: Annotated[NotRequired[list[float] | None], "--from: open and closed [deg]"]
 
 
 class GripOfServo(Head):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, output, render
+from armkin.cli import board_link, inputs, lerobot_zero, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.board.feetech.lerobot import Calibrated
 
 _ENDS = ("open", "closed")
 
@@ -21,11 +24,21 @@ def zero(
     robot: Robot,
     port: PortName = None,
     pose: Annotated[
-        str, typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in.")
-    ] = "home",
+        str | None,
+        typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in. [default: home]"),
+    ] = None,
     gripper: Annotated[
         str | None,
         typer.Option("--gripper", metavar="open|closed|VALUE", help="Where the gripper stands: its zero, too."),
+    ] = None,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="A LeRobot calibration file instead: zeros, limits, directions, the gripper's ends. --pose is then "
+            "where the middles of all ranges are (default: all joints at 0); --port compares it with the servos.",
+        ),
     ] = None,
     out: Out = None,
     baud: Baud = None,
@@ -50,7 +63,20 @@ def zero(
     board = board_link.board_of(arm, rehearsal=True)
     if not board.can("zero") or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
-    q = units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
+    if source is not None:
+        if gripper is not None:
+            raise UsageError("--from and --gripper: the file says where the gripper's ends are")
+
+        def check(found: Calibrated) -> str | None:
+            if port is None:
+                return None
+            with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+                found.check(board.offsets([motor.id for motor in found.all()]))
+                return machine.port.name
+
+        lerobot_zero.record(arm, robot, source, pose, out, json, check)
+        return
+    q = units.joints_in(arm, inputs.joint_list(arm, pose or "home", "--pose"))
     jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
     with board_link.backend(board, port, baud, reset=not no_reset) as machine:
         name = machine.port.name

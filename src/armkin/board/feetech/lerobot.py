@@ -1,0 +1,184 @@
+"""A LeRobot calibration file as the zeros, limits and directions of an arm's bus servos.
+
+LeRobot writes, for each motor by its name, `id`, `drive_mode` (1: the counts run the other way), `homing_offset` (which
+it writes into the servo's register 31, so that reported counts have it in them), and `range_min` and `range_max`, the
+reported counts at the ends of the motion that its owner has made by hand.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.board.feetech import registers
+from armkin.errors import FileError, LinkError, UsageError
+from armkin.model.units import DEGREE
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+_LONGEST = 1_000_000  # [bytes] of a calibration file
+_MIDDLE = 5.0  # [deg] that a joint's zero may be from the middle of its limits
+_WHOLE = {
+    "id": (0, 253),
+    "drive_mode": (0, 1),
+    "homing_offset": (-4095, 4095),
+    "range_min": (0, 4095),
+    "range_max": (0, 4095),
+}
+Edits = dict[tuple[str | int, ...], float | int | str]
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A motor of a calibration file."""
+
+    name: str  # LeRobot's
+    id: int
+    drive_mode: int
+    homing_offset: int  # [counts]
+    range_min: int  # [counts]
+    range_max: int
+
+    @property
+    def middle(self) -> float:
+        """Reported counts in the middle of its range."""
+        return (self.range_min + self.range_max) / 2
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a calibration file says of an arm."""
+
+    motors: tuple[Motor, ...]  # in the arm's order
+    zero: tuple[float, ...]  # [counts] of every drive
+    limits: tuple[tuple[float, float], ...]  # [deg] of every joint
+    gripper: Motor | None
+    gripper_ends: tuple[float, float] | None  # open, closed [deg], counted from the gripper's middle
+    edits: Edits  # of the robot file
+
+    def all(self) -> tuple[Motor, ...]:
+        """Motors of the joints, and the gripper's."""
+        return (*self.motors, *([self.gripper] if self.gripper is not None else []))
+
+    def check(self, offsets: Sequence[int]) -> None:
+        """Raise LinkError, naming the motor, if offsets of `all` servos (register 31) are not the file's."""
+        for motor, found in zip(self.all(), offsets, strict=True):
+            if found != motor.homing_offset:
+                raise LinkError(
+                    f"servo {motor.id} ({motor.name}): its homing offset (register 31) is {found}, the file says "
+                    f"{motor.homing_offset}: it is the file of another arm, or was calibrated again since"
+                )
+
+
+def read(path: str) -> dict[int, Motor]:
+    """The motors of a calibration file, by their ids. Raises FileError, naming the motor, for what is none."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            text = file.read(_LONGEST + 1)
+        told = json.loads(text) if len(text) <= _LONGEST else None
+    except OSError as error:
+        raise FileError(f"{path}: {error.strerror or error}", file=path) from None
+    except (ValueError, RecursionError):
+        told = None
+    if not isinstance(told, dict) or not told:
+        raise FileError(f"{path} is no calibration file of LeRobot: a JSON object of motors by their names", file=path)
+    found: dict[int, Motor] = {}
+    for name, values in told.items():
+        motor = Motor(name, **{key: _whole(path, name, values, key) for key in _WHOLE})
+        if motor.id in found:
+            raise FileError(f"{path}: {found[motor.id].name} and {name} have the same id {motor.id}", file=path)
+        if motor.range_min >= motor.range_max:
+            ends = f"{motor.range_min} to {motor.range_max}"
+            raise FileError(f"{path}: {name}: range_min to range_max is {ends}: calibrate it again", file=path)
+        found[motor.id] = motor
+    return found
+
+
+def _whole(path: str, name: str, values: Any, key: str) -> int:
+    value = values.get(key) if isinstance(values, Mapping) else None
+    low, high = _WHOLE[key]
+    if type(value) is not int or not low <= value <= high:
+        said = "is missing" if value is None else f"is {str(value)[:40]}"
+        raise FileError(f"{path}: {name}: {key} {said}: a whole number from {low} to {high}", file=path)
+    return value
+
+
+def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
+    """What a calibration file says of an arm whose joints have a bus servo each.
+
+    pose: (n,) [rad] where the middles of all ranges are; None: every joint's value is 0 there. Raises FileError for
+    what is no calibration file; UsageError, naming the joint, where it does not fit the arm.
+    """
+    there = read(path)
+    middle = np.zeros(arm.n) if pose is None else pose
+    motors, zero, limits, edits = list[Motor](), list[float](), list[tuple[float, float]](), Edits()
+    for drive, gain in zip(arm.motors, arm.motor_gain, strict=True):
+        j = int(np.flatnonzero(gain)[0])
+        name = arm.joint_names[j]
+        motor = _of(there, drive.id, name, path, drive.counts)
+        if pose is None:
+            _check_middle(arm, j)
+        per = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
+        at = motor.middle - per * float(middle[j]) / DEGREE
+        low, high = sorted((count - at) / per for count in (motor.range_min, motor.range_max))
+        motors.append(motor)
+        zero.append(at)
+        limits.append((low, high))
+        edits["joints", j, "limits"] = f"[{low:.6f}, {high:.6f}]"
+        edits["joints", j, "drive", "zero"] = _plain(at)
+        edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
+    jaw, ends = _gripper(arm, there, path, edits)
+    return Calibrated(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
+
+
+def _of(there: Mapping[int, Motor], number: int | None, name: str, path: str, counts: int | None) -> Motor:
+    if number is None or number not in there:
+        has = ", ".join(f"{motor.name} {key}" for key, motor in sorted(there.items()))
+        raise UsageError(f"{path}: joint {name} is servo {number}, which the file has not: it has {has}")
+    motor = there[number]
+    if counts != registers.COUNTS:
+        raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {registers.COUNTS}")
+    if motor.name != name and name in (other.name for other in there.values()):
+        raise UsageError(f"{path}: joint {name} is servo {number}, which is {motor.name} in the file")
+    return motor
+
+
+def _check_middle(arm: Arm, joint: int) -> None:
+    """Raise UsageError if a joint's zero is not about the middle of its limits, where LeRobot has the arm put."""
+    middle = float(arm.lower[joint] + arm.upper[joint]) / 2 / DEGREE
+    if not abs(middle) <= _MIDDLE:
+        raise UsageError(
+            f"{arm.name}: the zero of {arm.joint_names[joint]} lies {abs(middle):.4g} deg from the middle of its "
+            f"limits, more than {_MIDDLE:g}: say which pose the middles of all ranges are",
+            joint=arm.joint_names[joint],
+            middle=middle,
+        )
+
+
+def _gripper(
+    arm: Arm, there: Mapping[int, Motor], path: str, edits: Edits
+) -> tuple[Motor | None, tuple[float, float] | None]:
+    """The gripper's motor and its ends, open and closed [deg]: LeRobot closes it at 0 %, range_min of drive_mode 0."""
+    drive = arm.gripper
+    if drive is None or drive.kind != "bus":
+        return None, None
+    motor = _of(there, drive.id, "gripper", path, drive.counts)
+    half = (motor.range_max - motor.middle) / drive.pulses_per_unit()
+    values: Sequence[tuple[str, float | int | str]] = (
+        ("zero", _plain(motor.middle)),
+        ("invert", "true" if motor.drive_mode else "false"),
+        ("open", f"{half:.6f}"),
+        ("closed", f"{-half:.6f}"),
+    )
+    edits.update({("gripper", key): value for key, value in values})
+    return motor, (half, -half)
+
+
+def _plain(count: float) -> int | float:
+    return int(count) if count.is_integer() else round(count, 6)

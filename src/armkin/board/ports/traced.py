@@ -1,0 +1,42 @@
+"""A port whose bytes are logged: `armkin.board` at DEBUG. Nobody pays for it who does not listen."""
+
+from __future__ import annotations
+
+import logging
+
+from armkin.board.ports.port import Port
+
+LOG = logging.getLogger("armkin.board")  # bytes at DEBUG, states at INFO
+
+
+class Traced:
+    """A port that logs what is written to it and read from it."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self.name, self.simulated, self.baud = port.name, port.simulated, port.baud
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        LOG.debug("%.6f %s > %r", self._port.now(), self.name, data)
+        self._port.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, or comes within `timeout` seconds."""
+        data = self._port.read(timeout)
+        if data:
+            LOG.debug("%.6f %s < %r", self._port.now(), self.name, data)
+        return data
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+        return self._port.now()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._port.close()
+
+
+def traced(port: Port) -> Port:
+    """The port, with its bytes logged where somebody listens."""
+    return Traced(port) if LOG.isEnabledFor(logging.DEBUG) else port

@@ -1,0 +1,75 @@
+"""`armkin zero --from`: a LeRobot calibration file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import inputs, output, render
+from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from armkin.board.feetech.lerobot import Calibrated
+    from armkin.model.arm import Arm
+
+
+def record(
+    arm: Arm,
+    robot: str,
+    path: str,
+    pose: str | None,
+    out: str | None,
+    json: bool,
+    check: Callable[[Calibrated], str | None],
+) -> None:
+    """Write the robot file with a calibration file's zeros, limits and directions, and tell them.
+
+    check: compares them with the servos, where a port is named, and says which that is.
+    """
+    from armkin.board.feetech.lerobot import calibrated
+    from armkin.files import keep
+    from armkin.motors import motor_names
+    from armkin.robot_file import parse
+    from armkin.robot_file.catalogue import locate
+    from armkin.robot_file.edit import replaced
+
+    q = None if pose is None else units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
+    keep(path)
+    try:
+        found = calibrated(arm, path, q)
+    except UsageError as error:
+        if "middle" in error.fields:
+            error.advice = "--pose NAME|Q,... says it"
+        raise
+    port = check(found)
+    if out is not None:
+        text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), found.edits)
+        parse(text, out)  # nothing is written that no command would take
+        with output.destination(out) as write:
+            write(text)
+    if out == "-":
+        return
+    answer: dict[str, Any] = {
+        **render.head(arm),
+        "port": port,
+        "counts": None,
+        "zero": list(found.zero),
+        "gripper_zero": None if found.gripper is None else found.gripper.middle,
+        "limits": [list(pair) for pair in found.limits],
+        "invert": [bool(motor.drive_mode) for motor in found.motors],
+        "gripper_ends": None if found.gripper_ends is None else list(found.gripper_ends),
+    }
+    rows = [["joint", "zero", "was", "limits/deg", "counts"]]
+    for name, zero, was, pair, motor in zip(
+        motor_names(arm), found.zero, arm.motors, found.limits, found.motors, strict=True
+    ):
+        counts = "reversed" if motor.drive_mode else ""
+        rows.append([name, f"{zero:g}", f"{was.zero:g}", f"{pair[0]:.3f} to {pair[1]:.3f}", counts])
+    if found.gripper is not None and found.gripper_ends is not None and arm.gripper is not None:
+        ends = "open {:.3f}, closed {:.3f}".format(*found.gripper_ends)
+        rows.append(["gripper", f"{found.gripper.middle:g}", f"{arm.gripper.zero:g}", ends, ""])
+    with output.destination(None) as write:
+        write(render.to_json(answer) + "\n" if json else render.table(rows, left=(0, 4)) + "\n")

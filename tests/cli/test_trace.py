@@ -1,0 +1,40 @@
+"""`--trace` and the logger `armkin.board`: bytes at DEBUG, states at INFO."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+import armkin
+from armkin.board.kinds import board_of
+from armkin.board.opening import open_board
+from command_line import ROOT, THREE_DOF, run
+
+GRBL = ROOT / "tests/robots/three_dof_grbl.yaml"
+
+
+@pytest.mark.parametrize("robot", [THREE_DOF, GRBL, "so101", ROOT / "tests/robots/three_dof_klipper.yaml"])
+def test_trace_tells_bytes_and_states_on_stderr_and_nothing_else_changes(robot: str) -> None:
+    plain = run("status", robot, "--port", "sim", "--json")
+    traced = run("status", robot, "--port", "sim", "--json", "--trace")
+    assert (traced.code, traced.out) == (0, plain.out)
+    assert " DEBUG " in traced.err
+    assert " sim > b" in traced.err
+    assert " sim < b" in traced.err
+    assert "found: position " in traced.err
+    assert " DEBUG " not in plain.err
+    assert " DEBUG " not in run("status", robot, "--port", "sim").err  # it ends with its command
+    assert "--trace" not in run("fk", "--help").out
+
+
+def test_the_logger_tells_motions_and_states(caplog: pytest.LogCaptureFixture) -> None:
+    arm = armkin.load(GRBL)
+    with caplog.at_level(logging.INFO, "armkin.board"), open_board(board_of(arm), "sim") as machine:
+        machine.prepare()
+        machine.run([machine.plan(machine.counts(), arm.home + 0.1)])
+    said = [record.getMessage() for record in caplog.records]
+    assert any(text.startswith("motion from [0, 0, 0] to [") for text in said)
+    assert {"GRBL: Idle", "GRBL: Run"} <= set(said)
+    assert said[-1].startswith("left: position known, counts [")
+    assert not any(record.levelno < logging.INFO for record in caplog.records)
