@@ -28,6 +28,12 @@ def test_trace_tells_bytes_and_states_on_stderr_and_nothing_else_changes(robot: 
     assert "--trace" not in run("fk", "--help").out
 
 
+def test_send_s_trace_is_its_plan_and_log_tells_the_line() -> None:
+    done = run("send", THREE_DOF, 1, 89, -89, "--port", "sim", "--log")
+    assert (done.code, " DEBUG " in done.err) == (0, True)
+    assert run("send", THREE_DOF, 1, 89, -89, "--dry-run", "--trace", "-").out.startswith("time")
+
+
 def test_the_logger_tells_motions_and_states(caplog: pytest.LogCaptureFixture) -> None:
     arm = armkin.load(GRBL)
     with caplog.at_level(logging.INFO, "armkin.board"), open_board(board_of(arm), "sim") as machine:

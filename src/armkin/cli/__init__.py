@@ -13,7 +13,8 @@ numbers.py         numbers as people write them; unit_notes.py: those that look 
 inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or swept
 rows.py            many of them in chunks; csv_rows.py: from CSV; pieces.py: shared out; batch.py: their answers
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
-default_port.py    the port; board_link.py: an open machine, signals
+default_port.py    the port; board_link.py: an open machine, signals; trace.py: what is said on it
+lerobot_zero.py    `zero --from`
 keep_outs.py       radii that are assumed, the scene of a port, hits that are ignored
 
 What is printed:

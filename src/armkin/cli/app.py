@@ -12,9 +12,9 @@ from types import FrameType
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup, TyperOption
+from typer.core import TyperCommand, TyperGroup
 
-from armkin.cli import output
+from armkin.cli import output, trace
 from armkin.cli.arguments import options_first
 from armkin.cli.commands import COMMANDS
 from armkin.signals import put_off
@@ -94,19 +94,8 @@ def load(name: str) -> Any:
     word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name, cls=Command, context_settings=_SETTINGS)(function)
-    command = typer.main.get_command(single)
-    if any(parameter.name == "no_reset" for parameter in command.params):  # it talks to a board
-        command.params.append(_trace_option())
-    return command
-
-
-def _trace_option() -> Any:
-    """`--trace`, of every command that talks to a board."""
-    from armkin.cli import trace
-
-    text = "Write what is said on the port, and what the board does, to stderr: logger armkin.board."
-    return TyperOption(param_decls=["--trace"], is_flag=True, expose_value=False, callback=trace.switch, help=text)
+    single.command(name, cls=Command, context_settings=_SETTINGS)(trace.traceable(function))
+    return typer.main.get_command(single)
 
 
 app = typer.Typer(cls=Commands, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")

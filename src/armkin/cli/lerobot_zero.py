@@ -12,34 +12,33 @@ from armkin.model import units
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from armkin.board.feetech.lerobot import Calibrated
-    from armkin.model.arm import Arm
+    from armkin.board.backend.board import Board
 
 
 def record(
-    arm: Arm,
+    board: Board,
     robot: str,
     path: str,
     pose: str | None,
     out: str | None,
     json: bool,
-    check: Callable[[Calibrated], str | None],
+    check: Callable[[Any], str | None],
 ) -> None:
     """Write the robot file with a calibration file's zeros, limits and directions, and tell them.
 
     check: compares them with the servos, where a port is named, and says which that is.
     """
-    from armkin.board.feetech.lerobot import calibrated
     from armkin.files import keep
     from armkin.motors import motor_names
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.edit import replaced
 
+    arm = board.arm
     q = None if pose is None else units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
     keep(path)
     try:
-        found = calibrated(arm, path, q)
+        found = board.calibration(path, q)
     except UsageError as error:
         if "middle" in error.fields:
             error.advice = "--pose NAME|Q,... says it"

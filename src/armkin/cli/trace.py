@@ -1,25 +1,57 @@
-"""`--trace`: what the logger `armkin.board` says, on stderr."""
+"""`--trace`, of every command that talks to a board: what the logger `armkin.board` says, on stderr.
+
+`send` has had another `--trace` for long, a plan as CSV: there it is `--log`, which the others take, too.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Annotated, Any
+
+import typer
+
+_TEXT = "Write what is said on the port, and what the board does, to stderr: the logger armkin.board."
+Log = Annotated[bool, typer.Option("--log", help=_TEXT)]
+Trace = Annotated[bool, typer.Option("--trace", "--log", help=_TEXT)]
 
 
-def switch(ctx: Any, parameter: Any, wanted: bool | None) -> None:
-    """Listen to the logger for as long as this command runs."""
-    if not wanted:
-        return
-    import logging
-    import sys
+def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command's function, with the option where it opens ports."""
+    asked = signature(command)
+    if "no_reset" not in asked.parameters:
+        return command
 
-    log, before = logging.getLogger("armkin.board"), logging.getLogger("armkin.board").level
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(logging.Formatter("%(asctime)s.%(msecs)03d %(levelname)s %(message)s", "%H:%M:%S"))
-    log.addHandler(handler)
-    log.setLevel(logging.DEBUG)
+    @wraps(command)
+    def run(*words: Any, log: bool = False, **options: Any) -> Any:
+        if not log:
+            return command(*words, **options)
+        with Listening():
+            return command(*words, **options)
 
-    def end() -> None:
-        log.removeHandler(handler)
-        log.setLevel(before)
+    option = Log if "trace" in asked.parameters else Trace
+    added = Parameter("log", Parameter.KEYWORD_ONLY, default=False, annotation=option)
+    run.__annotations__ = {**command.__annotations__, "log": option}
+    run.__signature__ = asked.replace(parameters=[*asked.parameters.values(), added])  # type: ignore[attr-defined]
+    return run
 
-    ctx.call_on_close(end)
+
+class Listening:
+    """The logger `armkin.board` on stderr, all of it, within a block."""
+
+    def __enter__(self) -> None:
+        import logging
+        import sys
+
+        self._log = logging.getLogger("armkin.board")
+        self._before = self._log.level
+        self._handler = logging.StreamHandler(sys.stderr)
+        form = "%(asctime)s.%(msecs)03d %(levelname)s %(message)s"
+        self._handler.setFormatter(logging.Formatter(form, "%H:%M:%S"))
+        self._log.addHandler(self._handler)
+        self._log.setLevel(logging.DEBUG)
+
+    def __exit__(self, *error: object) -> None:
+        self._log.removeHandler(self._handler)
+        self._log.setLevel(self._before)

@@ -43,7 +43,7 @@ CAPABILITIES = {
     "grip": "move a gripper",
     "relax": "switch the motors off and read where the arm is moved by hand",
     "zero": "tell the counts that a drive's zero is made of",
-    "offsets": "tell the offsets that are kept in its servos",
+    "calibration": "read LeRobot's calibration files",
     "settings": "compare its settings with the robot file",
     "write_settings": "write those that differ",
     "recall": "tell where a motion was held: --resume is for boards with armkin's firmware",
@@ -188,11 +188,9 @@ class Board(ABC):
 
     def heard(self) -> None:
         """Take the newest word of where the arm is while it moves."""
-        return
 
     def stopped(self, error: StoppedError) -> None:
         """Take the word of where the arm came to rest."""
-        return
 
     @contextmanager
     def under_way(
@@ -303,10 +301,9 @@ class Board(ABC):
         self.need("zero")
         raise NotImplementedError
 
-    def offsets(self, servos: Sequence[int]) -> list[int]:
-        """Offsets [counts] that servos take off their encoders' positions, by their numbers."""
-        self.need("offsets")
-        raise NotImplementedError
+    def calibration(self, path: str, pose: Array | None) -> Any:
+        """What another program's calibration file says of the arm; pose: (n,) in the middle of all ranges."""
+        self.need("calibration")
 
     def settings(self) -> list[dict[str, Any]]:
         """Settings that are not as the robot file wants them, as JSON: setting, found, wanted, ..."""

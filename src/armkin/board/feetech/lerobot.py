@@ -19,6 +19,7 @@ from armkin.errors import FileError, LinkError, UsageError
 from armkin.model.units import DEGREE
 
 if TYPE_CHECKING:
+    from armkin.board.feetech.machine import ServoMachine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -62,13 +63,10 @@ class Calibrated:
     gripper_ends: tuple[float, float] | None  # open, closed [deg], counted from the gripper's middle
     edits: Edits  # of the robot file
 
-    def all(self) -> tuple[Motor, ...]:
-        """Motors of the joints, and the gripper's."""
-        return (*self.motors, *([self.gripper] if self.gripper is not None else []))
-
-    def check(self, offsets: Sequence[int]) -> None:
-        """Raise LinkError, naming the motor, if offsets of `all` servos (register 31) are not the file's."""
-        for motor, found in zip(self.all(), offsets, strict=True):
+    def check(self, machine: ServoMachine) -> None:
+        """Raise LinkError, naming the motor, if the register 31 of a servo is not the file's homing_offset."""
+        for motor in (*self.motors, *([self.gripper] if self.gripper is not None else [])):
+            found = machine.bus.read(motor.id, registers.OFFSET)
             if found != motor.homing_offset:
                 raise LinkError(
                     f"servo {motor.id} ({motor.name}): its homing offset (register 31) is {found}, the file says "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.board import Board, Gripped
 from armkin.board.feetech import gripping, registers
 from armkin.board.feetech.bus import Bus
+from armkin.board.feetech.lerobot import Calibrated, calibrated
 from armkin.board.feetech.machine import ServoMachine, job, servo_ids
 from armkin.board_kinds import ForeignBoard
 from armkin.motors import pulses
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.board.backend.servo_arm import ServoArm
     from armkin.board.ports import Port
+    from armkin.formula.arrays import Array
     from armkin.motion.trajectory import Trajectory
 
 KIND = ForeignBoard("feetech", "bus", "bus", ())
@@ -78,9 +80,9 @@ class ServoBusBoard(Board):
         jaw = None if gripper is None else gripping.zero(self.machine.bus, self.gripper(), gripper)
         return list(self.machine.counts()), jaw
 
-    def offsets(self, servos: Sequence[int]) -> list[int]:
-        """What register 31 of servos says."""
-        return [self.machine.bus.read(number, registers.OFFSET) for number in servos]
+    def calibration(self, path: str, pose: Array | None) -> Calibrated:
+        """What a LeRobot calibration file says of the arm."""
+        return calibrated(self.arm, path, pose)
 
 
 BOARD = ServoBusBoard

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -13,9 +13,6 @@ from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
-
-if TYPE_CHECKING:
-    from armkin.board.feetech.lerobot import Calibrated
 
 _ENDS = ("open", "closed")
 
@@ -67,14 +64,14 @@ def zero(
         if gripper is not None:
             raise UsageError("--from and --gripper: the file says where the gripper's ends are")
 
-        def check(found: Calibrated) -> str | None:
+        def check(found: Any) -> str | None:
             if port is None:
                 return None
             with board_link.backend(board, port, baud, reset=not no_reset) as machine:
-                found.check(board.offsets([motor.id for motor in found.all()]))
+                found.check(machine)
                 return machine.port.name
 
-        lerobot_zero.record(arm, robot, source, pose, out, json, check)
+        lerobot_zero.record(board, robot, source, pose, out, json, check)
         return
     q = units.joints_in(arm, inputs.joint_list(arm, pose or "home", "--pose"))
     jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
