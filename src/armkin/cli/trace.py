@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from inspect import Parameter, signature
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -19,9 +19,11 @@ Trace = Annotated[bool, typer.Option("--trace", "--log", help=_TEXT)]
 
 def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
     """A command's function, with the option where it opens ports."""
-    asked = signature(command)
-    if "no_reset" not in asked.parameters:
+    if "no_reset" not in signature(command).parameters:
         return command
+    hints = get_type_hints(command, include_extras=True)
+    plain = signature(command)
+    asked = plain.replace(parameters=[one.replace(annotation=hints[name]) for name, one in plain.parameters.items()])
 
     @wraps(command)
     def run(*words: Any, log: bool = False, **options: Any) -> Any:
@@ -32,7 +34,7 @@ def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
 
     option = Log if "trace" in asked.parameters else Trace
     added = Parameter("log", Parameter.KEYWORD_ONLY, default=False, annotation=option)
-    run.__annotations__ = {**command.__annotations__, "log": option}
+    run.__annotations__ = {**hints, "log": option}
     run.__signature__ = asked.replace(parameters=[*asked.parameters.values(), added])  # type: ignore[attr-defined]
     return run
 

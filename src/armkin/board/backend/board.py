@@ -88,12 +88,8 @@ class Board(ABC):
         """
         self.arm = arm
         if lines := rate_lines(arm):
-            raise UsageError(
-                f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:"
-                + "".join(f"\n  {line}" for line in lines),
-                robot_file=arm.path,
-                lines_to_add=lines,
-            )
+            text = "\n  ".join([f"{arm.name}: motion needs rates; add to {arm.path or 'its file'}:", *lines])
+            raise UsageError(text, robot_file=arm.path, lines_to_add=lines)
         self.check()
 
     # What each kind does in its own way
@@ -181,16 +177,17 @@ class Board(ABC):
 
     def wait(self, until: float) -> bool:
         """Wait for a moment of the port's clock; False if a stop was asked for before."""
-        port = self.machine.port
-        while port.now() < until and not self.stop():
-            port.read(0.01)
+        while self.machine.port.now() < until and not self.stop():
+            self.machine.port.read(0.01)
         return not self.stop()
 
     def heard(self) -> None:
         """Take the newest word of where the arm is while it moves."""
+        return
 
     def stopped(self, error: StoppedError) -> None:
         """Take the word of where the arm came to rest."""
+        return
 
     @contextmanager
     def under_way(
