@@ -127,6 +127,22 @@ def test_a_motion_that_was_held_goes_on_and_ends_where_it_should(
     assert distance(arm.track, whole) <= 4  # the whole motion was sampled every few ms
 
 
+def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Path) -> None:
+    file = tmp_path / "lines.yaml"
+    file.write_text("start: home\nmoves: [{line: [390, 60, 300]}, {line: [390, -60, 300]}]\n")
+    end = armkin.pulses(armkin.load(THREE_DOF), armkin.path(armkin.load(THREE_DOF), file).motion.end).tolist()
+    assert arm.send(20, 70, -70, "--assume-home")[0] == 0
+    arm.track.clear()
+    arm.paused_at = 0.3
+    code, err = arm.send("--path", file)
+    assert (code, "first a joint move to where the path starts" in err) == (5, True)
+    assert arm.counts[0] not in (0, end[0])  # it stands on its way home
+    code, err = arm.send("--path", file, "--resume")
+    assert (code, "first a joint move" in err) == (0, False), err
+    assert arm.counts == end
+    assert (0, 0, 0) in arm.track
+
+
 def test_what_cannot_be_gone_on_with_is_refused_with_the_next_step(
     arm: Arm, motions: dict[str, tuple[object, ...]]
 ) -> None:

@@ -1,11 +1,11 @@
 """What every kind of board can do for an arm. Our own firmware is one of several.
 
-board.py     what a kind is: one class, with capabilities
+board.py         what a kind is: one class, with capabilities
+starting.py      where a motion begins: what every trajectory that becomes counts is held to
+job.py           a trajectory for a board that is sent positions, not segments
+servo_arm.py     an arm of bus servos of any make
+record.py        what armkin last left on a board that other programs write to
 missing_keys.py  what a robot file lacks for its board
-starting.py  where a motion begins: what every trajectory that becomes counts is held to
-servo_arm.py  an arm of bus servos of any make
-job.py       a trajectory for a board that is sent positions, not segments
-record.py    what armkin last left on a board that other programs write to
 
 A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
 becomes bytes is its own business.
@@ -77,6 +77,10 @@ class Backend(Protocol):
 
     def position(self) -> Position:
         """Whether the board knows where the arm stands."""
+
+    @property
+    def why(self) -> str:
+        """Why the position is lost, in words; empty while it is known."""
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""

@@ -88,6 +88,11 @@ class ServoArm(JobMachine):
         """Always known: the servos' encoders are absolute."""
         return "known"
 
+    @property
+    def why(self) -> str:
+        """Nothing: the position is never lost."""
+        return ""
+
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)

@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from armkin.board.backend import StoppedError
-from armkin.board.backend.starting import from_counts, is_believable
+from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
 from armkin.board.firmware.board_status import WHY, told
 from armkin.board.firmware.protocol import Error, Flag, Status
@@ -39,6 +39,7 @@ class Machine:
     `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.
     """
 
+    differences: tuple[str, ...] = ()  # what armkin promises of a board is what this firmware does
     resumable = False  # whether what was held is noted: `armkin.board.resuming`
 
     def __init__(
@@ -71,9 +72,18 @@ class Machine:
         mask = protocol.mask_of(self.configuration.axes)
         if not self.configured or self.status.known & mask != mask:
             return "lost"
-        if not is_believable(self.arm, self.counts()):
+        if unbelievable(self.arm, self.counts()):
             return "lost"
         return "retained" if self.status.flags & Flag.RETAINED else "known"
+
+    @property
+    def why(self) -> str:
+        """Why the position is lost, in words; empty while it is known."""
+        if self.position() != "lost":
+            return ""
+        if self.info.config and not self.configured:
+            return "the board is configured for another arm, or the robot file has changed"
+        return unbelievable(self.arm, self.counts()) or "the board forgot it, or nobody has said where the arm stands"
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -82,11 +92,6 @@ class Machine:
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
         return joints_of(self.arm, self.counts())
-
-    @property
-    def differences(self) -> tuple[str, ...]:
-        """Nothing: what armkin promises of a board is what this firmware does."""
-        return ()
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
@@ -122,7 +127,7 @@ class Machine:
                 joints=joints_out(self.arm, self.joints()).tolist(),
             )
         if lost and assume is None and not self._simulated:
-            raise self._demand()
+            raise _demand(self)
         if not self.configured:
             self.configure()
         if lost:
@@ -171,24 +176,6 @@ class Machine:
         config = self.configuration.image.crc() if self.status.flags & Flag.CONFIGURED else 0
         self.info = protocol.Info(**{**vars(self.info), "config": config, "known": self.status.known})
 
-    def _demand(self) -> PositionLostError:
-        what = "the arm's position is lost"
-        if self.info.config and not self.configured:
-            changed = f"{self.arm.path} has changed"
-            what = f"the board is configured for another arm, or {changed}: its position is lost"
-        return self._lost(what)
-
-    def _lost(self, message: str) -> PositionLostError:
-        homing = all(self.arm.homing)
-        put = "put the arm in its home pose and prepare(assume=arm.home)"
-        return PositionLostError(
-            message,
-            advice=f"home it, or {put}" if homing else put,
-            robot_file=self.arm.path,
-            port=self.session.port.name,
-            homing=homing,
-        )
-
     # Moving
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> trajectory_to_counts.Cut:
@@ -219,7 +206,7 @@ class Machine:
         except DeviceError as error:
             raise self.explain(error) from None
         if self.position() == "lost":
-            raise self._lost("the board has lost the arm's position on the way")
+            raise _lost(self, "the board has lost the arm's position on the way")
         self.in_time()
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
@@ -264,7 +251,7 @@ class Machine:
         except LinkError:
             return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
         if self.position() == "lost":
-            return self._lost(f"{why}\n{self.standing()}")
+            return _lost(self, f"{why}\n{self.standing()}")
         return HeldError(
             f"{why}\nthe arm stands at {self.describe()}, its position is known",
             advice="the next motion starts there",
@@ -282,6 +269,28 @@ class Machine:
             self.session.call(make)
         except DeviceError as error:
             raise self.explain(error) from None
+
+
+def _demand(machine: Machine) -> PositionLostError:
+    what = "the arm's position is lost"
+    if machine.info.config and not machine.configured:
+        changed = f"{machine.arm.path} has changed"
+        what = f"the board is configured for another arm, or {changed}: its position is lost"
+    elif machine.configured and (far := unbelievable(machine.arm, machine.counts())):
+        what = f"{what}: {far}"
+    return _lost(machine, what)
+
+
+def _lost(machine: Machine, message: str) -> PositionLostError:
+    homing = all(machine.arm.homing)
+    put = "put the arm in its home pose and prepare(assume=arm.home)"
+    return PositionLostError(
+        message,
+        advice=f"home it, or {put}" if homing else put,
+        robot_file=machine.arm.path,
+        port=machine.session.port.name,
+        homing=homing,
+    )
 
 
 def describe(arm: Arm, q: Array) -> str:
