@@ -149,6 +149,10 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_corners_are_rounded_within_their_blend_and_all_limits",
         "test_waypoints_cost_little_memory_beyond_the_way_itself",
     ),
+    "motion/test_dense.py": (
+        "test_dense_points_are_one_curve_within_the_measure",
+        "test_the_order_of_what_says_how_corners_are_passed",
+    ),
     "motion/test_every_way.py": (),
     "motion/test_singular_paths.py": (),
     "motion/test_time_law.py": ("test_a_long_way_takes_little_memory_beside_its_own",),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.errors import UsageError
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from armkin.board.backend import Planned, Progress
     from armkin.board.backend.board import Board
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.path_plan import Marker, PathPlan
 
 Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
 
@@ -42,17 +43,37 @@ def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
 def check_gripper(plan: PathPlan, board: Board) -> None:
     """Raise UsageError if the plan needs a gripper that the board does not move, or a value it cannot reach."""
     for marker in plan.markers:
-        board.grip_value(marker.value)
+        if marker.kind == "grip":
+            board.grip_value(marker.value)
 
 
-def follow(board: Board, plan: PathPlan, laid: Sequence[Planned], progress: Progress, first: int = 0) -> None:
-    """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them."""
+def check_pauses(plan: PathPlan, answers: bool) -> None:
+    """Raise UsageError if the plan rests until Enter, and nobody answers."""
+    if not answers and any(marker.kind == "pause" for marker in plan.markers):
+        raise UsageError("the path rests until Enter (M0, wait: enter), and there is no terminal to press it")
+
+
+def follow(
+    board: Board,
+    plan: PathPlan,
+    laid: Sequence[Planned],
+    progress: Progress,
+    first: int = 0,
+    ask: Callable[[], object] = lambda: None,
+) -> None:
+    """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them.
+
+    ask: what ends a rest until Enter.
+    """
     done, total = 0.0, sum(one.duration for one in laid)
-    markers = [None] * (plan.approach is not None) + [marker.value for marker in plan.markers]
+    markers: list[Marker | None] = [None] * (plan.approach is not None) + list(plan.markers)
     for k, one in enumerate(laid, first):
         if one.trajectory.stretches:
             begun = done
             board.machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
             done += one.duration
-        if k < len(markers) and (value := markers[k]) is not None:
-            board.grip(value)
+        marker = markers[k] if k < len(markers) else None
+        if marker is not None and marker.kind == "pause":
+            ask()
+        elif marker is not None:
+            board.grip(marker.value)

@@ -1,13 +1,16 @@
 """Waypoints and paths to a trajectory: joint values over time.
 
-The way of a path (`path.py`, `armkin.path`):
+The way of a path (`path.py`, `armkin.path`; `walk.py` goes through its moves, `moves.py` says what each kind does):
 
 path_numbers.py     the moves of a path file, in degrees, as joint values and targets
+placing.py          where a drawing stands, and how the tool is held on it
 geometry.py         lines, arcs, helices, splines and blends of the tool, each at unit speed
+dense.py            targets on lines, gathered; fitting.py: one smooth curve of them, by b_spline.py
 route.py            one after another, with rests at corners
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
 branch_path.py      the branch that is taken: joint values along the route
+grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
 hold_cap.py         how fast it may be for a hold on it
 path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: with joints held

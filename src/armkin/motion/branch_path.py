@@ -5,7 +5,6 @@ route --columns--> linked branches --chains--> runs --here--> joint values on a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -14,28 +13,21 @@ import numpy as np
 
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
-from armkin.forward import fk, jacobian, position
+from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
-from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
-from armkin.model.units import radian_or_reach
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.grid import fine_enough
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.linked_branches import Columns, change, chord_bound, levers, linked
+from armkin.motion.linked_branches import Columns, change, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, finer, knots, optimal
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
-    from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
 _GRID = 1000  # points of a route's grid, at least
-_TIMES = 16.0  # more of them, at most, where the tolerance needs that
-_BLOCK = 8192  # points that are looked at together
-_EACH = (8, 64)  # of a piece's, at least, with many pieces and with few
-_DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
-_MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 _STEP = 1.0  # [mm] between the first samples, at most
 _SAMPLES = (200, 20_000)
 _FARTHEST = 2.0  # [mm] between those of a path that has more
@@ -79,7 +71,7 @@ def samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
     number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
     even = np.linspace(0.0, route.length, max(number, 2))
-    return np.asarray(_apart(np.sort(np.concatenate([even, route.ends])), 1e-7 * route.length))
+    return np.asarray(_apart(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
 
 def carry(
@@ -157,8 +149,8 @@ def stretches(
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        check = (lambda path: 0.0) if grid < _GRID else (lambda path: deviation(arm, route, path))
-        path, breaks, off = _fine_enough(arm, route, s[here], q[here], a, b, number, check, pace.tolerance)
+        tolerance = None if grid < _GRID else pace.tolerance
+        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, tolerance)
         if off > pace.tolerance:
             raise NoSolutionError(
                 f"between {a:.3f} and {b:.3f} mm the plan may leave the path by {off:.3g} mm; "
@@ -168,105 +160,6 @@ def stretches(
             path.q[0] = made[-1].end
         made.append(_timed(arm, route, knots(path.s, path.q, breaks), pace))
     return made
-
-
-def _fine_enough(
-    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int,
-    check: Callable[[Knots], float], tolerance: float,
-) -> tuple[Knots, list[int], float]:  # fmt: skip
-    """A grid from a to b of `number` points or more, as many as the tolerance needs; what `check` says of it."""
-    for damping in _DAMPING:
-        times = 1.0
-        while True:
-            path, breaks = _on_grid(arm, route, s, q, a, b, int(number * times), damping)
-            off = check(path)
-            if off <= tolerance or times >= _TIMES:
-                break
-            times = min(times * float(np.clip(1.1 * np.sqrt(off / tolerance), 1.5, 4.0)), _TIMES)
-        if off <= tolerance:
-            break
-    return path, breaks, off
-
-
-def _on_grid(
-    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, damping: float
-) -> tuple[Knots, list[int]]:
-    """Joint values on a grid from a to b that follows way and joints, exact to the inverse kinematics."""
-    first, last = np.searchsorted(route.ends, [a + 1e-9, b - 1e-9])
-    inside = route.ends[first:last].tolist()
-    moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
-    measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
-    at = np.interp([a, *inside, b], s, measure)
-    total = max(float(at[-1] - at[0]), 1e-12)
-    each = int(np.clip(2 * number / (len(inside) + 1), *_EACH))
-    parts = []
-    for (x, y), (m, n) in zip(pairwise([a, *inside, b]), pairwise(at.tolist()), strict=True):
-        share = _MOTION * (n - m) / total + (1 - _MOTION) * (y - x) / (b - a)
-        count = max(int(number * share), each)
-        here = s[np.searchsorted(s, x, side="right") : np.searchsorted(s, y)]
-        grid = np.concatenate([[x], here, [y]])
-        level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
-        parts.append(np.interp(np.linspace(level[0], level[-1], count + 1)[:-1], level, grid))
-    breaks: list[int] = np.cumsum([len(part) for part in parts])[:-1].tolist()
-    where = np.append(np.concatenate(parts), b)
-    guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
-    exact = corrected(arm, route.task, guess, route.targets(where), damping)
-    return knots(where, exact, breaks), breaks
-
-
-def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:
-    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
-
-    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
-    round for what is within the tolerance anyway.
-    """
-    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
-    return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
-
-
-def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
-    k, p = len(task.sums), task.position
-    scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
-    scale[:p] = 1 / arm.reach
-    for _ in range(steps):
-        T = fk(arm, q)
-        r = residual(task, T, q * arm.ratio, target) * scale
-        J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
-        J[:, p : p + k] *= arm.ratio
-        J = J * radian_or_reach(arm)
-        H = np.swapaxes(J, 1, 2) @ J + (damping / arm.reach) ** 2 * np.eye(arm.n)
-        step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
-        size = np.abs(step).max(axis=1, keepdims=True)
-        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * radian_or_reach(arm)
-        if size.max() < 1e-12:
-            break
-    return np.asarray(q)
-
-
-def deviation(arm: Arm, route: Route, path: Knots) -> float:
-    """An upper bound of the distance between the tip and the route on a grid's cubics [mm].
-
-    Chord against tip: `chord_bound`; cubic against chord: h^2 / 8 |q''| times the levers; chord against route:
-    its sagitta in the middle of each interval, a third more for what is not symmetrical.
-    """
-    lever, worst = levers(arm), 0.0
-    for i in range(0, len(path.s) - 1, _BLOCK):
-        part = slice(i, i + _BLOCK + 1)
-        worst = max(worst, _deviation(arm, route, Knots(path.s[part], path.q[part], path.d[part]), lever))
-    return worst
-
-
-def _deviation(arm: Arm, route: Route, path: Knots, lever: Array) -> float:
-    left, right = path.second()
-    h = path.h[:, None]
-    bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
-    tip = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
-    p = position(arm, path.q)
-    middle = route.targets((path.s[:-1] + path.s[1:]) / 2)
-    full = route.task.orientation == "full"
-    m = middle[:, :3, 3] if full else middle[:, : route.task.position]
-    sagitta = np.linalg.norm(m - ((p[:-1] + p[1:]) / 2)[:, : m.shape[1]], axis=1)
-    return float((tip + 4 / 3 * sagitta).max(initial=0.0))
 
 
 def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:

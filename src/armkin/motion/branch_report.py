@@ -104,6 +104,7 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "complete": plan.complete,
         "tolerance_mm": plan.tolerance,
         "deviation_mm": plan.deviation if planned else None,
+        "blends_reduced": plan.reduced.count,
         "joint_units": units.names(arm),
         "start_joints": out(arm, plan.motion.start).tolist() if planned else None,
         "joints": out(arm, plan.motion.end).tolist() if planned else None,

@@ -151,3 +151,8 @@ class Smoothed:
             inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (now, then)]
             change = self.curve.at(now, 1) * inside[0] - self.curve.at(then, 1) * inside[1]
         return np.asarray(change / self.window)
+
+
+def way_of(stretch: Curve | Smoothed) -> Knots:
+    """The way through joint space of a curve, or of the one that was made smooth."""
+    return stretch.path if isinstance(stretch, Curve) else stretch.curve.path

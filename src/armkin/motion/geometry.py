@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,11 +21,13 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
+from armkin.motion.b_spline import banded
 
 PER_RADIAN = 30.0  # [mm/rad]
 SMALL = 1e-9  # [mm] shorter pieces are no pieces
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
-_TABLE = 96  # intervals of a curved span's table of lengths
+_TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
+_TABLES = 20_000  # of all spans
 
 
 def turn(w: Array) -> Array:
@@ -66,7 +67,7 @@ def spot(task: Task, target: ArrayLike) -> Spot:
     return Spot(p, rest[:k], axis)
 
 
-def _between(task: Task, a: Spot, b: Spot) -> Array:
+def between(task: Task, a: Spot, b: Spot) -> Array:
     """Rotation vector from one orientation to another."""
     if a.turned is None or b.turned is None:
         return np.zeros(3)
@@ -80,6 +81,31 @@ def _between(task: Task, a: Spot, b: Spot) -> Array:
 
 
 @dataclass(frozen=True)
+class Dense:
+    """What a piece knows of the points that it was made from; all lengths [mm] are counted along the piece."""
+
+    given: Array  # (N,) where each point is passed
+    points: Array  # (N, 2 or 3) the points' positions
+    bends: Array  # (k,) where the curvature jumps
+    spans: Array  # (m,) where its cubics begin and end
+    begins: Array  # (c,) where each of its speeds begins
+    speed: Array  # (c,) fraction of the joints' max_speed; nan: the path's
+    tool_speed: Array  # (c,) [mm/s]; nan: the path's
+
+    def part(self, a: float, b: float) -> Dense:
+        """Of the part from length a to b."""
+        given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
+        return replace(
+            self,
+            given=self.given[given] - a,
+            points=self.points[given],
+            bends=self.bends[bends] - a,
+            spans=self.spans[(self.spans > a) & (self.spans < b)] - a,
+            begins=self.begins - a,
+        )
+
+
+@dataclass(frozen=True)
 class Piece:
     """A smooth part of a path, passed at unit speed."""
 
@@ -90,6 +116,7 @@ class Piece:
     speed: float | None = None  # fraction of the joints' max_speed, of this move
     tool_speed: float | None = None  # [mm/s] of this move
     rate: float | None = None  # of a straight line: millimetres of the position for each of length
+    dense: Dense | None = None  # of points that became one curve
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""
@@ -115,7 +142,7 @@ class Piece:
         h = min(1e-5 * self.length, 1e-3)
         a, b = max(s - h, 0.0), min(s + h, self.length)
         here, there = (spot(self.task, t) for t in self.targets(np.array([a, b])))
-        w = _between(self.task, here, there)
+        w = between(self.task, here, there)
         change = np.concatenate([there.p - here.p, PER_RADIAN * (there.sums - here.sums), PER_RADIAN * w])
         return np.asarray(change / (b - a))
 
@@ -132,7 +159,8 @@ class Piece:
             w = vector(turn(y[:, n:]) @ turned.T)
             return np.concatenate([y[:, :n], w], axis=1)
 
-        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed, self.rate)
+        dense = None if self.dense is None else self.dense.part(a, b)
+        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed, self.rate, dense)
 
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
@@ -182,8 +210,8 @@ def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
 def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
     """A smooth curve through points: natural cubic in the root of the chord lengths (centripetal)."""
     spots = [a, *points]
-    y = np.array([_relative(task, a, s) for s in spots])
-    chord = np.linalg.norm(np.diff(y * _weights(task), axis=0), axis=1)
+    y = np.array([relative(task, a, s) for s in spots])
+    chord = np.linalg.norm(np.diff(y * weights(task), axis=0), axis=1)
     if chord.min() < SMALL:
         raise UsageError("a spline passes the same point twice in a row: leave one out")
     u = np.concatenate([[0.0], np.cumsum(np.sqrt(chord))])
@@ -195,26 +223,29 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
         c0, c1, c2, c3 = (c[i] for c in coefficients)
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
-    v = np.concatenate([np.linspace(x, y, _TABLE, endpoint=False) for x, y in pairwise(u)])
-    tangent = at(v)[1] * _weights(task)
+    v = _places(u, _intervals(len(u) - 1))
+    tangent = at(v)[1] * weights(task)
     back = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
     if len(back):
         place = ", ".join(f"{x:.6g}" for x in at(v[back[:1] + 1])[0][0, : task.position])
         raise UsageError(f"a spline turns back by half a turn near {place}: use lines, which stop there")
-    return _unit_speed(task, a, at, u)
+    return unit_speed(task, a, at, u)[0]
 
 
-def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece]:
-    """Two pieces that meet at a corner, rounded within a sphere about it: first, blend, second.
+def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece, float]:
+    """Two pieces that meet at a corner, rounded within a sphere about it: first, blend, second, and the radius.
 
-    side: the first piece's length before the blend at its other end.
+    side: the first piece's length before the blend at its other end. The radius is `radius`, or less where half of
+    a side is nearer.
     """
-    cut_a = _leaves(a, b.first.p, radius, a.length, max(a.length - side / 2, 0.0), side)
-    cut_b = _leaves(b, b.first.p, radius, 0.0, b.length / 2, b.length)
+    corner, half = b.first.p, max(a.length - side / 2, 0.0)
+    radius = min(radius, *(_away(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
+    cut_a = _leaves(a, corner, radius, a.length, half)
+    cut_b = _leaves(b, corner, radius, 0.0, b.length / 2)
     before, after = a.part(0.0, cut_a), b.part(cut_b, b.length)
     start, end = before.last, after.first
-    y0, y1 = _relative(task, start, start), _relative(task, start, end)
-    scale = _weights(task)
+    y0, y1 = relative(task, start, start), relative(task, start, end)
+    scale = weights(task)
     d0, d1 = a.direction(cut_a) / scale, b.direction(cut_b) / scale
     k = task.position + len(task.sums)
     d1[k:] = _into(y1[k:], d1[k:])
@@ -228,33 +259,29 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
 
     speeds = [x.speed for x in (a, b) if x.speed is not None]
     tools = [x.tool_speed for x in (a, b) if x.tool_speed is not None]
-    made = _unit_speed(task, start, at, np.array([0.0, 1.0]))
-    slow = Piece(task, made.first, made.along, made.length, min(speeds, default=None), min(tools, default=None))
-    return before, slow, after
+    made, _ = unit_speed(task, start, at, np.array([0.0, 1.0]))
+    slow = replace(made, speed=min(speeds, default=None), tool_speed=min(tools, default=None))
+    return before, slow, after, radius
 
 
-def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: float, side: float) -> float:
+def _away(piece: Piece, corner: Array, s: float) -> float:
+    """Distance of a piece's place from a corner [mm]."""
+    return float(np.linalg.norm(piece.along(np.array([s]))[0, : piece.task.position] - corner))
+
+
+def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: float) -> float:
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
-
-    def away(s: float) -> float:
-        return float(np.linalg.norm(spot(piece.task, piece.targets(np.array([s]))[0]).p - corner))
-
-    if away(outer) < radius * (1 - 1e-9):
-        raise UsageError(
-            f"a blend of {radius:g} mm is longer than half of a side of {side:.4g} mm next to it: "
-            f"at most {away(outer):.4g} mm"
-        )
     if piece.rate:
         return inner + math.copysign(radius / piece.rate, outer - inner)
     for _ in range(60):
         middle = (inner + outer) / 2
-        inner, outer = (middle, outer) if away(middle) < radius else (inner, middle)
+        inner, outer = (middle, outer) if _away(piece, corner, middle) < radius else (inner, middle)
     return outer
 
 
 def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length: float) -> Piece:
     """A piece whose position, sums and turning all are passed at constant speed; at: fraction -> position."""
-    w = _between(task, a, b)
+    w = between(task, a, b)
     change = b.sums - a.sums
     angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
     whole = math.hypot(length, PER_RADIAN * angle)
@@ -267,11 +294,15 @@ def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length:
     return Piece(task, a, along, whole)
 
 
-def _unit_speed(task: Task, first: Spot, at: Callable[[Array], tuple[Array, Array]], u: Array) -> Piece:
-    """A piece from a curve over any parameter, given with its derivative, smooth between the values u."""
-    scale = _weights(task)
-    grid = np.concatenate([np.linspace(a, b, _TABLE, endpoint=False) for a, b in pairwise(u)])
-    grid = np.append(grid, u[-1])
+def unit_speed(
+    task: Task, first: Spot, at: Callable[[Array], tuple[Array, Array]], u: Array
+) -> tuple[Piece, Callable[[Array], Array]]:
+    """A piece from a curve over any parameter, given with its derivative, smooth between the values u.
+
+    Returns also the function from parameters to lengths.
+    """
+    scale = weights(task)
+    grid = np.append(_places(u, _intervals(len(u) - 1)), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
@@ -287,15 +318,25 @@ def _unit_speed(task: Task, first: Spot, at: Callable[[Array], tuple[Array, Arra
         v = grid[i] + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
         return at(v)[0]
 
-    return Piece(task, first, along, float(s[-1]))
+    return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 
 
-def _relative(task: Task, a: Spot, b: Spot) -> Array:
+def _intervals(spans: int) -> int:
+    """Of the table of lengths, for each of so many spans."""
+    return int(np.clip(_TABLES // max(spans, 1), _LEAST_TABLE, _TABLE))
+
+
+def _places(u: Array, parts: int) -> Array:
+    """Every span between the values u in equal parts, without the last value."""
+    return np.asarray((u[:-1, None] + np.diff(u)[:, None] * (np.arange(parts) / parts)).ravel())
+
+
+def relative(task: Task, a: Spot, b: Spot) -> Array:
     """A spot as y of a piece that starts at `a`."""
-    return np.concatenate([b.p, b.sums, _between(task, a, b)])
+    return np.concatenate([b.p, b.sums, between(task, a, b)])
 
 
-def _weights(task: Task) -> Array:
+def weights(task: Task) -> Array:
     """What a unit of each component of y is worth in length."""
     return np.concatenate([np.ones(task.position), np.full(len(task.sums) + 3, PER_RADIAN)])
 
@@ -310,13 +351,10 @@ def _into(w: Array, omega: Array) -> Array:
 def _natural(u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
     """Coefficients of the natural cubic spline through (u, y), a row for each span."""
     h = np.diff(u)
-    n = len(u)
-    A, rhs = np.eye(n), np.zeros_like(y)
     slope = np.diff(y, axis=0) / h[:, None]
-    for i in range(1, n - 1):
-        A[i, i - 1 : i + 2] = h[i - 1], 2 * (h[i - 1] + h[i]), h[i]
-        rhs[i] = 3 * (slope[i] - slope[i - 1])
-    c = np.linalg.solve(A, rhs)
+    second = np.zeros_like(y)
+    if len(u) > 2:
+        bands = np.stack([2 * (h[:-1] + h[1:]), np.append(h[1:-1], 0.0)])
+        second[1:-1] = banded(bands, 3 * np.diff(slope, axis=0))
     hh = h[:, None]
-    second = np.asarray(c, dtype=float)
     return y[:-1], slope - hh * (2 * second[:-1] + second[1:]) / 3, second[:-1], np.diff(second, axis=0) / (3 * hh)

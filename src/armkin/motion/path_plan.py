@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from armkin.formula.arrays import Array
 from armkin.forward import condition
 from armkin.motion.curve import Curve, Smoothed
+from armkin.motion.route import Reduced
 from armkin.motion.trajectory import Stretch, Trajectory, grouped
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class Marker:
-    """Something that happens between two stretches: the gripper."""
+    """Something that happens between two stretches: the gripper (grip), or a rest until Enter (pause)."""
 
     before: int  # number of the stretch that follows
     kind: str
@@ -70,7 +71,9 @@ class PathPlan:
     """What `armkin.path` returns: joint values over time, and how they came about.
 
     length: [mm] of the tool's way; runs, branches, reconfigurations: see their classes; deviation: [mm] a bound of
-    the distance between plan and path; nearest_singularity: [mm] where, the condition there, the joint values.
+    the distance between plan and path, or the greatest distance of a given point from the motion where corners are
+    passed by the tolerance; reduced: blends that did not fit; nearest_singularity: [mm] where, the condition there,
+    the joint values.
     """
 
     arm: Arm
@@ -81,6 +84,8 @@ class PathPlan:
     samples: int = 0
     complete: bool = True
     deviation: float = 0.0
+    rounded_most: float | None = None  # [mm] where a given point lies farthest from the motion
+    reduced: Reduced = field(default_factory=Reduced)
     runs: list[PathRun] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)
     reconfigurations: list[Reconfiguration] = field(default_factory=list)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
-from armkin.motion.geometry import SMALL, Piece, blend
+from armkin.motion.fitting import REVERSAL
+from armkin.motion.geometry import SMALL, Dense, Piece, blend
 from armkin.motion.trajectory import grouped
 
 _SMOOTH = 1e-3  # [rad] between two directions that count as one
@@ -51,28 +52,76 @@ class Route:
         return out
 
     @cached_property
-    def _paces(self) -> tuple[Array, Array]:
-        """Fraction of the joints' speed and tool speed of every piece; nan: it has none of its own."""
-        return tuple(  # type: ignore[return-value]
-            np.array([np.nan if x is None else x for x in each])
-            for each in ([p.speed for p in self.pieces], [p.tool_speed for p in self.pieces])
-        )
+    def breaks(self) -> Array:
+        """Where the curvature may jump: ends of pieces, and bends inside of dense ones, sorted [mm]."""
+        inside = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
+        return np.unique(np.concatenate([self.ends, *inside])) if inside else self.ends
+
+    @cached_property
+    def spans(self) -> Array:
+        """Where the cubics of dense pieces begin and end: a grid is no coarser [mm]."""
+        inside = [self.ends[k] + p.dense.spans for k, p in enumerate(self.pieces) if p.dense is not None]
+        return np.concatenate(inside) if inside else np.zeros(0)
+
+    @cached_property
+    def given(self) -> tuple[Array, Array]:
+        """Points that the route was fitted to: where each is passed (N,) [mm], and its position (N, 2 or 3)."""
+        dense = [(self.ends[k], p.dense) for k, p in enumerate(self.pieces) if p.dense is not None]
+        if not dense:
+            return np.zeros(0), np.zeros((0, self.task.position))
+        return np.concatenate([at + d.given for at, d in dense]), np.concatenate([d.points for _, d in dense])
+
+    @cached_property
+    def _paces(self) -> tuple[Array, Array, Array]:
+        """Where each speed begins, fraction of the joints' speed and tool speed; nan: it has none of its own."""
+        rows = []
+        for begin, piece in zip(self.ends, self.pieces, strict=False):
+            own = (piece.speed, piece.tool_speed)
+            if piece.dense is None or len(piece.dense.begins) == 0:
+                rows.append(np.array([[begin, *(np.nan if x is None else x for x in own)]]))
+            else:
+                d = piece.dense
+                rows.append(np.stack([np.maximum(begin + d.begins, begin), d.speed, d.tool_speed], axis=1))
+        table = np.concatenate(rows)
+        return table[:, 0], table[:, 1], table[:, 2]
 
     def limit(self, s: Array, speed: float, tool: float | None) -> tuple[Array, Array]:
         """Fraction of the joints' speed and tool speed [mm/s] (inf: none) in the intervals between s: (N - 1,) each."""
-        which = self.which((s[:-1] + s[1:]) / 2)
-        parts, tools = (own[which] for own in self._paces)
+        begins, *own = self._paces
+        which = np.searchsorted(begins, (s[:-1] + s[1:]) / 2, side="right") - 1
+        parts, tools = (each[which] for each in own)
         most = np.inf if tool is None else tool
         return np.where(np.isnan(parts), speed, parts), np.where(np.isnan(tools), most, tools)
 
 
+@dataclass
+class Reduced:
+    """Blends that did not fit: how many, and of the smallest what was wished and what it became [mm]."""
+
+    count: int = 0
+    wished: float = 0.0
+    became: float = np.inf
+
+    def note(self, wished: float, became: float) -> None:
+        """Count one."""
+        self.count += 1
+        if became < self.became:
+            self.wished, self.became = wished, became
+
+
 def joined(
-    task: Task, pieces: Sequence[Piece], blends: Sequence[float], pauses: frozenset[int]
+    task: Task,
+    pieces: Sequence[Piece],
+    blends: Sequence[float | None],
+    pauses: frozenset[int],
+    tolerance: float = 0.0,
+    reduced: Reduced | None = None,
 ) -> tuple[Route, dict[int, int]]:
     """Pieces as a route: corners rounded by their blends (one for each piece's end), rests where there is none.
 
-    pauses: numbers of pieces before which the arm has to stand in any case. Returns the route, and for each of
-    them the number of the piece in it.
+    blends: [mm], None: the largest that passes the corner within `tolerance`. pauses: numbers of pieces before which
+    the arm has to stand in any case. Returns the route, and for each of them the number of the piece in it; blends
+    that do not fit are made smaller, and noted in `reduced`.
     """
     made: list[Piece] = []
     side = 0.0  # of the last piece, before it was cut
@@ -92,21 +141,37 @@ def joined(
         before = made[-1]
         a, b = before.direction(before.length), piece.direction(0.0)
         angle = float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
-        radius = blends[k - 1]
+        wish = blends[k - 1]
+        # a cubic blend passes its corner at r |a - b| / 4
+        radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
         if angle < _SMOOTH:
             made.append(piece)
-        elif radius <= 0 or angle > np.pi - _SMOOTH or not (_moves(before) and _moves(piece)):
+        elif radius <= 0 or angle > (REVERSAL if wish is None else np.pi - _SMOOTH) or not both_move(before, piece):
             stops.add(len(made))
             made.append(piece)
         else:
-            first, middle, last = blend(task, before, piece, radius, side)
+            first, middle, last, radius = blend(task, before, piece, radius, side)
+            if reduced is not None and wish is not None and radius < wish * (1 - 1e-9):
+                reduced.note(wish, radius)
+            if wish is None:
+                middle = replace(middle, dense=_passing(middle, piece.first.p))
             made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
         side = piece.length
     stops.add(len(made))
     return Route(task, tuple(made), frozenset(stops)), order
 
 
+def _passing(piece: Piece, corner: Array) -> Dense:
+    """A blend that has a given corner to pass in its middle."""
+    none = np.zeros(0)
+    return Dense(np.array([piece.length / 2]), corner[None], none, none, none, none, none)
+
+
+def both_move(a: Piece, b: Piece) -> bool:
+    """Whether the position moves in both: a pure turn has no sphere to be blended in."""
+    return _moves(a) and _moves(b)
+
+
 def _moves(piece: Piece) -> bool:
-    """Whether the position moves at all: a pure turn has no sphere to be blended in."""
     p = [piece.along(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
     return bool(max(np.linalg.norm(p[0] - p[1]), np.linalg.norm(p[1] - p[2])) > 1e-6)

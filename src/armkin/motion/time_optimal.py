@@ -27,7 +27,10 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 
+Int = NDArray[np.intp]
 TINY = 1e-300
+_NEIGHBOURS = 5  # samples that give a slope
+_SECTIONS = 16  # of samples, between breaks: more are worked on together
 _MOST = 1e18  # of x, where nothing bounds it
 _EXCESS = 1.001  # of an acceleration, between grid points
 _ROUNDS = 6
@@ -59,6 +62,15 @@ class Knots:
         """Lengths of the intervals: (N - 1,)."""
         return np.asarray(self.s[1:] - self.s[:-1])
 
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """q and q' at lengths s: (M,) -> (M, n) twice."""
+        i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        h = self.h[i][:, None]
+        f = (s - self.s[i])[:, None] / h
+        d0, d1, chord = self.d[i] * h, self.d[i + 1] * h, self.q[i + 1] - self.q[i]
+        c2, c3 = 3 * chord - 2 * d0 - d1, d0 + d1 - 2 * chord
+        return self.q[i] + f * (d0 + f * (c2 + f * c3)), (d0 + f * (2 * c2 + 3 * f * c3)) / h
+
     def second(self) -> tuple[Array, Array]:
         """q'' at the left and the right end of every interval: (N - 1, n) twice."""
         h = self.h[:, None]
@@ -75,36 +87,45 @@ def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
     mean of both sides'.
     """
     N = len(s)
-    edges = sorted({0, N - 1, *breaks})
+    edges = np.unique([0, N - 1, *breaks])
+    if len(edges) > _SECTIONS and np.diff(edges).min() >= _NEIGHBOURS - 1:  # many short sections, all at once
+        size = np.diff(edges) + 1
+        first = np.repeat(edges[:-1], size)
+        i = np.arange(int(size.sum())) - np.repeat(np.cumsum(size) - size, size) + first
+        last = np.repeat(edges[1:], size)
+        parts = [slice(some.start, some.stop) for some in in_parts(len(i))]
+        slopes = np.concatenate([_slopes_at(s, q, i[some], first[some], last[some]) for some in parts])
+        begin = np.cumsum(size) - size
+        total = slopes[np.concatenate([[True], i[1:] != i[:-1]])]
+        total[edges[1:-1]] = (slopes[begin[1:] - 1] + slopes[begin[1:]]) / 2
+        return Knots(s, q, total)
     total, count = np.zeros_like(q), np.zeros(N)
-    for lo, hi in pairwise(edges):
-        part = slice(lo, hi + 1)
+    for lo, hi in pairwise(edges.tolist()):
         for some in in_parts(hi + 1 - lo):
-            total[lo + some.start : lo + some.stop] += _slopes(s[part], q[part], some)
-        count[part] += 1
+            i = np.arange(lo + some.start, lo + some.stop)
+            total[i] += _slopes_at(s, q, i, np.full(len(i), lo), np.full(len(i), hi))
+        count[lo : hi + 1] += 1
     total /= count[:, None]
     return Knots(s, q, total)
 
 
-def _slopes(s: Array, q: Array, some: slice) -> Array:
-    """Derivatives of the polynomials through up to five neighbours, at some of the samples: (M,), (M, n) -> (m, n).
+def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
+    """Derivatives of the polynomials through up to five neighbours of samples i, from `first` to `last`: (m, n).
 
     Barycentric: q'(x_i) = sum_j (l_j / l_i) (q_j - q_i) / (x_i - x_j), l_j = 1 / prod_m (x_j - x_m)
     (Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, section 9).
     """
-    M = len(s)
-    w = min(5, M)
-    i = np.arange(some.start, some.stop)
-    at = np.clip(i - w // 2, 0, M - w) + np.arange(w)[:, None]  # (w, m)
+    w = min(_NEIGHBOURS, int((last - first).min(initial=_NEIGHBOURS)) + 1)
+    at = np.clip(i - w // 2, first, last + 1 - w) + np.arange(w)[:, None]  # (w, m)
     x = s[at]
     inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
     mine = np.choose(i - at[0], inverse) if w > 1 else np.ones(len(i))
-    out = np.zeros_like(q[some])
+    out = np.zeros_like(q[i])
     for j in range(w):
-        apart = x[j] - s[some]
+        apart = x[j] - s[i]
         there = apart != 0
         weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(len(i)), where=there)
-        out += weight[:, None] * (q[at[j]] - q[some])
+        out += weight[:, None] * (q[at[j]] - q[i])
     return out
 
 

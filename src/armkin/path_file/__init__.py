@@ -2,6 +2,7 @@
 
     model.py   keys, types, bounds       messages.py   errors in the file's own words
     table.py   CSV: one row a corner, columns chosen by the header
+    drawing.py foreign files as moves: gcode.py (its words: gcode_words.py, its arcs: gcode_arcs.py)
 
 This package imports pydantic and yaml, and is itself imported only when a path is read.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -19,15 +20,52 @@ from armkin.errors import FileError, PathFileError
 from armkin.path_file.model import Move, PathFile, Source
 from armkin.robot_file import strict_yaml
 
+if TYPE_CHECKING:
+    from armkin.path_file.drawing import Placing, Wishes
+
 LARGEST = 32_000_000  # [bytes]
 _KIND = strict_yaml.Kind(
     "path file", "moves", "moves: and a list; rows of CSV belong into a .csv file", 4 * 1024 * 1024, 100_000
 )
-__all__ = ["LARGEST", "Move", "PathFile", "check_robot", "json_schema", "parse", "read", "validated"]
+_FOREIGN = {".gcode": "gcode", ".gco": "gcode", ".nc": "gcode", ".ngc": "gcode"}
+__all__ = [
+    "LARGEST",
+    "Move",
+    "PathFile",
+    "check_robot",
+    "foreign",
+    "json_schema",
+    "parse",
+    "read",
+    "read_drawing",
+    "validated",
+]
 
 
 def read(name: str) -> PathFile:
     """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
+    if foreign(name):
+        raise PathFileError(
+            f"{name}: a drawing says where it stands only with --at X,Y,Z: armkin path ROBOT {name} --at 300,0,50",
+            file=name,
+        )
+    return parse(_bytes(name), name)
+
+
+def foreign(name: str) -> str | None:
+    """Which language a file that only draws is in, by its ending: gcode, svg; None: it is a path file."""
+    return _FOREIGN.get(os.path.splitext(name)[1].lower())
+
+
+def read_drawing(name: str, placing: Placing, wishes: Wishes) -> PathFile:
+    """Read G-code or SVG as a path. Raises FileError, or PathFileError with line and word."""
+    raw = _bytes(name)
+    from armkin.path_file import gcode
+
+    return gcode.parse(raw, name, placing, wishes)
+
+
+def _bytes(name: str) -> bytes:
     try:
         with open(name, "rb") as file:
             raw = file.read(LARGEST + 1)
@@ -37,7 +75,7 @@ def read(name: str) -> PathFile:
         raise FileError(f"{name}: cannot read the path file: {reason}{hint}", file=name) from None
     if len(raw) > LARGEST:
         raise FileError(f"{name} is larger than {LARGEST // 1_000_000} MB: this is no path file", file=name)
-    return parse(raw, name)
+    return raw
 
 
 def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:

@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 Number = Annotated[float, Field(ge=-1e7, le=1e7)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
+MOST_POINTS = 200_000  # of a polyline or a spline, and of a CSV file
 LEAST_PERCENT = 0.01
 LEAST_TOOL_SPEED = 1e-3  # [mm/s]
 LEAST_TOLERANCE = 1e-6  # [mm]
@@ -86,11 +87,13 @@ class Move(_Model):
     polyline: Annotated[list[Values], Field(min_length=1)] | None = Field(None, description="Lines through targets.")
     arc: Arc | None = Field(None, description="An arc through via, to to.")
     circle: Circle | None = Field(None, description="A circle or helix.")
-    spline: Annotated[list[Values], Field(min_length=1, max_length=1000)] | None = Field(
+    spline: Annotated[list[Values], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
         None, description="A smooth curve through targets."
     )
     offset: Offset | None = Field(None, description="A line by an offset.")
-    wait: Annotated[float, Field(ge=0, le=86400)] | None = Field(None, description="Seconds at rest.")
+    wait: Annotated[float, Field(ge=0, le=86400)] | Literal["enter"] | None = Field(
+        None, description="Seconds at rest, or enter: until the Enter key."
+    )
     grip: Literal["open", "closed"] | Number | None = Field(None, description="open, closed, or the drive's value.")
     branch: str | None = Field(None, description="With point: the branch's name.")
     blend: Annotated[float, Field(ge=0, le=1e6)] | None = Field(
@@ -122,6 +125,7 @@ class Source:
     name: str
     lines: Mapping[tuple[str | int, ...], int]
     rows: bool = False  # of CSV
+    notes: tuple[str, ...] = ()  # what was read and ignored
 
 
 class PathFile(_Model):
@@ -136,7 +140,10 @@ class PathFile(_Model):
     )
     tool_speed: Speed | None = Field(None, description="mm/s, for all moves.")
     speed: Percent | None = Field(None, description="Percent of the joints' max_speed, for all moves.")
-    blend: Annotated[float, Field(ge=0, le=1e6)] = Field(0.0, description="mm, for all corners; 0 = stop.")
+    corners: Literal["stop", "blend", "tolerance"] | None = Field(
+        None, description="How corners without their own blend are passed; tolerance: dense points as one curve."
+    )
+    blend: Annotated[float, Field(ge=0, le=1e6)] | None = Field(None, description="mm, for all corners; 0 = stop.")
     start: str | Start | None = Field(None, description="A pose's name, joints: or point:. Absent: where the arm is.")
     moves: Annotated[list[Move], Field(min_length=1, max_length=1_000_000)] = Field(description="The moves, in order.")
 
@@ -144,6 +151,11 @@ class PathFile(_Model):
         """Note where the path was read, for messages; returns the path."""
         self._source = source
         return self
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a foreign file says that was ignored, a sentence each."""
+        return () if self._source is None else self._source.notes
 
     @property
     def folder(self) -> str:

@@ -9,18 +9,19 @@ from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import LEAST_TOOL_SPEED, Move, PathFile, Source
+from armkin.path_file.model import LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
 # What a batch of `armkin ik` says beside the joints.
 _OF_ANSWERS = ("row", "status", "branch", "within_limits", "residual_mm", "residual_deg", "motion")
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
-MOST = 50_000  # rows
 
 
 def parse(raw: bytes, name: str) -> PathFile:
     """Rows as moves: a point first, then lines (targets), or joint moves (joint names).
+
+    Targets without a blend column are dense points: corners are passed by the tolerance.
 
     The header names the columns: x,y,z[,roll,pitch,yaw] or whatever the task's labels are, or joint names, plus
     optional blend and tool_speed; what a batch of `armkin ik` says beside the joints is passed over. Without a
@@ -35,7 +36,7 @@ def parse(raw: bytes, name: str) -> PathFile:
         for number, row in enumerate(csv.reader(io.StringIO(text)), 1)
         if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
     )
-    rows = list(islice(filled, MOST + 2))  # a header, and one too many
+    rows = list(islice(filled, MOST_POINTS + 2))  # a header, and one too many
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     header: list[str] | None = None
@@ -46,8 +47,10 @@ def parse(raw: bytes, name: str) -> PathFile:
         doubled = sorted({key for key in header if header.count(key) > 1})
         if doubled:
             raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
-    if len(rows) > MOST:
-        raise PathFileError(f"{name}: has more than {MOST} rows, and a path no more: give it in parts", file=name)
+    if len(rows) > MOST_POINTS:
+        raise PathFileError(
+            f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
+        )
     moves: list[Move] = []
     for number, row in rows:
         values = [_value(cell) for cell in row]
@@ -63,7 +66,10 @@ def parse(raw: bytes, name: str) -> PathFile:
     if not moves:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
     lines: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
-    return PathFile.model_construct(moves=moves).read_from(Source(name, lines, rows=True))
+    smooth = moves[0].point is not None and "blend" not in (header or ())
+    return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
+        Source(name, lines, rows=True)
+    )
 
 
 def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:

@@ -210,6 +210,7 @@ class BoardActions:
         self.prepare(machine)
         plan = self.program(machine.joints(), speed)
         path_run.check_gripper(plan, self.thread.board)
+        path_run.check_pauses(plan, answers=False)
         board = self.thread.board
         path_run.follow(board, plan, path_run.parts(plan, machine.counts(), board.lay), self._progress)
 

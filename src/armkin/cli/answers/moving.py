@@ -104,7 +104,10 @@ class Path(Head):
     samples: Annotated[int, "targets that were solved"]
     complete: Annotated[bool, "every isolated branch of every sample is guaranteed to be known"]
     tolerance_mm: float
-    deviation_mm: Annotated[float | None, "a bound of the distance between plan and path"]
+    deviation_mm: Annotated[
+        float | None, "a bound of the distance between plan and path; of points passed by the tolerance their greatest"
+    ]
+    blends_reduced: Annotated[int, "blends that half of a side made smaller"]
     joint_units: Annotated[list[str], "deg or mm"]
     start_joints: Annotated[list[float] | None, "[deg or mm]"]
     joints: Annotated[list[float] | None, "at the end [deg or mm]"]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin import files
-from armkin.cli import board_link, inputs, keep_outs, lock_and_sweep, output, render
+from armkin.cli import board_link, foreign_path, inputs, keep_outs, lock_and_sweep, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
+from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import listed, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName
@@ -44,6 +46,12 @@ def path(
     blend: Annotated[
         str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
     ] = None,
+    corners: Annotated[
+        str | None,
+        typer.Option(
+            "--corners", metavar="stop|blend|tolerance", help="Corners; tolerance: dense points as one curve."
+        ),
+    ] = None,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
     accel: Annotated[str, typer.Option("--accel", metavar="PERCENT", help="Of every joint's max_accel.")] = "100",
     tool_speed: Annotated[
@@ -76,6 +84,11 @@ def path(
     resume: Resume = False,
     baud: Baud = None,
     no_reset: NoReset = False,
+    at: At = None,
+    scale: Scale = None,
+    feed: Feed = None,
+    lift: Lift = None,
+    grip_by: GripBy = None,
     json: Json = False,
 ) -> None:
     """Plan a path through space, and move along it.
@@ -99,11 +112,14 @@ def path(
         name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
         for name, value in lock_and_sweep.locks(arm, lock).items()
     }
-    moves = _moves(armkin.lock(arm, locked) if locked else arm, file, via, task)
+    free = armkin.lock(arm, locked) if locked else arm
+    drawn = foreign_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
+    moves = _moves(free, file, via, task) if drawn is None else drawn
     options: dict[str, Any] = {
         "branch": branch,
         "task": task,
         "tolerance": _positive(tolerance, "--tolerance", 1e-6),
+        "corners": corners,
         "blend": None if blend is None else _positive(blend, "--blend", 0),
         "speed": inputs.percent(speed, "--speed"),
         "accel": inputs.percent(accel, "--accel"),
@@ -181,12 +197,13 @@ def _carried_out(
         with planning():
             plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
+            path_run.check_pauses(plan, sys.stdin.isatty())
             laid = path_run.parts(plan, began, board.lay)
             _files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
         with board.under_way(laid, held) as (left, first, note), board_link.told(left, note) as tell:
-            path_run.follow(board, plan, left, tell, first)
+            path_run.follow(board, plan, left, tell, first, ask=_until_enter)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
         if held is not None:
             found.pop("approach", None)  # where it began, that motion is over
@@ -194,6 +211,11 @@ def _carried_out(
     if not json:
         with output.beside(out) as write:
             write(board_link.where_text(arm, found))
+
+
+def _until_enter() -> None:
+    output.note("the path rests here: press Enter to go on")
+    sys.stdin.readline()
 
 
 def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
@@ -350,5 +372,21 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         if worst is not None:
             size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
             lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
-        lines.append(f"at most {found['deviation_mm']:.4f} mm from the path; {found['tolerance_mm']:g} allowed")
+        lines.append(_deviation_text(plan))
+        if plan.reduced.count:
+            wished, became = plan.reduced.wished, plan.reduced.became
+            lines.append(
+                f"{plan.reduced.count} blend{'s' * (plan.reduced.count > 1)} made smaller, to half of a side: "
+                f"the smallest from {wished:g} to {became:.4g} mm"
+            )
     return "\n".join(lines) + "\n"
+
+
+def _deviation_text(plan: PathPlan) -> str:
+    """How far the motion leaves the path, or the points that it was fitted to."""
+    if plan.rounded_most is None:
+        return f"at most {plan.deviation:.4f} mm from the path; {plan.tolerance:g} allowed"
+    return (
+        f"points within {plan.deviation:.4f} mm of the motion, the farthest at {plan.rounded_most:.3f} mm; "
+        f"{plan.tolerance:g} allowed"
+    )

@@ -1,0 +1,72 @@
+"""Drawings as paths: G-code and SVG, and where `armkin path` puts them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armkin import files
+from armkin.cli import output
+from armkin.cli.numbers import listed, number
+from armkin.errors import UsageError
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.path_file import PathFile
+
+At = Annotated[
+    str | None,
+    typer.Option("--at", metavar="X,Y,Z[,R,P,Y]", help="Of G-code: where the file's zero lies."),
+]
+Scale = Annotated[str | None, typer.Option("--scale", metavar="K", help="Of G-code: times the file's millimetres.")]
+Feed = Annotated[
+    str | None, typer.Option("--feed", metavar="MM/S", help="Of G-code: the tool's speed where it has no F.")
+]
+Lift = Annotated[str | None, typer.Option("--lift", metavar="MM", help="SVG: height between strokes. [default: 5]")]
+GripBy = Annotated[
+    str | None, typer.Option("--grip-by", metavar="M3|M106", help="G-code: which words close and open the gripper.")
+]
+_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+def moves(
+    arm: Arm,
+    file: str | None,
+    task: str | None,
+    *,
+    at: str | None,
+    scale: str | None,
+    feed: str | None,
+    lift: str | None,
+    grip_by: str | None,
+) -> PathFile | None:
+    """The moves of a drawing; None: the file is none. Raises UsageError for options that make no sense."""
+    from armkin import path_file
+    from armkin.motion.placing import placing
+    from armkin.path_file.drawing import Wishes
+
+    given = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
+    if file is None or path_file.foreign(file) is None:
+        if (first := next((name for name, value in given.items() if value is not None), None)) is not None:
+            raise UsageError(f"{first} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
+        return None
+    if at is None:
+        raise UsageError(f"{file} needs --at X,Y,Z, for example --at 300,0,50: where its zero lies in the arm's frame")
+    if grip_by not in (None, "M3", "M106"):
+        raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
+    zero = listed(at, _POSE[: 3 if at.count(",") == 2 else 6], "--at")
+    factor = 1.0 if scale is None else number(scale, "--scale")
+    if not 1e-6 <= factor <= 1e6:
+        raise UsageError(f"--scale: '{scale}' must be from 1e-6 to 1e6")
+    speed = None if feed is None else number(feed, "--feed")
+    if speed is not None and speed < 1e-3:
+        raise UsageError(f"--feed: '{feed}' must be at least 0.001")
+    height = 5.0 if lift is None else number(lift, "--lift")
+    if height < 0:
+        raise UsageError(f"--lift: '{lift}' must be at least 0")
+    files.keep(file)
+    made = path_file.read_drawing(file, placing(arm, zero, task=task, scale=factor), Wishes(speed, height, grip_by))
+    for text in made.notes:
+        output.note(text)
+    return made

@@ -1,0 +1,166 @@
+"""Cubic B-splines by least squares: many separate curves at once, in time and memory that grow with the points.
+
+Points are rows, one curve after another; some of them are knots, the first and the last of each curve always. A curve
+with K knots has K + 2 control points (its end knots count four times), and a normal matrix with three diagonals beside
+the main one, so that all curves together are one banded system.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+
+Int = NDArray[np.intp]
+_RIDGE = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
+_ENDS = 1e6  # weight of a curve's ends, which it passes
+_THIRDS = np.arange(4) / 3
+_TO_POWERS = np.linalg.inv(np.vander(_THIRDS, increasing=True))  # values at thirds -> coefficients
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each point stands among the knots: (N,) rows, M intervals, C control points."""
+
+    u: Array  # (N,) parameter of the points, increasing along a curve
+    interval: Int  # (N,) interval that each point lies in
+    begin: Array  # (M,) where intervals begin
+    end: Array  # (M,)
+    knots: Array  # (M, 6) the six knots about each interval
+    control: Int  # (M,) first of the four control points of each interval
+    curve: Int  # (M,) curve of each interval
+    count: int  # control points
+
+    @staticmethod
+    def of(u: Array, curve: Int, knot: Bool) -> Layout:
+        """The layout of points u on curves (numbers from 0, in order), some of which are knots: (N,) each."""
+        at, which = u[knot], curve[knot]
+        inner = np.flatnonzero(which[1:] == which[:-1])  # knots at which an interval begins
+        number = np.cumsum(knot) - 1
+        before = np.searchsorted(inner, number)  # intervals that begin before the point's knot
+        interval = before - (before == np.searchsorted(inner, number, side="right"))  # a curve's last knot: the last
+        first = np.searchsorted(which, which[inner])
+        last = np.searchsorted(which, which[inner], side="right") - 1
+        around = np.clip(inner[:, None] + np.arange(-2, 4), first[:, None], last[:, None])
+        control = np.arange(len(inner)) + 3 * which[inner]
+        count = len(inner) + 3 * (int(which[-1]) + 1)
+        return Layout(u, interval, at[inner], at[inner + 1], at[around], control, which[inner], count)
+
+    def values(self, control: Array) -> Array:
+        """Points of the curves at the layout's parameters: control points (C, d) -> (N, d)."""
+        N = _basis(self.knots[self.interval], self.u)
+        first = self.control[self.interval]
+        return np.asarray(sum(N[:, [k]] * control[first + k] for k in range(4)))
+
+    def powers(self, control: Array) -> Array:
+        """Coefficients of the cubics over the fraction of each interval: (M, 4, d)."""
+        size = self.end - self.begin
+        at = [_basis(self.knots, self.begin + f * size) for f in _THIRDS]
+        values = np.stack([sum(N[:, [k]] * control[self.control + k] for k in range(4)) for N in at], axis=1)
+        return np.asarray(_TO_POWERS @ values)
+
+
+def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
+    """Control points (C, d) of the curves nearest to points y (N, d), weighted (N,); ends (N,): points to pass."""
+    N = _basis(layout.knots[layout.interval], layout.u)
+    first = layout.control[layout.interval]
+    w = np.where(ends, _ENDS, weight)
+    bands = np.zeros((4, layout.count))
+    right = np.zeros((layout.count, y.shape[1]))
+    for j in range(4):
+        wj = w * N[:, j]
+        for k in range(j, 4):
+            bands[k - j] += np.bincount(first + j, wj * N[:, k], layout.count)
+        for d in range(y.shape[1]):
+            right[:, d] += np.bincount(first + j, wj * y[:, d], layout.count)
+    _add_ridge(layout, bands)
+    return banded(bands, right)
+
+
+def _add_ridge(layout: Layout, bands: Array) -> None:
+    """Add a small share of the squared bends of the control polygons, three control points after another."""
+    t = layout.knots
+    # Greville's places of an interval's four control points: means of three knots each
+    place = np.stack([t[:, k : k + 3].mean(axis=1) for k in range(4)], axis=1)
+    starts = np.append(True, layout.curve[1:] != layout.curve[:-1])
+    for k in (0, 1):
+        some = starts if k == 0 else np.ones(len(t), bool)
+        a, b = place[some, k + 1] - place[some, k], place[some, k + 2] - place[some, k + 1]
+        size = np.minimum(a, b)
+        row = np.stack([size / a, -size / a - size / b, size / b], axis=1)
+        at = layout.control[some] + k
+        for i in range(3):
+            for j in range(i, 3):
+                bands[j - i] += _RIDGE * np.bincount(at + i, row[:, i] * row[:, j], layout.count)
+
+
+def _basis(t: Array, u: Array) -> Array:
+    """The four cubic basis functions at u (N,) within the middle of six knots t (N, 6): (N, 4).
+
+    Source: Piegl and Tiller, The NURBS Book, 1997, algorithm A2.2.
+    """
+    left = [u - t[:, 3 - k] for k in range(4)]  # left[k] = u - t_{j+1-k}
+    right = [t[:, 2 + k] - u for k in range(4)]
+    N = [np.ones(len(u))]
+    for p in range(1, 4):
+        saved = np.zeros(len(u))
+        for r in range(p):
+            part = N[r] / (right[r + 1] + left[p - r])
+            N[r] = saved + right[r + 1] * part
+            saved = left[p - r] * part
+        N.append(saved)
+    return np.stack(N, axis=1)
+
+
+def banded(bands: Array, right: Array) -> Array:
+    """Solve A x = right for a symmetric positive A of few diagonals: bands (b + 1, n), right (n, d) -> (n, d).
+
+    bands[k, i] = A[i, i + k]. As blocks of b rows, A is block tridiagonal.
+    """
+    b, n = len(bands) - 1, bands.shape[1]
+    M = -(-n // b)
+    full = np.zeros((b + 1, (M + 1) * b))
+    full[:, :n] = np.where(np.arange(n) < n - np.arange(b + 1)[:, None], bands, 0.0)
+    full[0, n:] = 1.0
+    D, U = np.zeros((M, b, b)), np.zeros((M, b, b))
+    rows = b * np.arange(M)
+    for i in range(b):
+        for k in range(b + 1):
+            j = i + k
+            if j < b:
+                D[:, i, j] = D[:, j, i] = full[k, rows + i]
+            else:
+                U[:, i, j - b] = full[k, rows + i]
+    rhs = np.zeros((M * b, right.shape[1]))
+    rhs[:n] = right
+    return _block_tridiagonal(D, U[:-1], rhs.reshape(M, b, -1)).reshape(M * b, -1)[:n]
+
+
+def _block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
+    """Symmetric block tridiagonal systems by cyclic reduction: every other block is eliminated, all at once.
+
+    D: (M, k, k); U: (M - 1, k, k) blocks beside the diagonal; b: (M, k, d) -> (M, k, d).
+    """
+    if len(D) == 1:
+        return np.asarray(np.linalg.solve(D, b))
+    k, m = D.shape[1], len(D) // 2  # size of blocks, blocks that go
+    left, right = U[0::2], np.zeros((m, k, k))
+    going = U[1::2]
+    right[: len(going)] = going
+    solved = np.linalg.solve(D[1::2], np.concatenate([left.swapaxes(1, 2), right, b[1::2]], axis=2))
+    a, c, d = solved[..., :k], solved[..., k : 2 * k], solved[..., 2 * k :]
+    D_kept, b_kept, more = D[0::2].copy(), b[0::2].copy(), len(going)
+    D_kept[:m] -= left @ a
+    b_kept[:m] -= left @ d
+    back = going.swapaxes(1, 2)
+    D_kept[1 : 1 + more] -= back @ c[:more]
+    b_kept[1 : 1 + more] -= back @ d[:more]
+    kept = _block_tridiagonal(D_kept, -(left @ c)[:more], b_kept)
+    out = np.empty_like(b)
+    out[0::2] = kept
+    out[1::2] = d - a @ kept[:m]
+    out[1::2][:more] -= c[:more] @ kept[1 : 1 + more]
+    return out

@@ -1,0 +1,156 @@
+"""Points on straight lines, gathered and made one smooth curve within the tolerance; any number of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.model import units
+from armkin.motion import path_numbers
+from armkin.motion.b_spline import Int
+from armkin.motion.fitting import REVERSAL, Fitted, distinct, fitted, turns
+from armkin.motion.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+
+FIT = 0.94  # share of the tolerance: points to curve (chords to curve: less, see `fitting`)
+PLAN = (0.2, 0.05, 0.02)  # curve to motion, whatever the points; the first with which all points are within it
+_FARTHEST_TURN = 5.0  # [rad] that rotation vectors tell from less
+_NAN = float("nan")
+
+
+class Polyline:
+    """Targets in the file's numbers, one after another, from a spot on; each with the speeds of the line to it."""
+
+    def __init__(self, task: Task, first: Spot) -> None:
+        self.task, self.first = task, first
+        self.rows: list[Sequence[float]] = []
+        self.speeds: list[tuple[float, float]] = []  # fraction of the joints' max_speed, tool speed; nan: the path's
+        self._last: tuple[int, Spot] = (0, first)
+
+    def add(self, value: Sequence[float], speed: float | None, tool_speed: float | None) -> None:
+        """One more target. Raises UsageError for one that is none of the task."""
+        if len(value) != self.task.position or len(self.task.labels) == self.task.position:
+            last = path_numbers.target(self.task, self.last, value)
+            self._last = len(self.rows) + 1, last
+        self.rows.append(value)
+        self.speeds.append((_NAN if speed is None else speed, _NAN if tool_speed is None else tool_speed))
+
+    @property
+    def last(self) -> Spot:
+        """The last target."""
+        number, spot = self._last
+        if number < len(self.rows):  # the position alone was given since
+            self._last = len(self.rows), replace(spot, p=np.asarray(self.rows[-1], dtype=float))
+        return self._last[1]
+
+    def pieces(self, tolerance: float) -> list[Piece]:
+        """Smooth curves through all, one between each two places where the way turns back."""
+        spots = _Spots.of(self.task, self.first, self.rows)
+        speeds = np.array(self.speeds)
+        scale = weights(self.task)
+        y = spots.relative(0, len(spots.p) - 1)
+        if y is None:  # the tool turns so far that it is laid line by line
+            return self._lines(spots, speeds)
+        kept = distinct(y * scale)
+        back = 1 + np.flatnonzero(turns(y[kept] * scale) > REVERSAL) if len(kept) > 2 else np.zeros(0, int)
+        made = []
+        for a, b in pairwise([0, *back.tolist(), len(kept) - 1]):
+            numbers = kept[a : b + 1]
+            values = spots.relative(int(numbers[0]), int(numbers[-1]))
+            assert values is not None
+            own = speeds[numbers[1:] - 1]
+            made.append(_piece(self.task, spots, numbers, values[numbers - numbers[0]] * scale, own, tolerance))
+        return made
+
+    def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
+        made = []
+        for k, (speed, tool) in enumerate(speeds.tolist()):
+            one = line(self.task, spots.at(k), spots.at(k + 1))
+            made.append(replace(one, speed=_or_none(speed), tool_speed=_or_none(tool)))
+        return made
+
+
+@dataclass(frozen=True)
+class _Spots:
+    """Spots as arrays."""
+
+    task: Task
+    p: Array  # (N, 2 or 3)
+    sums: Array  # (N, k)
+    turned: Array | None  # (N, 3, 3), (N, 3) or nothing
+
+    @staticmethod
+    def of(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
+        """The first spot, and rows of numbers as the file has them; of the position alone the rest stays."""
+        p = np.array([first.p, *(row[: task.position] for row in rows)], dtype=float)
+        labels, N = task.labels, len(rows) + 1
+        full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
+        since = np.searchsorted(full, np.arange(N), side="right")  # 0: as at first
+        given = units.targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
+        k = len(task.sums)
+        sums = np.zeros((len(full), k)) if given is None or not k else given[:, task.position : task.position + k]
+        turned = None
+        if first.turned is not None:
+            parts = [first.turned[None]]
+            if given is not None and task.orientation == "full":
+                parts.append(given[:, :3, :3])
+            elif given is not None:
+                axis = given[:, task.position + k : task.position + k + 3]
+                parts.append(axis / np.linalg.norm(axis, axis=1, keepdims=True))
+            turned = np.concatenate(parts)[since]
+        return _Spots(task, p, np.concatenate([first.sums[None], sums])[since], turned)
+
+    def at(self, k: int) -> Spot:
+        """One of them."""
+        return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
+
+    def relative(self, a: int, b: int) -> Array | None:
+        """Spots a to b as y of a piece that starts at a, (b - a + 1, d); None: it turns too far for that."""
+        w = np.zeros((b - a + 1, 3))
+        if self.turned is not None and (self.turned[a : b + 1] != self.turned[a]).any():
+            if self.task.orientation == "full":
+                w = vector(self.turned[a : b + 1] @ self.turned[a].T)
+                for k in np.flatnonzero(np.linalg.norm(w, axis=1) > 0.5 * np.pi).tolist():
+                    size = np.linalg.norm(w[k])
+                    other = w[k] * (1 - 2 * np.pi / size)  # the same rotation, the other way round
+                    if k and np.linalg.norm(other - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
+                        w[k] = other
+            else:
+                w = np.array([between(self.task, self.at(a), self.at(k)) for k in range(a, b + 1)])
+            if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
+                return None
+        return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
+
+
+def _piece(task: Task, spots: _Spots, numbers: Int, y: Array, speeds: Array, tolerance: float) -> Piece:
+    """The smooth curve through some of the spots; y: (N, d) [mm]; speeds: (N - 1, 2) of the lines between them."""
+    if len(numbers) == 2:
+        speed, tool = speeds[0].tolist()
+        made = line(task, spots.at(numbers[0]), spots.at(numbers[1]))
+        return replace(made, speed=_or_none(speed), tool_speed=_or_none(tool))
+    curve: Fitted = fitted(y, FIT * tolerance)
+    scale = weights(task)
+
+    def at(v: Array) -> tuple[Array, Array]:
+        values, slopes = curve.values(v)
+        return values / scale, slopes / scale
+
+    made, length = unit_speed(task, spots.at(numbers[0]), at, curve.begin)
+    given = length(curve.at)
+    same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
+    new = np.flatnonzero(np.append(True, ~same.all(axis=1)))
+    dense = Dense(
+        given, spots.p[numbers], length(curve.bends), length(curve.begin), given[new], speeds[new, 0], speeds[new, 1]
+    )
+    return replace(made, dense=dense)
+
+
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else value

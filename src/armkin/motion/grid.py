@@ -1,0 +1,172 @@
+"""Joint values along a route on a grid: exact at its points, as fine as the tolerance needs in between."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.forward import fk, jacobian, position
+from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.model.units import radian_or_reach
+from armkin.motion.linked_branches import chord_bound, levers
+from armkin.motion.time_optimal import Int, Knots, knots
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+    from armkin.motion.route import Route
+
+_TIMES = 16.0  # as many points, at most, where the tolerance needs them
+_ROUNDS = 8  # in which intervals are divided
+_BLOCK = 8192  # points that are looked at together
+_EACH = (8, 64)  # of a section between two bends, at least, with many sections and with few
+_DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
+
+
+def fine_enough(
+    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, tolerance: float | None
+) -> tuple[Knots, list[int], float]:
+    """A grid from length a to b: cubics, numbers of the points where q'' jumps, and how far they may leave the route.
+
+    s, q: samples (N,), (N, n) of the branch. The grid has `number` points, and more in the intervals that may leave
+    the route by more than `tolerance` [mm]; None: whatever they do.
+    """
+    where, breaks = _places(arm, route, s, q, a, b, number)
+    most = _TIMES * len(where)
+    for damping in _DAMPING:
+        for _ in range(_ROUNDS):
+            path = _solved(arm, route, s, q, where, breaks, damping)
+            if tolerance is None:
+                return path, breaks.tolist(), 0.0
+            off = interval_deviations(arm, route, path)
+            if off.max() <= tolerance or len(where) > most:
+                break
+            parts = np.ceil(np.clip(1.1 * np.sqrt(off / tolerance), 1.0, 4.0)).astype(int)
+            beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
+            where, breaks = _divided(where, breaks, np.maximum(parts, 1 + beside))
+        if off.max() <= tolerance:
+            break
+    return path, breaks.tolist(), float(off.max())
+
+
+def _places(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Array, Int]:
+    """Grid points that follow way and joints, and which of them are breaks."""
+    first, last = np.searchsorted(route.breaks, [a + 1e-9, b - 1e-9])
+    edges = np.concatenate([[a], route.breaks[first:last], [b]])
+    moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
+    measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
+    at = np.interp(edges, s, measure)
+    total = max(float(at[-1] - at[0]), 1e-12)
+    each = int(np.clip(2 * number / (len(edges) - 1), *_EACH))
+    share = _MOTION * np.diff(at) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
+    count = np.maximum((number * share).astype(int), each)
+    # places at equal steps of a level that rises with motion and way, in each section between two edges
+    grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
+    level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
+    ends = np.interp(edges, grid, level)
+    begin = np.cumsum(count) - count
+    inside = (np.arange(int(count.sum())) - np.repeat(begin, count)) / np.repeat(count, count)
+    levels = np.repeat(ends[:-1], count) + inside * np.repeat(np.diff(ends), count)
+    where = np.append(np.interp(levels, level, grid), b)
+    where[begin] = edges[:-1]
+    fine = route.spans
+    inside = np.diff(np.searchsorted(fine, where))
+    return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
+
+
+def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
+    """Points (N,) with every interval in so many parts (N - 1,); breaks keep their places."""
+    begin = np.cumsum(parts) - parts
+    f = (np.arange(int(parts.sum())) - np.repeat(begin, parts)) / np.repeat(parts, parts)
+    new = np.repeat(where[:-1], parts) + f * np.repeat(np.diff(where), parts)
+    return np.append(new, where[-1]), begin[breaks]
+
+
+def _solved(arm: Arm, route: Route, s: Array, q: Array, where: Array, breaks: Int, damping: float) -> Knots:
+    """Joint values at the points, exact to the inverse kinematics."""
+    guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
+    return knots(where, corrected(arm, route.task, guess, route.targets(where), damping), breaks.tolist())
+
+
+def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:
+    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
+
+    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
+    round for what is within the tolerance anyway.
+    """
+    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
+    return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
+
+
+def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
+    k, p = len(task.sums), task.position
+    scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
+    scale[:p] = 1 / arm.reach
+    for _ in range(steps):
+        T = fk(arm, q)
+        r = residual(task, T, q * arm.ratio, target) * scale
+        J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
+        J[:, p : p + k] *= arm.ratio
+        J = J * radian_or_reach(arm)
+        H = np.swapaxes(J, 1, 2) @ J + (damping / arm.reach) ** 2 * np.eye(arm.n)
+        step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
+        size = np.abs(step).max(axis=1, keepdims=True)
+        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * radian_or_reach(arm)
+        if size.max() < 1e-12:
+            break
+    return np.asarray(q)
+
+
+def deviation(arm: Arm, route: Route, path: Knots) -> float:
+    """An upper bound of the distance between the tip and the route on a grid's cubics [mm]."""
+    return float(interval_deviations(arm, route, path).max(initial=0.0))
+
+
+def interval_deviations(arm: Arm, route: Route, path: Knots) -> Array:
+    """An upper bound of the distance between the tip and the route in every interval of a grid: (N - 1,) [mm].
+
+    Chord against tip: `chord_bound`; cubic against chord: h^2 / 8 |q''| times the levers; chord against route:
+    its sagitta in the middle of each interval, a third more for what is not symmetrical.
+    """
+    lever = levers(arm)
+    parts = [slice(i, i + _BLOCK + 1) for i in range(0, len(path.s) - 1, _BLOCK)]
+    return np.concatenate([_deviations(arm, route, Knots(path.s[p], path.q[p], path.d[p]), lever) for p in parts])
+
+
+def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:
+    """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
+    s, points = route.given
+    here = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
+    s, points = s[here], points[here]
+    worst: tuple[float, float] | None = None
+    for i in range(0, len(s), _BLOCK):
+        at, given = s[i : i + _BLOCK], points[i : i + _BLOCK]
+        for _ in range(2):  # the nearest place is a little before or behind
+            q, slope = path.at(np.clip(at, path.s[0], path.s[-1]))
+            off = given - position(arm, q)[:, : given.shape[1]]
+            tangent = (np.asarray(jacobian(arm, q)[:, : given.shape[1]]) @ slope[:, :, None])[..., 0]
+            size = np.maximum((tangent**2).sum(axis=1), 1e-300)
+            at = at + np.clip((off * tangent).sum(axis=1) / size, -1.0, 1.0)
+        distance = np.linalg.norm(
+            given - position(arm, path.at(np.clip(at, path.s[0], path.s[-1]))[0])[:, : given.shape[1]], axis=1
+        )
+        k = int(distance.argmax())
+        if worst is None or distance[k] > worst[0]:
+            worst = float(distance[k]), float(s[i + k])
+    return worst
+
+
+def _deviations(arm: Arm, route: Route, path: Knots, lever: Array) -> Array:
+    left, right = path.second()
+    h = path.h[:, None]
+    bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
+    tip = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
+    p = position(arm, path.q)
+    middle = route.targets((path.s[:-1] + path.s[1:]) / 2)
+    full = route.task.orientation == "full"
+    m = middle[:, :3, 3] if full else middle[:, : route.task.position]
+    sagitta = np.linalg.norm(m - ((p[:-1] + p[1:]) / 2)[:, : m.shape[1]], axis=1)
+    return np.asarray(tip + 4 / 3 * sagitta)

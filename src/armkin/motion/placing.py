@@ -1,0 +1,76 @@
+"""Where a drawing stands in an arm's frame, and how the tool is held on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.forward import fk
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.model import units
+from armkin.model.rotation import rpy, transform
+from armkin.path_file.drawing import Placing
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+_IN_PLANE = 1e-6  # sine of the angle between the tool's axis and the arm's plane
+
+
+def placing(arm: Arm, at: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
+    """The frame of a drawing whose zero is `at`: x y z [mm], or with roll pitch yaw [deg].
+
+    The tool points against the drawing's z: its rotation is that of `at`, then half a turn about x. Raises UsageError
+    for a task that cannot hold it so.
+    """
+    definition = task_for(arm, task)
+    if definition.position != 3:
+        raise UsageError(f"a drawing has x, y and z, and task {definition.name} has no z: it cannot lift the tool")
+    numbers = [float(x) for x in at]
+    angles = numbers[3:] or [0.0, 0.0, 0.0]
+    R = transform((0.0, 0.0, 0.0), angles)[:3, :3]
+    tool = R @ np.diag([1.0, -1.0, -1.0])
+    x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in R)
+    return Placing((numbers[0], numbers[1], numbers[2]), (x, y, z), _rest(arm, definition, tool, angles[2]), scale)
+
+
+def _rest(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple[float, ...]:
+    """What follows x y z in a target that holds the tool so."""
+    values = {"yaw": yaw, "roll": 0.0}
+    if task.orientation == "full":
+        values |= dict(zip(("roll", "pitch", "yaw"), units.angles_out(rpy(tool)).tolist(), strict=True))
+    if task.orientation == "axis":
+        values |= dict(zip(("ax", "ay", "az"), tool[:, 2].tolist(), strict=True))
+    if "phi" in task.labels:
+        values["phi"] = _phi(arm, task, tool[:, 2])
+    return tuple(values[label] + 0.0 for label in task.labels[3:])
+
+
+def _phi(arm: Arm, task: Task, axis: Array) -> float:
+    """The pitch [deg] whose tool axis points along `axis`, the same wherever the arm's plane is turned to."""
+    up = arm.base[:3, 2]
+    if np.linalg.norm(np.cross(up, axis)) > _IN_PLANE:
+        raise UsageError(
+            f"task {task.name} holds the tool in the arm's plane, which turns: on a drawing it can only point along "
+            "the base's z; let --at have no tilt"
+        )
+    q = arm.home[None]
+    k = task.labels.index("phi")
+    sum_ = task.sums[k - task.position]
+    now = float(targets_of(task, fk(arm, q), q)[0, k])
+    bent = q.copy()
+    pitch = int(np.flatnonzero(sum_)[-1])
+    bent[0, pitch] += 0.1 / (sum_[pitch] * arm.ratio[pitch])  # phi grows by 0.1
+    first, second = fk(arm, q)[0, :3, 2], fk(arm, bent)[0, :3, 2]
+    normal = np.cross(first, second)
+    if np.linalg.norm(normal) < 1e-6 or abs(float(normal @ axis)) > _IN_PLANE * 0.1:
+        raise UsageError(f"the tool of {arm.name} does not lie in the arm's plane: no pitch points it straight down")
+    normal /= np.linalg.norm(normal)
+    angle = float(np.arctan2(normal @ np.cross(first, axis), first @ axis))
+    return float((np.rad2deg(now + angle) + 180.0) % 360.0 - 180.0)

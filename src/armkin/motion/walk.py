@@ -1,0 +1,310 @@
+"""The moves of a path, one after another: joint moves at once, moves of the tool in groups on one branch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from armkin.errors import NoSolutionError, UsageError
+from armkin.formula.arrays import Array
+from armkin.forward import fk
+from armkin.inverse.branches.names import find
+from armkin.inverse.solutions import Status
+from armkin.inverse.solve import ik
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.model.limits import check_limits, outside, said
+from armkin.motion import branch_report, geometry, path_numbers
+from armkin.motion.branch_path import Pace, carry, stretches
+from armkin.motion.curve import Curve, Smoothed, way_of
+from armkin.motion.dense import FIT, PLAN, Polyline
+from armkin.motion.geometry import Piece, Spot
+from armkin.motion.grid import deviation, missed
+from armkin.motion.path_plan import Marker, PathPlan
+from armkin.motion.plan import approach, straight
+from armkin.motion.profile import at_rest
+from armkin.motion.route import joined
+from armkin.motion.trajectory import Straight, Stretch
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+    from armkin.motion.branch_chains import Run
+    from armkin.motion.route import Route
+    from armkin.path_file import Move, PathFile
+
+_OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What `path` was asked for beside the moves and their pace."""
+
+    task: str | None
+    corner: float | Literal["default"] | None  # blend of corners without their own; None: by the tolerance
+    near: Array | None
+    branch: str | None
+    split: bool
+    samples: int | None
+
+
+class Walk:
+    """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
+
+    _spot: Spot | None = None
+    opening = False  # whether the path's first posture is not chosen yet
+    leads: Move | None = None  # the move of the file that leads to a group's first point
+    at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
+
+    def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, wishes: Wishes) -> None:
+        self.arm, self.file, self.pace, self.wishes = arm, file, pace, wishes
+        with _of_key(file, "task"):
+            self.plan = PathPlan(arm, _task(arm, file, wishes.task or file.task), pace.tolerance, pace.speed)
+        self.q = here  # where the joints are when all so far is done
+        self.made: list[Stretch] = []
+        self.markers: list[Marker] = []  # what happens between stretches
+        self.clear(None)
+
+    @property
+    def task(self) -> Task:
+        """What targets prescribe. Raises UsageError if no task fits the arm."""
+        return self.plan.task or task_for(self.arm, None)
+
+    @property
+    def spot(self) -> Spot:
+        """Where the tool is when all that has gathered is done."""
+        if self.dense is not None:
+            return self.dense.last
+        if self._spot is None:
+            self._spot = geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+        return self._spot
+
+    def clear(self, goal: Spot | None, branch: str | None = None) -> None:
+        """Begin a group: at a target whose branch is free, or where the joints are."""
+        self.goal, self.goal_branch, self.group = goal, branch, self.at
+        self._spot = goal
+        self.pieces: list[Piece] = []
+        self.blends: list[float | None] = []
+        self.dense: Polyline | None = None  # points that have gathered for one curve
+        self.pauses: dict[int, list[tuple[str, Any]]] = {}
+
+    def walked(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
+        """The plan of all moves; kinds: what each kind of them does."""
+        here = self.q
+        with _of_key(self.file, "start"):
+            self._begin()
+        for number, move in enumerate(self.file.moves):
+            self.at = number, number
+            with _of_moves(self):
+                kinds[move.kind](self, move, getattr(move, move.kind))
+        with _of_moves(self):
+            self.close()
+        self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
+        return self.plan.finished(self.begun, self.made, self.markers)
+
+    def _begin(self) -> None:
+        """Where the path begins: where the arm stands, in a posture, or at a point, which the first moves choose."""
+        start = self.file.start
+        value = start if start is None or isinstance(start, str) else start.joints
+        if start is not None and value is None:
+            goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
+            self._reached(goal, None)  # refused here, of this key
+            self.clear(goal)
+            self.opening = True
+        elif value is not None:
+            self.q = path_numbers.joints(self.arm, self.q, value)
+            check_limits(self.arm, self.q[None])
+            self.clear(None)
+        self.begun = self.q
+
+    def lay_dense(self, corner: float | None = None) -> None:
+        """Make the points that have gathered pieces; corner: how their last one is passed."""
+        if self.dense is None:
+            return
+        dense, self.dense = self.dense, None
+        self._spot = dense.last
+        made = dense.pieces(self.pace.tolerance)
+        self.pieces += made
+        self.blends += [*[None] * (len(made) - 1), corner]
+
+    def corner(self, move: Move, inner: bool = False) -> float | None:
+        """How the corner at a move's end is passed: the radius of its blend, None: by the tolerance."""
+        if move.blend is not None:
+            return move.blend
+        if self.wishes.corner == "default":
+            return None if inner else 0.0
+        return self.wishes.corner
+
+    def queue_event(self, kind: str, value: Any) -> None:
+        self.lay_dense()
+        if self.goal is None and not self.pieces:
+            self.emit_event(kind, value)
+        else:
+            self.pauses.setdefault(len(self.pieces), []).append((kind, value))
+
+    def emit_event(self, kind: str, value: Any) -> None:
+        if kind == "wait" and value == "enter":
+            self.markers.append(Marker(len(self.made), "pause", None))
+        elif kind == "wait":
+            self.made.append(Straight(self.q, self.q, at_rest(float(value))))
+        else:
+            self.markers.append(Marker(len(self.made), kind, value))
+
+    def add(self, move: Move, piece: Piece) -> None:
+        speed = None if move.speed is None else move.speed / 100 * self.pace.speed
+        self.group = (self.group if self.goal is not None or self.pieces else self.at)[0], self.at[1]
+        self.lay_dense()
+        self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
+        self.blends.append(self.corner(move))
+        self._spot = piece.last
+
+    def target(self, value: list[float]) -> Spot:
+        return path_numbers.target(self.task, self.spot, value)
+
+    # Groups
+
+    def close(self) -> None:
+        """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
+        now, self.at = self.at, self.group
+        self.lay_dense()
+        self._plan_group()
+        self.at = now
+
+    def _plan_group(self) -> None:
+        if not self.pieces:
+            if self.goal is not None:
+                self.append_joint_move(self._reached(self.goal, self.goal_branch), self.leads)
+                for kind, value in self.pauses.get(0, ()):
+                    self.emit_event(kind, value)
+            self.goal = None
+            return
+        tolerance = self.pace.tolerance
+        pauses = frozenset(self.pauses)
+        route, order = joined(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
+        if route.length < geometry.SMALL:
+            raise UsageError("the tool's way has no length: its points are all the same")
+        free = self.goal is not None
+        near = self.q if self.wishes.near is None else self.wishes.near
+        s, runs = self._runs(route, near, free=free)
+        for k, run in enumerate(runs):
+            if run.first == run.last:
+                continue
+            fixed = self.q if not free and k == 0 else None
+            curves = self._curves(route, s, run, near, fixed)
+            if free or k:
+                self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
+            self.append_curves(route, curves, order)
+            near = self.q
+        for kind, value in self.pauses.get(len(self.pieces), ()):
+            self.emit_event(kind, value)
+        self.plan.length += route.length
+        self.goal = None
+        self.pieces, self.blends, self.pauses = [], [], {}
+
+    def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
+        """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
+        branch = (self.goal_branch or self.wishes.branch) if free else None
+        carried = carry(
+            self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
+            fixed=None if free else self.q, branch=branch, count=self.wishes.samples,
+        )  # fmt: skip
+        branch_report.note(self.plan, carried, near)
+        if not carried.whole and not (self.wishes.split and carried.covered):
+            raise branch_report.refused(self.plan, carried, branch)
+        return carried.columns.s, carried.runs
+
+    def _curves(self, route: Route, s: Array, run: Run, near: Array, fixed: Array | None) -> list[Curve | Smoothed]:
+        """A run in time; a route that is fitted to points leaves the motion little of the tolerance."""
+        if not len(route.given[0]):
+            return stretches(self.arm, route, s, run, near, self.pace, fixed=fixed)
+        for share in PLAN:
+            pace = replace(self.pace, tolerance=share * self.pace.tolerance)
+            made = stretches(self.arm, route, s, run, near, pace, fixed=fixed)
+            if max((missed(self.arm, route, way_of(one)) or (0.0,))[0] for one in made) <= self.pace.tolerance:
+                break
+        return made
+
+    def append_curves(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
+        """Put a run's curves into the plan, with the pauses where they begin."""
+        at = {round(float(route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
+        for curve in curves:
+            path_ = way_of(curve)
+            for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
+                self.emit_event(kind, value)
+            self.plan.along(len(self.made), curve, self.plan.length)
+            self.made.append(curve)
+            self.q = curve.end
+            given = missed(self.arm, route, path_)
+            off = deviation(self.arm, route, path_) if given is None else given[0]
+            if given is not None and off > self.plan.deviation:
+                self.plan.rounded_most = self.plan.length + given[1]
+            self.plan.deviation = max(self.plan.deviation, off)
+            self.plan.nearer_singularity(path_.q, path_.s)
+
+    # Joint moves
+
+    def append_joint_move(self, goal: Array, move: Move | None) -> None:
+        """A joint move to joint values."""
+        bad = np.flatnonzero(outside(self.arm, goal))
+        if len(bad):
+            raise NoSolutionError(f"{said(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
+        speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)
+        if self.opening:  # the path begins here, and what leads here is none of its moves
+            self.begun, self.opening = goal, False
+        else:
+            one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
+            self.made += [one] if one.duration > 0 else []
+        self.q = goal
+
+    def _reached(self, goal: Spot, branch: str | None) -> Array:
+        """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
+        found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
+        meant = find(found.names, wanted) if (wanted := branch or self.wishes.branch) else None
+        free = found.clear if self.arm.keep_out and not self.arm.ignores_keep_out else None
+        for b in found.order:
+            named = meant is None or found.branch[b] in meant
+            if found.valid[b] and found.within_limits[b] and named and (free is None or free[b]):
+                return np.asarray(found.q[b])
+        what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
+        if found.status == Status.UNREACHABLE:
+            raise NoSolutionError(f"{what} is out of reach: nothing was moved")
+        on = f" on branch '{wanted}'" if wanted else ""
+        if free is not None and (found.within_limits & ~free).any():
+            raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
+        raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
+
+
+def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
+    """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
+    try:
+        return task_for(arm, name)
+    except UsageError:
+        if name is None and all(move.kind in _OF_JOINTS for move in file.moves):
+            return None
+        raise
+
+
+@contextmanager
+def _of_key(file: PathFile, key: str) -> Iterator[None]:
+    """Errors inside are said of a key of the file, if it has that."""
+    try:
+        yield
+    except (UsageError, NoSolutionError) as error:
+        if getattr(file, key) is None or not (place := file.place(key)):
+            raise
+        raise error.within(place) from None
+
+
+@contextmanager
+def _of_moves(walk: Walk) -> Iterator[None]:
+    """Errors inside are said of the moves that a walk does then."""
+    try:
+        yield
+    except (UsageError, NoSolutionError) as error:
+        if not (place := walk.file.place_of(*walk.at)):
+            raise
+        raise error.within(place, move=walk.at[0] + 1) from None

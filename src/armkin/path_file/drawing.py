@@ -1,0 +1,132 @@
+"""What foreign files draw, as the moves of a path: points in the file's millimetres, placed in the arm's frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armkin.errors import PathFileError
+from armkin.path_file.model import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
+
+Point = tuple[float, float, float]
+LARGEST = 1e6  # [mm] of a coordinate
+_FULL = 2 * math.pi
+_NO_ARC = 1e-6  # [mm]
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where a drawing stands: its zero and axes in the arm's frame, and what follows x y z in every target."""
+
+    origin: Point  # [mm]
+    axes: tuple[Point, Point, Point]  # rows of the rotation from the drawing's frame to the arm's
+    rest: tuple[float, ...] = ()  # [deg, 1] the tool's orientation, the same everywhere
+    scale: float = 1.0
+
+    def point(self, p: Sequence[float]) -> list[float]:
+        """A point of the drawing in the arm's frame."""
+        x, y, z = p[0] * self.scale, p[1] * self.scale, p[2] * self.scale
+        return [o + a[0] * x + a[1] * y + a[2] * z for o, a in zip(self.origin, self.axes, strict=True)]
+
+    def direction(self, d: Sequence[float]) -> list[float]:
+        """A direction of the drawing in the arm's frame."""
+        return [a[0] * d[0] + a[1] * d[1] + a[2] * d[2] for a in self.axes]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the command line says of a foreign file beside its place."""
+
+    feed: float | None = None  # [mm/s] where the file says none
+    lift: float = 5.0  # [mm] of the pen between strokes of a drawing
+    grip_by: str | None = None  # M3 or M106
+
+
+class Pen:
+    """Draws moves one after another; straight ones of the same speed become one polyline."""
+
+    def __init__(self, placing: Placing) -> None:
+        self.placing = placing
+        self.moves: list[Move] = []
+        self.lines: list[int] = []  # of the file, where each move begins
+        self._open: list[list[float]] | None = None
+        self._speed: float | None = None
+
+    def jump(self, p: Sequence[float], line: int) -> None:
+        """A joint move to a point."""
+        self._add(Move.model_construct({"point"}, point=[*self.placing.point(p), *self.placing.rest]), line)
+
+    def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
+        """A straight line; speed: [mm/s], None: as fast as the joints go."""
+        if self._open is None or speed != self._speed:
+            self._open, self._speed = [], speed
+            own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+            opened = self._open
+            self._add(Move.model_construct({"polyline"}, polyline=opened, **own), line)
+            self._open = opened
+        self._open.append(self.placing.point(p))
+
+    def arc(
+        self, a: Point, centre: Point, b: Point, normal: Point, angle: float, speed: float | None, line: int
+    ) -> None:
+        """An arc or helix from a to b about an axis, by an angle [rad] (positive: right-handed)."""
+        own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+        rise = sum(n * (y - x) for n, x, y in zip(normal, a, b, strict=True))
+        out = [x - c for x, c in zip(a, centre, strict=True)]
+        lift = sum(n * o for n, o in zip(normal, out, strict=True))
+        out = [o - lift * n for o, n in zip(out, normal, strict=True)]
+        radius = math.sqrt(sum(o * o for o in out))
+        if radius < _NO_ARC:
+            self.line(b, speed, line)
+            return
+        base = [x - o for x, o in zip(a, out, strict=True)]
+        if abs(rise) < _NO_ARC and abs(angle) < _FULL - 1e-6:
+            across = _cross(normal, (out[0], out[1], out[2]))
+            end = math.dist(base, b)  # it may differ a little from the radius at the start
+            half, mean = angle / 2, (radius + end) / 2 / radius
+            via = [
+                c + mean * (math.cos(half) * o + math.sin(half) * w) for c, o, w in zip(base, out, across, strict=True)
+            ]
+            made = Arc.model_construct(via=self.placing.point(via), to=self.placing.point(b))
+            self._add(Move.model_construct({"arc"}, arc=made, **own), line)
+            return
+        direction = self.placing.direction(normal)
+        turns, scale = angle / _FULL, self.placing.scale
+        made_circle = Circle.model_construct(
+            centre=self.placing.point(base), normal=direction, turns=turns, rise=rise * scale
+        )
+        self._add(Move.model_construct({"circle"}, circle=made_circle, **own), line)
+
+    def home(self, line: int) -> None:
+        """A joint move home."""
+        self._add(Move.model_construct({"joint"}, joint="home"), line)
+
+    def wait(self, seconds: float, line: int) -> None:
+        """Rest."""
+        self._add(Move.model_construct({"wait"}, wait=seconds), line)
+
+    def pause(self, line: int) -> None:
+        """Rest until Enter."""
+        self._add(Move.model_construct({"wait"}, wait="enter"), line)
+
+    def grip(self, value: str, line: int) -> None:
+        """The gripper."""
+        self._add(Move.model_construct({"grip"}, grip=value), line)
+
+    def _add(self, move: Move, line: int) -> None:
+        self._open = None
+        self.moves.append(move)
+        self.lines.append(line)
+
+    def file(self, name: str, notes: Sequence[str]) -> PathFile:
+        """The path. Raises PathFileError if nothing is drawn."""
+        if not any(move.kind in ("polyline", "arc", "circle") for move in self.moves):
+            raise PathFileError(f"{name}: draws nothing", file=name)
+        lines: dict[tuple[str | int, ...], int] = {("moves", k): line for k, line in enumerate(self.lines)}
+        made = PathFile.model_construct(moves=self.moves, corners="tolerance")
+        return made.read_from(Source(name, lines, notes=tuple(notes)))
+
+
+def _cross(a: Point, b: Point) -> Point:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,272 @@
+"""G-code of slicers, CAM programs and senders as a path: a subset of RS-274, its modal state kept true.
+
+Source of the meanings: Kramer, Proctor and Messina, The NIST RS274NGC Interpreter, 2000, section 3.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from armkin.errors import PathFileError
+from armkin.path_file import gcode_arcs
+from armkin.path_file.drawing import LARGEST, Pen, Placing, Point, Wishes
+from armkin.path_file.gcode_words import Block, blocks, wrong
+from armkin.path_file.model import PathFile
+
+AXES = "XYZ"
+INCH = 25.4
+_MOTION = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3"}
+_PLANES = {17.0: (0, 1, 2), 18.0: (2, 0, 1), 19.0: (1, 2, 0)}  # two axes of the plane, and the one across
+_SYSTEMS = {54.0: 1, 55.0: 2, 56.0: 3, 57.0: 4, 58.0: 5, 59.0: 6}
+_IGNORED_G = {11.0: "G11", 29.0: "G29", 40.0: "G40", 49.0: "G49", 61.0: "G61", 64.0: "G64", 80.0: "G80",
+              91.1: "G91.1", 94.0: "G94"}  # fmt: skip
+_GROUPS: dict[str, tuple[float, ...]] = {
+    "motion": (0.0, 1.0, 2.0, 3.0, 80.0),
+    "plane": (17.0, 18.0, 19.0),
+    "units": (20.0, 21.0),
+    "distance": (90.0, 91.0),
+    "coordinate system": tuple(_SYSTEMS),
+    "one-line": (4.0, 10.0, 28.0, 52.0, 92.0, 29.0, 11.0),
+}
+_GROUP = {code: group for group, codes in _GROUPS.items() for code in codes}
+_KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
+
+
+def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
+    """The path of a program. Raises PathFileError with line and word for what is refused."""
+    if b"\0" in raw:
+        raise PathFileError(f"{name}: is no text; binary G-code must be written as text", file=name)
+    program = _Program(name, Pen(placing), wishes)
+    program.run(blocks(raw.decode("utf-8-sig", "replace"), name))
+    notes = [
+        f"{word} is ignored (line {program.first[word]}{f', and {n - 1} more' if n > 1 else ''})"
+        for word, n in program.ignored.items()
+    ]
+    return program.pen.file(name, notes)
+
+
+class _Program:
+    """The modal state of a machine that reads a program."""
+
+    def __init__(self, name: str, pen: Pen, wishes: Wishes) -> None:
+        self.name, self.pen, self.wishes = name, pen, wishes
+        self.at = [0.0, 0.0, 0.0]  # [mm] in the machine's coordinates
+        self.drawn = False  # whether the pen is at the file's point
+        self.motion: float | None = None
+        self.plane, self.unit, self.absolute = 17.0, 1.0, True
+        self.feed: float | None = None  # [mm/min]
+        self.system = 1
+        self.systems = {number: [0.0, 0.0, 0.0] for number in range(1, 7)}
+        self.local, self.shift = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]  # G52, G92
+        self.held: bool | None = None
+        self.ignored: Counter[str] = Counter()
+        self.first: dict[str, int] = {}
+        self.block = Block(0, ())
+
+    def run(self, program: Iterable[Block]) -> None:
+        """Read lines until the program's end."""
+        for self.block in program:
+            if self._line():
+                return
+
+    def _wrong(self, text: str) -> PathFileError:
+        return wrong(self.name, self.block.line, text)
+
+    def _ignore(self, word: str) -> None:
+        self.ignored[word] += 1
+        self.first.setdefault(word, self.block.line)
+
+    def _line(self) -> bool:
+        """One line, in RS-274's order of execution; True: the program ends."""
+        codes, m_codes, values = self._sorted()
+        if "F" in values:
+            self.feed = values.pop("F") * self._unit_after(codes)
+            if self.feed < 0:
+                raise self._wrong("F below 0 is no feed")
+        gripped = values.get("S")
+        for code in m_codes:
+            if code not in (0.0, 1.0, 2.0, 30.0):
+                self._switch(code, gripped)
+        values.pop("S", None)
+        if 4.0 in codes:
+            self._dwell(values, gripped)
+        self._modes(codes)
+        for code in codes:
+            if code in _IGNORED_G:
+                self._ignore(_IGNORED_G[code])
+                if code in (29.0, 11.0):
+                    values.clear()
+                if code == 64.0:
+                    values.pop("P", None)
+        self._offsets_and_motion(codes, values)
+        if values:
+            letter = next(iter(values))
+            raise self._wrong(f"{letter} belongs to no word of this line")
+        for code in m_codes:
+            if code in (0.0, 1.0):
+                self.pen.pause(self.block.line)
+        return bool({2.0, 30.0} & set(m_codes))
+
+    def _sorted(self) -> tuple[list[float], list[float], dict[str, float]]:
+        """The line's G and M codes, and its other words."""
+        codes: list[float] = []
+        m_codes: list[float] = []
+        values: dict[str, float] = {}
+        groups: dict[str, str] = {}
+        for letter, number, word in self.block.words:
+            if letter == "G":
+                code = round(number, 2)
+                if code not in _KNOWN_G:
+                    raise self._wrong(f"{word} is not known")
+                group = _GROUP.get(code)
+                if group is not None and group in groups:
+                    raise self._wrong(f"{groups[group]} and {word} stand on one line")
+                if group is not None:
+                    groups[group] = word
+                codes.append(code)
+            elif letter == "M":
+                m_codes.append(number)
+            elif letter in "TE":
+                self._ignore(letter)
+            elif letter in values:
+                raise self._wrong(f"{letter} stands twice on one line")
+            else:
+                values[letter] = number
+        return codes, m_codes, values
+
+    def _unit_after(self, codes: list[float]) -> float:
+        return INCH if 20.0 in codes else 1.0 if 21.0 in codes else self.unit
+
+    def _switch(self, code: float, speed: float | None) -> None:
+        """An M word: the gripper's, or ignored."""
+        by, close = self.wishes.grip_by, None
+        if by == "M3" and code in (3.0, 4.0, 5.0):
+            close = code != 5.0
+        elif by == "M106" and code in (106.0, 107.0):
+            close = code == 106.0 and speed != 0
+        if close is None:
+            self._ignore(f"M{code:g}")
+        elif close != self.held:
+            self.held = close
+            self.pen.grip("closed" if close else "open", self.block.line)
+
+    def _dwell(self, values: dict[str, float], seconds: float | None) -> None:
+        """G4 with P or S, both in seconds."""
+        time = values.pop("P", seconds)
+        if time is None:
+            time = 0.0
+        if not 0 <= time <= 86400:
+            raise self._wrong(f"G4 waits 0 to 86400 seconds, not {time:g}")
+        if time > 0:
+            self.pen.wait(time, self.block.line)
+
+    def _modes(self, codes: list[float]) -> None:
+        for code in codes:
+            if code in _PLANES:
+                self.plane = code
+            elif code in (20.0, 21.0):
+                self.unit = INCH if code == 20.0 else 1.0
+            elif code in (90.0, 91.0):
+                self.absolute = code == 90.0
+            elif code in _SYSTEMS:
+                self.system = _SYSTEMS[code]
+            elif code == 80.0:
+                self.motion = None
+            elif code in _MOTION:
+                self.motion = code
+
+    def _offsets_and_motion(self, codes: list[float], values: dict[str, float]) -> None:
+        if 28.0 in codes:
+            for letter in AXES:
+                values.pop(letter, None)
+            self.pen.home(self.block.line)
+            self.at, self.drawn = [0.0, 0.0, 0.0], False
+        elif 10.0 in codes:
+            self._set_system(values)
+        elif 52.0 in codes or 92.0 in codes:
+            self._set_shift(values, 52.0 in codes)
+        elif any(letter in values for letter in "XYZIJKR"):
+            if 4.0 in codes or 29.0 in codes:
+                raise self._wrong("an axis' word beside G4")
+            self._move(values, machine=53.0 in codes)
+
+    def _set_system(self, values: dict[str, float]) -> None:
+        """G10: L2 sets a system's zero, L20 so that the present point has these values; without L a retraction."""
+        kind = values.pop("L", None)
+        if kind is None:
+            self._ignore("G10")
+            values.clear()
+            return
+        if kind not in (2.0, 20.0):
+            raise self._wrong(f"G10 L{kind:g} is not known; L2 and L20 are")
+        number = int(values.pop("P", 0.0)) or self.system
+        if number not in self.systems:
+            raise self._wrong(f"G10 P{number} is no coordinate system; 1 to 6 are")
+        zero = self.systems[number]
+        for k, letter in enumerate(AXES):
+            if letter in values:
+                value = values.pop(letter) * self.unit
+                zero[k] = value if kind == 2.0 else self.at[k] - self.local[k] - self.shift[k] - value
+
+    def _set_shift(self, values: dict[str, float], local: bool) -> None:
+        """G52 sets a local zero, G92 one so that the present point has these values."""
+        word = "G52" if local else "G92"
+        given = [(k, values.pop(letter) * self.unit) for k, letter in enumerate(AXES) if letter in values]
+        if not given and not any(letter == "E" for letter, *_ in self.block.words):
+            raise self._wrong(f"{word} needs X, Y or Z")
+        zero = self.systems[self.system]
+        for k, value in given:
+            if local:
+                self.local[k] = value
+            else:
+                self.shift[k] = self.at[k] - zero[k] - self.local[k] - value
+
+    def _goal(self, values: dict[str, float], machine: bool) -> Point:
+        zero, goal = self.systems[self.system], list(self.at)
+        for k, letter in enumerate(AXES):
+            if letter in values:
+                value = values.pop(letter) * self.unit
+                if machine:
+                    goal[k] = value
+                elif self.absolute:
+                    goal[k] = zero[k] + self.local[k] + self.shift[k] + value
+                else:
+                    goal[k] += value
+                if not abs(goal[k]) <= LARGEST:
+                    raise self._wrong(f"{letter}{value:g} is farther away than {LARGEST:g} mm")
+        return goal[0], goal[1], goal[2]
+
+    def _move(self, values: dict[str, float], machine: bool) -> None:
+        if self.motion is None:
+            raise self._wrong("axes' words, and neither G0, G1, G2 nor G3 before them")
+        word = _MOTION[self.motion]
+        if machine and self.motion > 1:
+            raise self._wrong(f"G53 goes with G0 and G1, not with {word}")
+        start = self.at[0], self.at[1], self.at[2]
+        goal = self._goal(values, machine)
+        arc = None
+        if self.motion > 1:
+            try:
+                arc = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, start, goal)
+            except gcode_arcs.ArcError as error:
+                raise self._wrong(str(error)) from None
+        line, speed = self.block.line, None if self.motion == 0 else self._speed(word)
+        if arc is not None:
+            if not self.drawn:
+                self.pen.jump(start, line)
+            centre, normal, angle = arc
+            self.pen.arc(start, centre, goal, normal, angle, speed, line)
+        elif not self.drawn:
+            self.pen.jump(goal, line)
+        elif goal != start:
+            self.pen.line(goal, speed, line)
+        self.at, self.drawn = list(goal), True
+
+    def _speed(self, word: str) -> float | None:
+        """The tool's speed [mm/s]; None: as fast as the joints go."""
+        if self.feed is None:
+            return self.wishes.feed
+        if self.feed == 0:
+            raise self._wrong(f"{word} with F0 never arrives")
+        return self.feed / 60

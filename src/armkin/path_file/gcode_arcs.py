@@ -1,0 +1,68 @@
+"""Arcs of G-code: the circle of G2 and G3, by its centre or its radius."""
+
+from __future__ import annotations
+
+import math
+
+from armkin.path_file.drawing import Point
+
+AXES = "XYZ"
+_OFF = (0.005, 0.001, 0.5)  # [mm], of the radius, [mm]: how far an arc's end may lie off its circle
+
+
+class ArcError(ValueError):
+    """What is wrong with an arc, in words."""
+
+
+def arc(
+    word: str, plane: tuple[int, int, int], values: dict[str, float], unit: float, a: Point, b: Point
+) -> tuple[Point, Point, float]:
+    """Centre, normal and angle of G2 or G3 from a to b; takes its words out of `values`.
+
+    plane: its two axes, and the one across; unit: [mm]. Raises ArcError.
+    """
+    x, y, across = plane
+    normal = [0.0, 0.0, 0.0]
+    normal[across] = 1.0
+    sense = -1.0 if word == "G2" else 1.0
+    turns = values.pop("P", 1.0)
+    if turns != int(turns) or not 1 <= turns <= 1000:
+        raise ArcError(f"{word} P{turns:g}: turns are whole, 1 to 1000")
+    offsets = {k: values.pop(letter) * unit for k, letter in enumerate("IJK") if letter in values}
+    if across in offsets:
+        raise ArcError(f"{word} has {'IJK'[across]} in the plane of {AXES[x]} and {AXES[y]}")
+    if "R" in values:
+        if offsets:
+            raise ArcError(f"{word} has R and {'IJK'[next(iter(offsets))]}: one of them")
+        centre = _centre_by_radius(word, plane, values.pop("R") * unit, a, b, sense)
+    elif not offsets:
+        raise ArcError(f"{word} needs {'IJK'[x]}, {'IJK'[y]} or R")
+    else:
+        moved = list(a)
+        for k, value in offsets.items():
+            moved[k] += value
+        centre = moved[0], moved[1], moved[2]
+    u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
+    radius, off = math.hypot(*u), abs(math.hypot(*v) - math.hypot(*u))
+    if off > _OFF[2] or (off > _OFF[0] and off > _OFF[1] * radius):
+        raise ArcError(f"{word} ends {off:.4g} mm off its circle of {radius:.6g} mm")
+    angle = sense * (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % (2 * math.pi)
+    same = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
+    angle = 2 * math.pi if same or angle < 1e-12 else angle
+    return centre, (normal[0], normal[1], normal[2]), sense * (angle + 2 * math.pi * (turns - 1))
+
+
+def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point, b: Point, sense: float) -> Point:
+    """The centre of an arc of radius |r|, above 0 of at most half a turn, below 0 of more."""
+    x, y, _ = plane
+    dx, dy = b[x] - a[x], b[y] - a[y]
+    chord = math.hypot(dx, dy)
+    if chord < 1e-9:
+        raise ArcError(f"{word} with R begins where it ends: a whole circle needs I, J or K")
+    if chord > 2 * abs(r) * (1 + 1e-6) + 2 * _OFF[0]:
+        raise ArcError(f"{word} R{r:g} is shorter than half of its chord of {chord:.6g} mm")
+    rise = math.sqrt(max(r * r - chord * chord / 4, 0.0)) * sense * (1 if r > 0 else -1)
+    centre = list(a)
+    centre[x] += dx / 2 - rise * dy / chord
+    centre[y] += dy / 2 + rise * dx / chord
+    return centre[0], centre[1], centre[2]

@@ -1,0 +1,103 @@
+"""G-code, line by line, as words: a letter and a number each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from armkin.errors import PathFileError
+
+_COMMENT = re.compile(r"\([^()]*\)")
+_WORD = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_CHECKSUM = re.compile(r"\*\s*([0-9]{1,3})\s*$")
+_OWN_WORDS = re.compile(r"\s*(?:N\s*[0-9]+\s*)?(?:M\s*0*([0-9]+)|T\s*([0-9]+))")
+_MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # of RS-274: the other words of the line stay words
+_LONGEST = 1000  # characters of a line that is not a comment alone
+
+
+@dataclass(frozen=True)
+class Block:
+    """A line of a program: its number in the file, and its words."""
+
+    line: int
+    words: tuple[tuple[str, float, str], ...]  # letter, number, as written
+
+
+def wrong(name: str, line: int, text: str) -> PathFileError:
+    """The error of a line of a file."""
+    return PathFileError(f"{name}:{line}: {text}", file=name, line=line)
+
+
+def blocks(text: str, name: str) -> Iterator[Block]:
+    """The lines that have words, up to a second `%`. Raises PathFileError with line and word."""
+    percents = 0
+    for number, raw in enumerate(text.splitlines(), 1):
+        if raw.strip() == "%":
+            percents += 1
+            if percents == 2:
+                return
+            continue
+        line = raw.split(";", 1)[0] if ";" in raw else raw
+        if "(" in line or ")" in line:
+            line = _COMMENT.sub(" ", line)
+            if "(" in line or ")" in line:
+                raise wrong(name, number, "a comment's bracket ( or ) has no partner")
+        if not line or line.isspace():
+            continue
+        if "*" in line:
+            line = _checked(line, name, number)
+        yield Block(number, _words(line.upper(), name, number))
+
+
+def _checked(line: str, name: str, number: int) -> str:
+    """A line without its checksum: the exclusive or of all bytes before the star."""
+    found = _CHECKSUM.search(line)
+    if found is None:
+        raise wrong(name, number, f"'{line[line.index('*') :].strip()[:20]}' is no checksum: * and a number up to 255")
+    body = line[: found.start()]
+    total = 0
+    for byte in body.encode("utf-8", "replace"):
+        total ^= byte
+    if total != int(found[1]):
+        raise wrong(name, number, f"its checksum is {total}, and it says *{found[1]}: the line was damaged")
+    return body
+
+
+def _words(line: str, name: str, number: int) -> tuple[tuple[str, float, str], ...]:
+    own = _OWN_WORDS.match(line)
+    if own is not None and own[1] is not None and int(own[1]) not in _MACHINE_M:
+        # M201 X500: what follows is the M word's own; of a fan the S counts
+        speed = re.search(r"\bS\s*([0-9.]+)", line[own.end() :])
+        word = ("M", float(own[1]), f"M{int(own[1])}")
+        return (word, ("S", _number(speed[1]), "S")) if speed else (word,)
+    if len(line) > _LONGEST:
+        raise wrong(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
+    packed = "".join(line.split())
+    if packed.startswith("/"):
+        raise wrong(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")
+    out, at = [], 0
+    for found in _WORD.finditer(packed):
+        if found.start() != at:
+            break
+        at = found.end()
+        if found[1] != "N":
+            out.append((found[1], float(found[2]), found[0]))
+    if at < len(packed):
+        rest = packed[at:]
+        if rest[0] in "#=[]" or (len(rest) > 1 and rest[1] in "#["):
+            raise wrong(name, number, f"'{rest[:20]}': expressions, parameters and macros are not known")
+        near = next((one for one in line.split() if not _is_words(one)), rest)
+        raise wrong(name, number, f"'{near[:20]}' is no word of G-code: a letter and a number, such as X10")
+    return tuple(out)
+
+
+def _is_words(text: str) -> bool:
+    return re.fullmatch(f"(?:{_WORD.pattern})+", text) is not None
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 1.0

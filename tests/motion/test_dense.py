@@ -1,0 +1,217 @@
+"""Dense points: one smooth curve that keeps to every point and chord, as fast as where they came from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import UsageError
+from armkin.model.arm import Arm
+from armkin.motion import fitting
+from armkin.motion.b_spline import banded
+from armkin.motion.path_plan import PathPlan
+
+CENTRE = np.array([340.0, 80.0, 300.0])
+CORNER = np.deg2rad(20)
+
+
+@pytest.fixture(scope="module")
+def three_dof() -> Arm:
+    return armkin.load("robots/three_dof.yaml")
+
+
+def circle(count: int, radius: float = 50.0) -> np.ndarray:
+    a = np.linspace(0, 2 * np.pi, count + 1)
+    return np.asarray(CENTRE + radius * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1))
+
+
+def spiral(count: int) -> np.ndarray:
+    a = np.linspace(0, 10 * np.pi, count)
+    return np.asarray(CENTRE + (10 + a)[:, None] * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1))
+
+
+def lissajous(count: int) -> np.ndarray:
+    a = np.linspace(0, 2 * np.pi, count)
+    return np.asarray(CENTRE + 60 * np.stack([np.sin(3 * a), np.sin(2 * a + 0.9), 0 * a], axis=1))
+
+
+def square() -> np.ndarray:
+    return np.asarray(CENTRE + 40 * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]]))
+
+
+def stadium() -> np.ndarray:
+    a = np.linspace(-np.pi / 2, np.pi / 2, 40)
+    bend = np.stack([30 + 20 * np.cos(a), 20 * np.sin(a), 0 * a], axis=1)
+    return np.asarray(CENTRE + np.concatenate([[[-50, -20, 0]], bend, [[-50, 20, 0]]]))
+
+
+def on_path(plan: PathPlan) -> float:
+    """Seconds on the tool's way, without the joint move to it."""
+    return sum(stretch.duration for stretch, _ in plan.on_path.values())
+
+
+def tips(plan: PathPlan) -> np.ndarray:
+    """The executed tip, densely, while it is on the path."""
+    parts = []
+    for number, (stretch, _) in sorted(plan.on_path.items()):
+        begin = plan.motion.begins[number]
+        parts.append(plan.q(np.linspace(begin, begin + stretch.duration, 20_000)))
+    return armkin.fk(plan.arm, np.concatenate(parts))[:, :3, 3]
+
+
+def to_segment(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    f = np.clip((p - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-300), 0, 1)
+    return np.asarray(np.linalg.norm(p - a - f[:, None] * (b - a), axis=1))
+
+
+def sagitta(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    """Of the chord a b, by the circle through it and c."""
+    area = float(np.linalg.norm(np.cross(b - a, c - a))) / 2
+    L, M, N = (float(np.linalg.norm(x)) for x in (b - a, c - b, c - a))
+    if area < 1e-12:
+        return 0.0
+    radius = L * M * N / (4 * area)
+    return radius - float(np.sqrt(max(radius**2 - L**2 / 4, 0.0)))
+
+
+def worst_miss(points: np.ndarray, way: np.ndarray, tolerance: float) -> tuple[float, float]:
+    """The measure: farthest given point from the way, in order; farthest excess of the way beside its chord."""
+    step = np.diff(points, axis=0)
+    unit = step / np.linalg.norm(step, axis=1)[:, None]
+    turned = np.append(0.0, np.arccos(np.clip((unit[1:] * unit[:-1]).sum(axis=1), -1, 1)))
+    size = np.linalg.norm(step, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    u = np.concatenate([[0.0], np.cumsum(size)])
+    far, excess, passed = 0.0, 0.0, [0]
+    for k, p in enumerate(points):
+        near = np.flatnonzero(np.abs(along - u[k] * along[-1] / u[-1]) < max(2.0, 0.01 * u[-1]))
+        near = near[near >= passed[-1]] if len(near) else near
+        d = np.linalg.norm(way[near] - p, axis=1)
+        i = int(near[d.argmin()])
+        distances = [to_segment(p[None], way[j], way[j + 1])[0] for j in (i - 1, i) if 0 <= j < len(way) - 1]
+        far = max(far, float(min(distances)))
+        passed.append(i)
+    for k in range(len(step)):
+        allowed = 0.0
+        for other, corner in ((k - 1, k), (k + 1, k + 1)):
+            if 0 <= other < len(step) and turned[corner] <= CORNER and size[other] >= size[k] / 3:
+                c = points[k - 1] if other < k else points[k + 2]
+                allowed = max(allowed, sagitta(points[k], points[k + 1], c))
+        beside = way[passed[k + 1] : passed[k + 2] + 1]
+        excess = max(excess, float(to_segment(beside, points[k], points[k + 1]).max() - allowed))
+    return far, excess
+
+
+@pytest.mark.parametrize(
+    ("points", "smooth", "share"),
+    [
+        (circle(100), circle(2000), 1.02),
+        (circle(60, 1.0), circle(2000, 1.0), 1.02),
+        (spiral(1500), spiral(15_000), 1.02),
+        (lissajous(400), lissajous(15_000), 1.02),
+        (spiral(1500) + np.random.default_rng(1).uniform(-0.02, 0.02, (1500, 3)), spiral(15_000), 1.05),
+        (square(), square(), 1.0001),
+        (stadium(), stadium(), 1.0001),
+    ],
+    ids=["circle", "small circle", "spiral", "lissajous", "noise", "square", "stadium"],
+)
+def test_dense_points_are_one_curve_within_the_measure(
+    three_dof: Arm, points: np.ndarray, smooth: np.ndarray, share: float
+) -> None:
+    plan = armkin.path(three_dof, points, corners="tolerance")
+    way = tips(plan)
+    far, excess = worst_miss(points, way, plan.tolerance)
+    assert far <= plan.tolerance + 1e-3  # the way is looked at in steps
+    assert excess <= plan.tolerance + 1e-3
+    assert plan.deviation <= plan.tolerance
+    assert far == pytest.approx(plan.deviation, abs=1e-3)
+    assert len(plan.on_path) == 1  # no stop
+    assert on_path(plan) <= share * on_path(armkin.path(three_dof, smooth, corners="tolerance"))
+
+
+def test_the_circle_s_points_take_no_longer_than_the_circle(three_dof: Arm) -> None:
+    exact = {"moves": [{"point": [390, 80, 300]}, {"circle": {"centre": [340, 80, 300]}}]}
+    plan = armkin.path(three_dof, circle(100), corners="tolerance")
+    assert on_path(plan) <= 1.002 * on_path(armkin.path(three_dof, exact))
+
+
+def test_poses_turn_along(tmp_path: Path) -> None:
+    arm = armkin.load("ar4")
+    rows = [[400 + 20 * np.cos(a), 100 + 20 * np.sin(a), 300, 180, 10 * np.sin(a), 0] for a in np.linspace(0, 4, 60)]
+    file = tmp_path / "poses.csv"
+    file.write_text("x,y,z,roll,pitch,yaw\n" + "\n".join(",".join(map(str, row)) for row in rows))
+    plan = armkin.path(arm, file)
+    assert len(plan.on_path) == 1
+    assert plan.deviation <= plan.tolerance
+    T = armkin.fk(arm, plan.q(plan.duration))
+    assert T[:3, 3] == pytest.approx(rows[-1][:3], abs=1e-3)
+    assert np.rad2deg(np.arcsin(-T[2, 0])) == pytest.approx(rows[-1][4], abs=1e-3)
+
+
+def test_the_order_of_what_says_how_corners_are_passed(three_dof: Arm) -> None:
+    moves = [{"point": [390, 80, 300]}, {"line": [390, 100, 300]}, {"line": [370, 100, 300], "blend": 0}]
+    moves.append({"line": [370, 80, 300]})
+
+    def stops(**options: object) -> int:
+        head = {key: options.pop(key) for key in ("head_corners", "head_blend") if key in options}
+        file = {"moves": moves, **{key[5:]: value for key, value in head.items()}}
+        return len(armkin.path(three_dof, file, **options).on_path) - 1  # type: ignore[arg-type]
+
+    assert stops() == 2
+    assert stops(corners="tolerance") == 1  # a corner's own blend comes first
+    assert stops(head_corners="tolerance") == 1
+    assert stops(head_corners="tolerance", corners="stop") == 2
+    assert stops(head_blend=2.0) == 1
+    assert stops(head_blend=2.0, head_corners="stop") == 2
+    assert stops(head_blend=2.0, corners="blend") == 1
+    with pytest.raises(UsageError, match="give one of them"):
+        stops(corners="stop", blend=2.0)
+    with pytest.raises(UsageError, match="corners: blend needs a radius"):
+        stops(corners="blend")
+    with pytest.raises(UsageError, match="corners 'round' is none of stop, blend, tolerance"):
+        stops(corners="round")
+
+
+def test_csv_of_targets_is_dense_unless_it_has_blends(three_dof: Arm, tmp_path: Path) -> None:
+    file = tmp_path / "corners.csv"
+    file.write_text("x,y,z\n390,80,300\n390,100,300\n370,100,300\n")
+    assert len(armkin.path(three_dof, file).on_path) == 1
+    assert len(armkin.path(three_dof, file, corners="stop").on_path) == 2
+    file.write_text("x,y,z,blend\n390,80,300,0\n390,100,300,0\n370,100,300,0\n")
+    assert len(armkin.path(three_dof, file).on_path) == 2
+
+
+def test_a_blend_that_does_not_fit_is_made_smaller(three_dof: Arm) -> None:
+    moves = [{"point": [390, 80, 300]}, {"line": [390, 81.5, 300]}, {"line": [370, 81.5, 300]}]
+    plan = armkin.path(three_dof, {"moves": moves, "blend": 5})
+    assert (plan.reduced.count, plan.reduced.wished) == (1, 5.0)
+    assert plan.reduced.became == pytest.approx(0.75)
+    assert len(plan.on_path) == 1
+
+
+def test_a_spline_takes_many_points(three_dof: Arm) -> None:
+    points = spiral(5000).tolist()
+    plan = armkin.path(three_dof, {"moves": [{"point": points[0]}, {"spline": points[1:]}]})
+    assert plan.deviation <= plan.tolerance
+
+
+def test_a_banded_system_is_solved() -> None:
+    rng = np.random.default_rng(3)
+    for n in (1, 2, 3, 4, 17, 64):
+        bands = rng.normal(size=(4, n)) * 0.3
+        bands[0] += 3
+        A = sum(np.diag(bands[k, : n - k], k) + (np.diag(bands[k, : n - k], -k) if k else 0) for k in range(min(4, n)))
+        b = rng.normal(size=(n, 2))
+        np.testing.assert_allclose(banded(bands, b), np.linalg.solve(A, b), atol=1e-12)
+
+
+def test_noise_is_no_corner_and_a_small_square_is() -> None:
+    rng = np.random.default_rng(5)
+    x = np.linspace(0, 10, 200)
+    noisy = np.stack([x, rng.uniform(-0.02, 0.02, 200), 0 * x], axis=1)
+    assert not fitting.corners(noisy, 0.05).any()
+    small = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
+    assert fitting.corners(small, 0.05).tolist() == [False, True, True, False]

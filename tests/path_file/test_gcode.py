@@ -1,0 +1,172 @@
+"""G-code: the path that an independent reading of RS-274 draws, or a refusal with line and word."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import PathFileError, UsageError
+from armkin.inverse.tasks.fitting import task_for
+from armkin.model import units
+from armkin.motion.placing import placing
+from armkin.path_file import gcode
+from armkin.path_file.drawing import Placing, Wishes
+from command_line import run
+
+AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+def moves(text: str, **wishes: Any) -> list[tuple[str, Any]]:
+    """Kinds and values of the moves, polylines and targets rounded."""
+    out: list[tuple[str, Any]] = []
+    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, Wishes(**wishes)).moves:
+        value = getattr(move, move.kind)
+        if move.kind in ("polyline", "point"):
+            value = np.round(value, 6).tolist()
+        out.append((move.kind, value))
+    return out
+
+
+def ends(text: str) -> list[list[float]]:
+    """Where each line ends, the jump to the first point included."""
+    out: list[list[float]] = []
+    for kind, value in moves(text):
+        out += [value] if kind == "point" else value if kind == "polyline" else []
+    return out
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("G0 X1 Y2\nG1 X3 F60", [[1, 2, 0], [3, 2, 0]]),
+        ("G21 G90 G0 X0\nG91 G1 X1\nX1 Y1", [[0, 0, 0], [1, 0, 0], [2, 1, 0]]),
+        ("G20\nG0X1\nG1Y1", [[25.4, 0, 0], [25.4, 25.4, 0]]),
+        ("G92 X10\nG0 X10\nG1 X11 Y1", [[0, 0, 0], [1, 1, 0]]),
+        ("G10 L2 P2 X5 Y6\nG55 G0 X0 Y0\nG1 X1\nG54 X0", [[5, 6, 0], [6, 6, 0], [0, 6, 0]]),
+        ("G0 X7\nG10 L20 P1 X2\nG1 X3", [[7, 0, 0], [8, 0, 0]]),
+        ("G52 X3\nG0 X0\nG1 X1\nG52 X0\nX1", [[3, 0, 0], [4, 0, 0], [1, 0, 0]]),
+        ("G10 L2 P1 X5\nG0 X0\nG53 G1 X1 Y1\nX0", [[5, 0, 0], [1, 1, 0], [5, 1, 0]]),
+        ("%\nN1 G00 X+1. Y-.5 (move)\nN2 G01 X 2 ; end\n%\nG1 X99", [[1, -0.5, 0], [2, -0.5, 0]]),
+        ("G1 X1 F60\nG1 X2 M30\nG1 X3", [[1, 0, 0], [2, 0, 0]]),
+        ("N3 T0*57\nG1 X5 Y2\nG1 X6", [[5, 2, 0], [6, 2, 0]]),
+        ("M201 X500 Y500\nM117 Hello World\ng1 x1\ng1 x2", [[1, 0, 0], [2, 0, 0]]),
+        ("G0 X5\nG28 X0\nG0 X1\nG1 X2", [[5, 0, 0], [1, 0, 0], [2, 0, 0]]),
+    ],
+)
+def test_modal_state_is_that_of_rs_274(text: str, points: list[list[float]]) -> None:
+    assert ends(text) == points
+
+
+@pytest.mark.parametrize(
+    ("text", "via", "to"),
+    [
+        ("G0 X10 Y0\nG3 X0 Y10 I-10 J0", (10 / math.sqrt(2), 10 / math.sqrt(2), 0), (0, 10, 0)),
+        ("G0 X10 Y0\nG2 X0 Y10 I-10 J0", (-10 / math.sqrt(2), -10 / math.sqrt(2), 0), (0, 10, 0)),
+        ("G0 X10 Y0\nG3 X0 Y10 R10", (10 / math.sqrt(2), 10 / math.sqrt(2), 0), (0, 10, 0)),
+        ("G0 X10 Y0\nG3 X0 Y10 R-10", (10 + 10 / math.sqrt(2), 10 + 10 / math.sqrt(2), 0), (0, 10, 0)),
+        ("G18 G0 X10 Z0\nG3 X0 Z-10 I-10 K0", (10 / math.sqrt(2), 0, -10 / math.sqrt(2)), (0, 0, -10)),
+        ("G19 G0 Y10 Z0\nG3 Y0 Z10 J-10 K0", (0, 10 / math.sqrt(2), 10 / math.sqrt(2)), (0, 0, 10)),
+    ],
+)
+def test_arcs(text: str, via: tuple[float, ...], to: tuple[float, ...]) -> None:
+    kind, value = moves(text)[-1]
+    assert kind == "arc"
+    assert value.via == pytest.approx(via, abs=1e-9)
+    assert value.to == pytest.approx(to, abs=1e-9)
+
+
+def test_circles_and_helices() -> None:
+    kind, value = moves("G0 X10 Y0\nG2 I-10 Z6 P2")[-1]
+    assert (kind, value.turns, value.rise) == ("circle", -2.0, 6.0)
+    assert value.centre == [0, 0, 0]
+    assert value.normal == [0, 0, 1]
+
+
+def test_events_and_speeds() -> None:
+    text = "G0 X1\nM3 S1000\nG1 X2 F120\nX3 F240\nM4\nG4 P0.5\nG4 S2\nM5\nM0\nG0 X4\nG28"
+    file = gcode.parse(text.encode(), "t.nc", AS_IT_IS, Wishes(grip_by="M3"))
+    found = [(move.kind, move.tool_speed) for move in file.moves]
+    assert found == [
+        ("point", None), ("grip", None), ("polyline", 2.0), ("polyline", 4.0), ("wait", None), ("wait", None),
+        ("grip", None), ("wait", None), ("polyline", None), ("joint", None),
+    ]  # fmt: skip
+    assert [move.grip for move in file.moves if move.grip] == ["closed", "open"]
+    assert [move.wait for move in file.moves if move.wait] == [0.5, 2.0, "enter"]
+    fan = gcode.parse(b"G0 X1\nM106 S255\nG1 X2\nM106 S0\nG1 X3\nM107", "t", AS_IT_IS, Wishes(3.0, grip_by="M106"))
+    assert [move.grip for move in fan.moves if move.grip] == ["closed", "open"]
+    assert {move.tool_speed for move in fan.moves if move.polyline} == {3.0}
+
+
+def test_what_is_ignored_is_noted_once_a_word() -> None:
+    text = "M104 S200\nM104 S210\nT0\nG0 X1 E2\nG1 X2\nG10\nG11\nG40 G49 G61 G80 G94\nG64 P0.1\nG91.1\nG29 P1 X2"
+    notes = gcode.parse(text.encode(), "t", AS_IT_IS, Wishes()).notes
+    words = [note.split()[0] for note in notes]
+    assert words == ["M104", "T", "E", "G10", "G11", "G40", "G49", "G61", "G80", "G94", "G64", "G91.1", "G29"]
+    assert notes[0] == "M104 is ignored (line 1, and 1 more)"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("G0 X1\nG5 X2", "t.gcode:2: G5 is not known"),
+        ("G43 H1", "t.gcode:1: G43 is not known"),
+        ("G0 X1\nG1 X#5", "t.gcode:2: 'X#5': expressions, parameters and macros"),
+        ("#1=5", "expressions, parameters and macros"),
+        ("START_PRINT BED=60", "'START_PRINT' is no word of G-code"),
+        ("G0 X1\nX1 X2", "X stands twice"),
+        ("G0 G1 X1", "G0 and G1 stand on one line"),
+        ("X1", "neither G0, G1, G2 nor G3"),
+        ("G0 X1\nG2 X2", "G2 needs I, J or R"),
+        ("G0 X1\nG2 X2 Y2 R0.1", "shorter than half of its chord"),
+        ("G0 X1\nG2 X1 R5", "begins where it ends"),
+        ("G0 X10\nG2 X0 Y12 I-10", "off its circle"),
+        ("G0 X10\nG2 X0 Y10 I-10 K2", "G2 has K in the plane of X and Y"),
+        ("N1 G0 X1*3", "the line was damaged"),
+        ("G0 X1 (open", "has no partner"),
+        ("G1 X1 F0\nG1 X2", "F0 never arrives"),
+        ("G10 L1 P1 X1", "G10 L1 is not known"),
+        ("G0 X1 H5", "H belongs to no word"),
+        ("G0 X1\nG1 X9999999", "farther away than"),
+        ("(nothing)", "t.gcode: draws nothing"),
+        ("GG0 X1", "is no word of G-code"),
+        ("G0 X1\nG1 X1..5", "is no word of G-code"),
+        ("G4 P-1", "G4 waits 0 to 86400"),
+        ("/G0 X1", "a machine's switch"),
+    ],
+)
+def test_what_is_refused_names_line_and_word(text: str, words: str) -> None:
+    with pytest.raises(PathFileError, match=words):
+        moves(text)
+
+
+def test_the_plan_draws_what_the_program_says(tmp_path: Path) -> None:
+    file = tmp_path / "d.gcode"
+    file.write_text("G21 G90\nG0 X0 Y0 Z2\nG1 Z0 F600\nX40 F3000\nY20\nG3 X30 Y30 I-10 J0\nG1 X0\nY0\nM2\n")
+    found = run("path", "three_dof", file, "--at", "300,0,250", "--json").json
+    assert found["length_mm"] == pytest.approx(2 + 40 + 20 + 5 * math.pi + 30 + 30, abs=0.5)
+    assert found["deviation_mm"] <= 0.05
+    refused = run("path", "three_dof", file)
+    assert refused.code == 2
+    assert "--at X,Y,Z" in refused.err
+    assert "--feed belongs to G-code" in run("path", "three_dof", "--via", "390,80,300", "--feed", "3").err
+
+
+@pytest.mark.parametrize("robot", ["irb120", "wx250s", "labvolt_5150", "xarm6", "so101"])
+def test_the_tool_points_against_the_drawing(robot: str) -> None:
+    arm = armkin.load(robot)
+    place = placing(arm, [300, 0, 50])
+    definition = task_for(arm, None)
+    target = units.targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.rest]])
+    found = armkin.ik(arm, target[0])
+    assert found.valid.any()
+    assert armkin.fk(arm, found.q[found.valid][0])[:3, 2] == pytest.approx([0, 0, -1], abs=1e-6)
+
+
+def test_a_tilt_that_a_pitch_cannot_hold_is_refused() -> None:
+    with pytest.raises(UsageError, match="let --at have no tilt"):
+        placing(armkin.load("labvolt_5150"), [300, 0, 50, 20, 0, 0], task="xyz_pitch_roll")
