@@ -148,7 +148,7 @@ def test_a_million_rows_are_refused_without_being_read() -> None:
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert done.code == 2
-    assert "has more than 200000 rows" in done.err
+    assert "has more than 120000 rows" in done.err
     assert most < 12 * len(rows)
 
 

@@ -11,7 +11,7 @@ arguments.py       negative numbers are no options
 options.py         options that several commands share; completion.py: what Tab offers
 numbers.py         numbers as people write them; unit_notes.py: those that look like metres or radians
 inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or swept
-foreign_path.py    drawings as paths: G-code
+foreign_path.py    drawings as paths: G-code and SVG
 rows.py            many of them in chunks; csv_rows.py: from CSV; pieces.py: shared out; batch.py: their answers
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
 default_port.py    the port; board_link.py: an open machine, signals; trace.py: what is said on it

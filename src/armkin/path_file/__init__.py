@@ -3,6 +3,7 @@
     model.py   keys, types, bounds       messages.py   errors in the file's own words
     table.py   CSV: one row a corner, columns chosen by the header
     drawing.py foreign files as moves: gcode.py (its words: gcode_words.py, its arcs: gcode_arcs.py)
+    svg.py     and SVG (its outlines: svg_shapes.py)
 
 This package imports pydantic and yaml, and is itself imported only when a path is read.
 """
@@ -27,7 +28,7 @@ LARGEST = 32_000_000  # [bytes]
 _KIND = strict_yaml.Kind(
     "path file", "moves", "moves: and a list; rows of CSV belong into a .csv file", 4 * 1024 * 1024, 100_000
 )
-_FOREIGN = {".gcode": "gcode", ".gco": "gcode", ".nc": "gcode", ".ngc": "gcode"}
+_FOREIGN = {".gcode": "gcode", ".gco": "gcode", ".nc": "gcode", ".ngc": "gcode", ".svg": "svg"}
 __all__ = [
     "LARGEST",
     "Move",
@@ -60,6 +61,10 @@ def foreign(name: str) -> str | None:
 def read_drawing(name: str, placing: Placing, wishes: Wishes) -> PathFile:
     """Read G-code or SVG as a path. Raises FileError, or PathFileError with line and word."""
     raw = _bytes(name)
+    if foreign(name) == "svg":
+        from armkin.path_file import svg
+
+        return svg.parse(raw, name, placing, wishes)
     from armkin.path_file import gcode
 
     return gcode.parse(raw, name, placing, wishes)

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 Number = Annotated[float, Field(ge=-1e7, le=1e7)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
-MOST_POINTS = 200_000  # of a polyline or a spline, and of a CSV file
+MOST_POINTS = 120_000  # of a polyline or a spline, and of a CSV file
 LEAST_PERCENT = 0.01
 LEAST_TOOL_SPEED = 1e-3  # [mm/s]
 LEAST_TOLERANCE = 1e-6  # [mm]

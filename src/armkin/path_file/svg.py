@@ -1,0 +1,195 @@
+"""Drawings in SVG as a path: every outline a stroke, the pen lifted in between."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from armkin.errors import PathFileError
+from armkin.path_file.drawing import LARGEST, Pen, Placing, Wishes
+from armkin.path_file.model import MOST_POINTS, PathFile
+from armkin.path_file.svg_shapes import Matrix, Point, ShapeError, length, numbers, outlines, times, transform
+
+_MM = 25.4 / 96  # of a px
+_SHAPES = {"path", "line", "polyline", "polygon", "rect", "circle", "ellipse"}
+_GROUPS = {"svg", "g", "a", "symbol"}
+_REFUSED = {"text", "tspan", "textPath", "image", "foreignObject", "switch"}
+_DEEPEST, _MOST = 64, 200_000  # elements in each other, and in all
+_SAME = 1e-9
+
+
+@dataclass
+class _Element:
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[_Element] = field(default_factory=list)
+
+    def style(self, key: str) -> str | None:
+        """A property, by its attribute or in style."""
+        for one in self.attributes.get("style", "").split(";"):
+            name, _, value = one.partition(":")
+            if name.strip() == key:
+                return value.strip()
+        return self.attributes.get(key)
+
+
+def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
+    """The path of a drawing: x right, y up, zero at the viewBox's lower left corner.
+
+    Raises PathFileError with the line of what is refused.
+    """
+    root = _tree(raw, name)
+    if root.tag != "svg":
+        raise PathFileError(f"{name}: is <{root.tag}>, and no <svg>", file=name)
+    named = {one.attributes["id"]: one for one in _all(root) if "id" in one.attributes}
+    pen = _Drawer(name, Pen(placing), wishes, wishes.lift / placing.scale)
+    try:
+        frame = _frame(root)
+    except ShapeError as error:
+        raise PathFileError(f"{name}:{root.line}: <svg>: {error}", file=name, line=root.line) from None
+    for child in root.children:
+        pen.draw(child, frame, named, 0)
+    pen.lift()
+    return pen.pen.file(name, ())
+
+
+def _tree(raw: bytes, name: str) -> _Element:
+    """The document's elements, their names without prefixes."""
+    parser = expat.ParserCreate()
+    top = _Element("", {}, 0)
+    stack = [top]
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        made = _Element(tag.rpartition(":")[2], attributes, parser.CurrentLineNumber)
+        if tag.partition(":")[0] in ("sodipodi", "inkscape"):
+            made.tag = "metadata"
+        stack[-1].children.append(made)
+        stack.append(made)
+        if len(stack) > 4 * _DEEPEST:
+            raise PathFileError(f"{name}:{made.line}: elements in each other deeper than {4 * _DEEPEST}", file=name)
+
+    def end(_: str) -> None:
+        stack.pop()
+
+    def entity(*_: object) -> None:
+        raise PathFileError(f"{name}:{parser.CurrentLineNumber}: has entities, which are not read", file=name)
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
+    try:
+        parser.Parse(raw.lstrip(), True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise PathFileError(f"{name}: is not XML: {error}", file=name) from None
+    return top.children[0]
+
+
+def _all(element: _Element) -> Iterator[_Element]:
+    yield element
+    for child in element.children:
+        yield from _all(child)
+
+
+def _frame(root: _Element) -> Matrix:
+    """From the drawing's coordinates to millimetres, x right and y up from the viewBox's lower left corner."""
+    sizes = [root.attributes.get(key) for key in ("width", "height")]
+    size = [None if text is None or text.strip().endswith("%") else length(text) for text in sizes]
+    box = numbers(root.attributes.get("viewBox", ""))
+    if box and (len(box) != 4 or box[2] <= 0 or box[3] <= 0):
+        raise ShapeError("viewBox needs x y width height, the last two above 0")
+    if not box:
+        return _MM, 0.0, 0.0, -_MM, 0.0, (size[1] or 0.0) * _MM
+    scales = [None if s is None else s / b for s, b in zip(size, box[2:], strict=True)]
+    sx, sy = scales[0] or scales[1] or 1.0, scales[1] or scales[0] or 1.0
+    if root.attributes.get("preserveAspectRatio", "").split()[:1] != ["none"]:
+        sx = sy = max(sx, sy) if "slice" in root.attributes.get("preserveAspectRatio", "") else min(sx, sy)
+    return sx * _MM, 0.0, 0.0, -sy * _MM, -box[0] * sx * _MM, (box[1] + box[3]) * sy * _MM
+
+
+@dataclass
+class _Drawer:
+    """Draws strokes one after another."""
+
+    name: str
+    pen: Pen
+    wishes: Wishes
+    height: float  # [mm of the drawing] of the lifted pen
+    at: Point | None = None
+    points: int = 0
+    elements: int = 0
+    line: int = 0
+
+    def draw(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+        """An element and all in it; m: from where it stands to millimetres."""
+        self.elements += 1
+        if self.elements > _MOST:
+            raise self._wrong(element, f"is one of more than {_MOST} elements")
+        if depth > _DEEPEST:
+            raise self._wrong(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
+        if element.tag in _REFUSED:
+            raise self._wrong(element, "is not drawn: make its outlines a path first")
+        known = element.tag in _SHAPES or element.tag in _GROUPS or element.tag == "use"
+        if not known or element.style("display") == "none" or element.style("visibility") == "hidden":
+            return
+        for key in ("clip-path", "mask"):
+            if element.style(key) not in (None, "none"):
+                raise self._wrong(element, f"has {key}: cut its outlines off first")
+        if element.tag == "svg":
+            raise self._wrong(element, "stands inside of another <svg>")
+        try:
+            m = times(m, transform(element.attributes.get("transform", "")))
+            if element.tag == "use":
+                shift = (length(element.attributes.get("x")), length(element.attributes.get("y")))
+                self._use(element, times(m, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
+            elif element.tag in _SHAPES:
+                for stroke in outlines(element.tag, element.attributes, m):
+                    self._stroke(element, stroke)
+        except ShapeError as error:
+            raise self._wrong(element, str(error)) from None
+        if element.tag in _GROUPS and (element.tag != "symbol" or depth):
+            for child in element.children:
+                self.draw(child, m, named, depth + 1)
+
+    def _use(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+        href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
+        if href[:1] != "#" or href[1:] not in named:
+            raise self._wrong(element, f"uses '{href[:40]}', which is not in this file")
+        used = named[href[1:]]
+        if used.tag != "symbol":
+            self.draw(used, m, named, depth + 1)
+            return
+        if "viewBox" in used.attributes:
+            raise self._wrong(element, "uses a symbol with a viewBox")
+        for child in used.children:
+            self.draw(child, m, named, depth + 1)
+
+    def _stroke(self, element: _Element, stroke: list[Point]) -> None:
+        self.points += len(stroke)
+        if self.points > MOST_POINTS:
+            raise self._wrong(element, f"is beyond {MOST_POINTS} points: give the drawing in parts")
+        if not all(abs(x) <= LARGEST for p in stroke for x in p):
+            raise self._wrong(element, f"is farther away than {LARGEST:g} mm")
+        line, (x, y) = element.line, stroke[0]
+        if self.at is None:
+            self.pen.jump((x, y, self.height), line)
+        elif abs(self.at[0] - x) + abs(self.at[1] - y) > _SAME:
+            self.lift()
+            self.pen.line((x, y, self.height), None, line)
+        if self.at is None or abs(self.at[0] - x) + abs(self.at[1] - y) > _SAME:
+            self._to((x, y, 0.0), line)
+        for x, y in stroke[1:]:
+            self.pen.line((x, y, 0.0), self.wishes.feed, line)
+        self.at, self.line = stroke[-1], line
+
+    def _to(self, p: tuple[float, float, float], line: int) -> None:
+        if self.height > 0:
+            self.pen.line(p, self.wishes.feed, line)
+
+    def lift(self) -> None:
+        """Lift the pen where it is."""
+        if self.at is not None and self.height > 0:
+            self.pen.line((*self.at, self.height), None, self.line)
+
+    def _wrong(self, element: _Element, text: str) -> PathFileError:
+        where = f"{self.name}:{element.line}: <{element.tag}>"
+        return PathFileError(f"{where} {text}", file=self.name, line=element.line)

@@ -1,0 +1,294 @@
+"""Outlines of SVG's shapes and path data, as points close enough to every curve."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+Point = tuple[float, float]
+Matrix = tuple[float, float, float, float, float, float]  # x' = a x + c y + e, y' = b x + d y + f
+CLOSE = 0.002  # [mm] of a chord to its curve
+_TURN = math.radians(8.0)  # of a curve from chord to chord, at most
+_MOST = 20_000  # chords of one curve
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+_UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "pt": 4 / 3, "pc": 16.0, "q": 96 / 101.6}
+_TRANSFORM = re.compile(r"\s*,?\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
+
+
+class ShapeError(ValueError):
+    """What is wrong with a shape, in words."""
+
+
+def length(text: str | None, default: float = 0.0) -> float:
+    """A length in px."""
+    if text is None:
+        return default
+    found = _NUMBER.match(text.strip())
+    unit = text.strip()[found.end() :].strip().lower() if found else ""
+    if found is None or unit not in _UNITS:
+        raise ShapeError(f"'{text[:20]}' is no length: a number, or one with {', '.join(u for u in _UNITS if u)}")
+    return float(found[0]) * _UNITS[unit]
+
+
+def numbers(text: str) -> list[float]:
+    """Numbers between spaces and commas."""
+    found = _NUMBER.findall(text)
+    if _NUMBER.sub("", text).strip(" ,\t\r\n"):
+        raise ShapeError(f"'{text.strip()[:20]}' has what is no number")
+    return [float(x) for x in found]
+
+
+def times(m: Matrix, n: Matrix) -> Matrix:
+    """First n, then m."""
+    a, b, c, d, e, f = m
+    A, B, C, D, E, F = n
+    return a * A + c * B, b * A + d * B, a * C + c * D, b * C + d * D, a * E + c * F + e, b * E + d * F + f
+
+
+def transform(text: str) -> Matrix:
+    """The matrix of a transform attribute."""
+    whole: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    at = 0
+    while found := _TRANSFORM.match(text, at):
+        at = found.end()
+        whole = times(whole, _one_transform(found[1], numbers(found[2])))
+    if text[at:].strip(" ,\t\r\n"):
+        raise ShapeError(f"transform '{text[at:].strip()[:30]}' is not known")
+    return whole
+
+
+def _one_transform(kind: str, v: list[float]) -> Matrix:
+    n = len(v)
+    if kind == "matrix" and n == 6:
+        return v[0], v[1], v[2], v[3], v[4], v[5]
+    if kind == "translate" and n in (1, 2):
+        return 1.0, 0.0, 0.0, 1.0, v[0], v[1] if n == 2 else 0.0
+    if kind == "scale" and n in (1, 2):
+        return v[0], 0.0, 0.0, v[-1], 0.0, 0.0
+    if kind == "rotate" and n in (1, 3):
+        c, s = math.cos(math.radians(v[0])), math.sin(math.radians(v[0]))
+        x, y = (v[1], v[2]) if n == 3 else (0.0, 0.0)
+        return c, s, -s, c, x - c * x + s * y, y - s * x - c * y
+    if kind in ("skewX", "skewY") and n == 1:
+        t = math.tan(math.radians(v[0]))
+        return (1.0, 0.0, t, 1.0, 0.0, 0.0) if kind == "skewX" else (1.0, t, 0.0, 1.0, 0.0, 0.0)
+    raise ShapeError(f"{kind} has {n} numbers")
+
+
+def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Point]]:
+    """The strokes of an element, transformed to millimetres: points."""
+
+    def size(key: str) -> float:
+        return length(attributes.get(key))
+
+    pen = _Outline(m)
+    if tag == "path":
+        _path(pen, attributes.get("d", ""))
+    elif tag == "line":
+        pen.move((size("x1"), size("y1")))
+        pen.line((size("x2"), size("y2")))
+    elif tag in ("polyline", "polygon"):
+        values = numbers(attributes.get("points", ""))
+        if len(values) % 2:
+            raise ShapeError("points has an odd count of numbers")
+        for k in range(0, len(values), 2):
+            (pen.line if k else pen.move)((values[k], values[k + 1]))
+        if tag == "polygon" and values:
+            pen.close()
+    elif tag in ("circle", "ellipse"):
+        rx = size("r") if tag == "circle" else length(attributes.get("rx", attributes.get("ry")))
+        ry = size("r") if tag == "circle" else length(attributes.get("ry", attributes.get("rx")))
+        if rx > 0 and ry > 0:
+            x, y = size("cx"), size("cy")
+            pen.move((x + rx, y))
+            pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
+            pen.close()
+    elif tag == "rect":
+        _rectangle(pen, size("x"), size("y"), size("width"), size("height"), attributes)
+    return [stroke for stroke in pen.strokes if len(stroke) > 1]
+
+
+def _rectangle(pen: _Outline, x: float, y: float, w: float, h: float, attributes: Mapping[str, str]) -> None:
+    if w <= 0 or h <= 0:
+        return
+    rx = min(length(attributes.get("rx", attributes.get("ry"))), w / 2)
+    ry = min(length(attributes.get("ry", attributes.get("rx"))), h / 2)
+    pen.move((x + rx, y))
+    corners = ((x + w - rx, y + ry, -90), (x + w - rx, y + h - ry, 0), (x + rx, y + h - ry, 90), (x + rx, y + ry, 180))
+    for cx, cy, begin in corners:
+        t = math.radians(begin)
+        pen.line((cx + rx * math.cos(t), cy + ry * math.sin(t)))
+        if rx > 0 and ry > 0:
+            pen.ellipse((cx, cy), rx, ry, 0.0, t, math.pi / 2)
+    pen.close()
+
+
+class _Outline:
+    """Strokes in the element's coordinates, kept transformed."""
+
+    def __init__(self, m: Matrix) -> None:
+        self.m = m
+        self.strokes: list[list[Point]] = []
+        self.at: Point = (0.0, 0.0)
+        self.begun: Point = (0.0, 0.0)
+        self.scale = max(math.hypot(m[0], m[1]), math.hypot(m[2], m[3]), 1e-12)
+        self.open = False
+
+    def move(self, p: Point) -> None:
+        self.at = self.begun = p
+        self.open = False
+
+    def line(self, p: Point) -> None:
+        if not self.open:
+            self.strokes.append([self._placed(self.at)])
+            self.open = True
+        self.strokes[-1].append(self._placed(p))
+        self.at = p
+
+    def close(self) -> None:
+        if self.open:
+            self.line(self.begun)
+        self.at, self.open = self.begun, False
+
+    def bezier(self, a: Point, b: Point, p: Point) -> None:
+        """A cubic to p."""
+        s = self.at
+        bend = max(
+            math.hypot(s[0] - 2 * a[0] + b[0], s[1] - 2 * a[1] + b[1]),
+            math.hypot(a[0] - 2 * b[0] + p[0], a[1] - 2 * b[1] + p[1]),
+        )
+        n = _chords(math.sqrt(6 * bend * self.scale / (8 * CLOSE)), 12 if bend > 1e-12 else 1)
+        for k in range(1, n + 1):
+            t = k / n
+            u = 1 - t
+            w = (u * u * u, 3 * u * u * t, 3 * u * t * t, t * t * t)
+            self.line((
+                w[0] * s[0] + w[1] * a[0] + w[2] * b[0] + w[3] * p[0],
+                w[0] * s[1] + w[1] * a[1] + w[2] * b[1] + w[3] * p[1],
+            ))  # fmt: skip
+
+    def ellipse(self, c: Point, rx: float, ry: float, turned: float, begin: float, angle: float) -> None:
+        """An arc of an ellipse about c, its axes turned [rad], from `begin` over `angle`."""
+        size = max(rx, ry) * self.scale
+        step = min(_TURN, 2 * math.acos(1 - min(CLOSE / size, 1.0))) if size > 0 else _TURN
+        n = _chords(abs(angle) / step, 1)
+        cos, sin = math.cos(turned), math.sin(turned)
+        for k in range(1, n + 1):
+            t = begin + angle * k / n
+            x, y = rx * math.cos(t), ry * math.sin(t)
+            self.line((c[0] + cos * x - sin * y, c[1] + sin * x + cos * y))
+
+    def _placed(self, p: Point) -> Point:
+        a, b, c, d, e, f = self.m
+        return a * p[0] + c * p[1] + e, b * p[0] + d * p[1] + f
+
+
+def _chords(wanted: float, least: int) -> int:
+    if not wanted <= _MOST:
+        raise ShapeError(f"a curve needs more than {_MOST} chords: is the drawing this large?")
+    return max(math.ceil(wanted), least)
+
+
+def _path(pen: _Outline, d: str) -> None:
+    """Path data: both cases of M L H V C S Q T A Z (SVG 1.1, section 8.3)."""
+    command, at, size = "", 0, len(d)
+    bent: tuple[str, Point] | None = None  # the curve before, and its last control point
+    while True:
+        while at < size and d[at] in " ,\t\r\n":
+            at += 1
+        if at >= size:
+            return
+        if d[at].isalpha():
+            command, at = d[at], at + 1
+            if command.upper() not in _COMMANDS or (not pen.strokes and command.upper() != "M" and pen.at == (0, 0)
+                                                    and d.lstrip()[0] not in "Mm"):  # fmt: skip
+                raise ShapeError(f"path data: '{command}' is not known here; it begins with M")
+            if command in "Zz":
+                pen.close()
+                bent = None
+                continue
+        elif command in ("", "Z", "z"):
+            raise ShapeError(f"path data: '{d[at : at + 12]}' stands where a command must")
+        values, at = _values(d, at, command)
+        bent = _command(pen, command, values, bent)
+        if command in "Mm":
+            command = "L" if command == "M" else "l"
+
+
+def _values(d: str, at: int, command: str) -> tuple[list[float], int]:
+    out: list[float] = []
+    for k in range(_COMMANDS[command.upper()]):
+        while at < len(d) and d[at] in " ,\t\r\n":
+            at += 1
+        if command in "Aa" and k in (3, 4):  # flags need no space between them
+            if d[at : at + 1] not in ("0", "1"):
+                raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[at : at + 6]}'")
+            out.append(float(d[at]))
+            at += 1
+            continue
+        found = _NUMBER.match(d, at)
+        if found is None:
+            raise ShapeError(
+                f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[at : at + 12]}'"
+            )
+        out.append(float(found[0]))
+        at = found.end()
+    return out, at
+
+
+def _command(pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point] | None:
+    """Draw one command; returns what a smooth one after it mirrors."""
+    kind, (x, y) = command.upper(), pen.at
+    if command.islower() and kind != "A":
+        shift = {"H": (x,), "V": (y,)}.get(kind, (x, y))
+        v = [value + shift[k % len(shift)] for k, value in enumerate(v)]
+    elif command == "a":
+        v = [*v[:5], v[5] + x, v[6] + y]
+    if kind == "M":
+        pen.move((v[0], v[1]))
+    elif kind in "LHV":
+        pen.line((v[0], v[1]) if kind == "L" else (v[0], y) if kind == "H" else (x, v[0]))
+    elif kind == "A":
+        _arc(pen, v)
+    else:
+        curve = "C" if kind in "CS" else "Q"
+        first = (v[0], v[1])
+        if kind in "ST":
+            before = bent[1] if bent is not None and bent[0] == curve else (x, y)
+            first = (2 * x - before[0], 2 * y - before[1])
+        end = (v[-2], v[-1])
+        if curve == "C":
+            second = (v[-4], v[-3])
+            pen.bezier(first, second, end)
+            return "C", second
+        a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in ((x, y), end))
+        pen.bezier(a, b, end)
+        return "Q", first
+    return None
+
+
+def _arc(pen: _Outline, v: list[float]) -> None:
+    """An elliptical arc by its ends (SVG 1.1, appendix F.6.5)."""
+    (x1, y1), (x2, y2) = pen.at, (v[5], v[6])
+    rx, ry, turned, large, sweep = abs(v[0]), abs(v[1]), math.radians(v[2]), v[3] == 1, v[4] == 1
+    if (x1, y1) == (x2, y2):
+        return
+    if rx == 0 or ry == 0:
+        pen.line((x2, y2))
+        return
+    cos, sin = math.cos(turned), math.sin(turned)
+    dx, dy = (x1 - x2) / 2, (y1 - y2) / 2
+    x, y = cos * dx + sin * dy, -sin * dx + cos * dy
+    grown = (x / rx) ** 2 + (y / ry) ** 2
+    if grown > 1:
+        rx, ry = rx * math.sqrt(grown), ry * math.sqrt(grown)
+    below = rx * rx * y * y + ry * ry * x * x
+    root = math.sqrt(max(rx * rx * ry * ry - below, 0.0) / below) * (-1 if large == sweep else 1)
+    cx, cy = root * rx * y / ry, -root * ry * x / rx
+    begin = math.atan2((y - cy) / ry, (x - cx) / rx)
+    angle = (math.atan2((-y - cy) / ry, (-x - cx) / rx) - begin) % (2 * math.pi)
+    angle = angle if sweep else angle - 2 * math.pi
+    centre = cos * cx - sin * cy + (x1 + x2) / 2, sin * cx + cos * cy + (y1 + y2) / 2
+    pen.ellipse(centre, rx, ry, turned, begin, angle)
