@@ -26,6 +26,7 @@ from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.inverse.workers import check, shared
+from armkin.keep_out.clearance import Clearance, clearance, named
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -74,6 +75,10 @@ class CompiledArm:
         """Position of the tool alone: q (..., n) [rad | mm] -> (..., 3) [mm]."""
         return self._of(None).position(q, workers)
 
+    def clearance(self, q: ArrayLike) -> Clearance:
+        """How far the arm is from hitting anything, as `armkin.clearance`."""
+        return self._of(None).clearance(q)
+
     def ik(
         self, targets: ArrayLike, task: str | None = None, near: ArrayLike | None = None, *, workers: int = 1
     ) -> Solutions:
@@ -105,6 +110,9 @@ class _CompiledTask:
         self._poses, self._points = code.arm_poses, code.arm_points
         for function in (self._poses, self._points):
             function.argtypes, function.restype = [size, *[pointer] * 3], size
+        self._clearances = code.arm_clearances if arm.keep_out and arm.whole is None else None
+        if self._clearances is not None:
+            self._clearances.argtypes, self._clearances.restype = [size, *[pointer] * 4], size
         self.branches = library.branches
         if not self.branches:
             return
@@ -123,6 +131,17 @@ class _CompiledTask:
     def position(self, q: ArrayLike, workers: int) -> Array:
         """Positions (..., 3) of the tool for joint values (..., n)."""
         return self._of_joints(self._points, forward.position, (3,), q, workers)
+
+    def clearance(self, q: ArrayLike) -> Clearance:
+        """Least clearances and their pairs; in Python where C has no table of them, or leaves an angle."""
+        values = forward.as_joints(self.arm, q)
+        if self._clearances is None or not np.isfinite(values).all():
+            return clearance(self.arm, values)
+        flat = np.ascontiguousarray(values.reshape(-1, self.n))
+        mm, which, wild = np.empty(len(flat)), np.empty(len(flat), np.int32), np.empty(len(flat), np.uint8)
+        if self._clearances(len(flat), *(a.ctypes.data for a in (flat, mm, which, wild))):
+            return clearance(self.arm, values)
+        return named(self.arm, mm, which.astype(np.intp), values.shape[:-1])
 
     def _of_joints(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from armkin.export.c import elimination, formulas, kernel, program
+from armkin.export.c import elimination, formulas, keep_outs, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.near_itself import room
@@ -56,6 +56,8 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     parts = [_part("head"), program.settings(), _fast_numbers()]
     parts += [kernel.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
     parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
+    if commanded.keep_out and commanded.whole is None:
+        parts += [keep_outs.clearances(commanded), _part("clearances")]
     if branches:
         assert task is not None
         accepted = ACCEPTED**2

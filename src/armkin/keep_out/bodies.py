@@ -118,7 +118,7 @@ def ends(arm: Arm, q: Array) -> tuple[Array, Array]:
     out = np.empty((2, 3, len(form.owner), len(q)))
     columns = list(np.ascontiguousarray(q.T))
     code = _recorded(arm).get(len(q))
-    found = _ends(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
+    found = ends_formula(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
     for k, entry in enumerate(found):
         segment, rest = divmod(k, 6)
         out[rest // 3, rest % 3, segment] = entry
@@ -127,10 +127,10 @@ def ends(arm: Arm, q: Array) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _recorded(arm: Arm) -> LazyCode:
-    return LazyCode(lambda q: _ends(arm, q), arm.n)
+    return LazyCode(lambda q: ends_formula(arm, q), arm.n)
 
 
-def _ends(arm: Arm, q: list[Entry]) -> list[Entry]:
+def ends_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     """Six numbers a segment: where it begins and where it ends."""
     form = bodies(arm)
     out: list[Entry] = []

@@ -48,6 +48,12 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
     held = _guard(whole)
     mm, which = held.least(full)
+    return named(whole, mm, which, lead)
+
+
+def named(arm: Arm, mm: Array, which: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
+    """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
+    held = _guard(arm)
     bodies, others = (np.array([held.of(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
     return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Out, Robot, TaskName
+from armkin.cli.options import Out, Robot, Scene, TaskName
 from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def export(
     ] = None,
     single: Annotated[bool, typer.Option("--float", help="With --c: 32-bit numbers, for microcontrollers.")] = False,
     task: TaskName = None,
+    scene: Scene = None,
     out: Out = None,
 ) -> None:
     """The arm in other words: URDF, JSON, C, JavaScript, HTML.
@@ -68,7 +69,7 @@ def export(
         raise UsageError("--float goes with --c alone")
     if path is not None and not html:
         raise UsageError("--path goes with --html alone")
-    kinds[asked[0]][1](inputs.load(robot))
+    kinds[asked[0]][1](inputs.load(robot, scene))
 
 
 def _urdf(arm: Arm, out: str | None) -> None:

@@ -49,17 +49,17 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
 
 def forward_kinematics(arm: Arm, single: bool = False) -> str:
     """`arm_pose`, of 16 numbers row by row."""
-    return _of_joints(arm, "arm_pose", forward.tip_formula, "T", single)
+    return of_joints(arm, "arm_pose", forward.tip_formula, "T", single)
 
 
 def position(arm: Arm) -> str:
     """`arm_point`, of 3 numbers."""
-    return _of_joints(arm, "arm_point", forward.point_formula, "p", False)
+    return of_joints(arm, "arm_point", forward.point_formula, "p", False)
 
 
 def jacobian(arm: Arm, single: bool = False) -> str:
     """`arm_slope`, of 6 n numbers row by row."""
-    return _of_joints(arm, "arm_slope", forward.jacobian_formula, "J", single)
+    return of_joints(arm, "arm_slope", forward.jacobian_formula, "J", single)
 
 
 def target(arm: Arm, task: Task, single: bool = False) -> str:
@@ -67,7 +67,8 @@ def target(arm: Arm, task: Task, single: bool = False) -> str:
     return _recorded(formulas.target(arm, task), "arm_goal", "target", single)
 
 
-def _of_joints(arm: Arm, name: str, formula: forward.Formula, out: str, single: bool) -> str:
+def of_joints(arm: Arm, name: str, formula: forward.Formula, out: str, single: bool) -> str:
+    """A function of joint values."""
     return _recorded(recording.record(lambda q: formula(arm, q), arm.n), name, out, single)
 
 

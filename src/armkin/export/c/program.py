@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from armkin import __version__
 from armkin.errors import UsageError
-from armkin.export.c import elimination, formulas, kernel
+from armkin.export.c import elimination, formulas, keep_outs, kernel
 from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
@@ -58,6 +58,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "joints_are": in_comment(joints),
     }
     fields = {
+        "keep_outs": keep_outs.declared(arm) if arm.keep_out else "",
         "guard": f"ARMKIN_{prefix.upper()}_H",
         "real": "float" if single else "double",
         "joints": str(arm.n),
@@ -91,6 +92,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
         part("ik"),
         part("source_tail"),
+        *([keep_outs.clearances(arm, single), keep_outs.free(arm)] if arm.keep_out else []),
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, geometry is named))
     return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
@@ -167,7 +169,7 @@ def filled(text: str, fields: dict[str, str]) -> str:
 
 def _named(text: str, prefix: str) -> str:
     """Public names begin with the robot's, so that two arms fit into one program."""
-    text = re.sub(r"\barm_(fk|jacobian|target|ik|best|names|real|solution)\b", rf"{prefix}_\1", text)
+    text = re.sub(r"\barm_(fk|jacobian|target|ik|best|names|real|solution|free|pairs)\b", rf"{prefix}_\1", text)
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
 
 

@@ -41,7 +41,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *found, in
 
 /* Index of the branch within limits that moves the joints least from near, or -1. */
 int arm_best(const arm_solution *found, int count, const arm_real *near);
-
+@keep_outs@
 #ifdef __cplusplus
 }
 #endif

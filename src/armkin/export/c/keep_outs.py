@@ -1,0 +1,79 @@
+"""Keep-outs in C: the arm's segments as a formula, tables of what they are held against, and the loops over both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.export.c import kernel
+from armkin.export.c.text import part
+from armkin.formula.c_and_js_code import number
+from armkin.keep_out.bodies import ends_formula
+from armkin.keep_out.guard import guard
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_KINDS = {"floor": 0, "box": 1, "capsule": 2}
+_NUMBERS = 15  # of the largest shape
+
+
+def clearances(arm: Arm, single: bool = False) -> str:
+    """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
+    held = guard(arm)
+    form = held.bodies
+
+    def listed(values: Iterable[float]) -> str:
+        return ", ".join(number(float(v), single) for v in values)
+
+    solid = sorted({int(form.owner[k]) for k in held.moving})
+    moving = [n for k in held.moving for n in (int(k), solid.index(int(form.owner[k])))]
+    shapes = [shape.numbers() for _, shape in held.obstacles]
+    rows = [listed([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in shapes]
+    which = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
+    crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in zip(held.ours, held.theirs, which, strict=True)]
+    fields = {
+        "segments": str(len(form.owner)),
+        "moving_count": str(len(held.moving)),
+        "obstacle_count": str(len(shapes)),
+        "crossing_count": str(len(crossings)),
+        "solid": str(len(solid)),
+        "thick": listed(form.radius[form.owner]),
+        "moving": ", ".join(map(str, moving)) or "0",
+        "kinds": ", ".join(str(_KINDS[kind]) for kind, _ in shapes) or "0",
+        "obstacles": ",\n    ".join(f"{{{row}}}" for row in rows) or "{0}",
+        "crossings": ", ".join(crossings) or "{0}",
+        "clearance": number(arm.clearance, single),
+    }
+    text = part("keep_out")
+    for name, value in fields.items():
+        text = text.replace(f"@{name}@", value)
+    return kernel.of_joints(arm, "arm_ends", ends_formula, "e", single) + text
+
+
+def free(arm: Arm) -> str:
+    """`arm_free`, and the names of pairs."""
+    held = guard(arm)
+    names = [held.of(k) for k in range(len(held.pairs))] or [("", "")]
+    pairs = ",\n    ".join("{" + ", ".join(f'"{_quoted(name)}"' for name in pair) + "}" for pair in names)
+    return part("free").replace("@pairs@", pairs)
+
+
+def _quoted(name: str) -> str:
+    """A name as text of C holds it."""
+    plain = name.encode("ascii", "replace").decode()
+    return plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "?\\?")
+
+
+def declared(arm: Arm) -> str:
+    """The lines of the header."""
+    count = max(len(guard(arm).pairs), 1)
+    return f"""
+/* Whether joint values hit none of the keep-outs of the robot file and its scene. clearance: how far the nearest pair
+   is from being hit [mm], negative: a hit; pair: its index into arm_pairs, -1 where nothing counts. Both may be null. */
+int arm_free(const arm_real *q, arm_real *clearance, int *pair);
+
+extern const char *const arm_pairs[{count}][2]; /* a body, and what it is held against */
+"""
