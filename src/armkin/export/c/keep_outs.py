@@ -72,7 +72,7 @@ def declared(arm: Arm) -> str:
     count = max(len(guard(arm).pairs), 1)
     return f"""
 /* Whether joint values hit none of the keep-outs of the robot file and its scene. clearance: how far the nearest pair
-   is from being hit [mm], negative: a hit; pair: its index into arm_pairs, -1 where nothing counts. Both may be null. */
+   is from being hit [mm], negative: a hit; pair: its index into arm_pairs, -1: nothing counts. Both may be null. */
 int arm_free(const arm_real *q, arm_real *clearance, int *pair);
 
 extern const char *const arm_pairs[{count}][2]; /* a body, and what it is held against */
