@@ -142,3 +142,14 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
     assert parts.nearest_singularity is not None
     assert whole.nearest_singularity is not None
     assert parts.nearest_singularity[:2] == pytest.approx(whole.nearest_singularity[:2])
+
+
+def test_a_path_that_begins_on_a_boundary_is_carried_by_the_branches_that_meet_there(three_dof: Arm) -> None:
+    plan = armkin.path(three_dof, {"start": {"joints": [0, 0, 0]}, "moves": [{"line": [400, 10, 170]}]})
+    q, v, a = executed(plan)
+    assert v.max() <= 1.002
+    assert a.max() <= 1.002
+    assert q[0] == pytest.approx([0, 0, 0], abs=1e-9)
+    tip = armkin.fk(three_dof, q)[:, :3, 3]
+    assert np.abs(tip[:, 1:] - [10, 170]).max() < 1e-6
+    assert plan.deviation <= plan.tolerance

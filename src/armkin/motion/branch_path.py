@@ -19,7 +19,7 @@ from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.grid import fine_enough
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.linked_branches import Columns, change, linked
+from armkin.motion.linked_branches import ENDS, Columns, change, chord_bound, levers, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, finer, knots, optimal
 from armkin.motors import motor_accel
@@ -93,6 +93,8 @@ def carry(
     name = route.task.name
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
+    if fixed is not None:
+        all_ = [*all_, *_from_boundary(arm, columns, all_, fixed, tolerance)]
     starts = [c for c in all_ if c.first == 0]
     if fixed is not None:
         apart = [float(np.abs(change(arm, c.q[0], fixed)).max()) for c in starts]
@@ -110,6 +112,21 @@ def carry(
         fastest = min(t for t, *_ in timed)
         return Carried(route, columns, all_, [Run(min(x[1:] for x in timed if x[0] <= fastest * 1.0005)[2], 0, end)])
     return Carried(route, columns, all_, fewest(all_, end + 1, starts))
+
+
+def _from_boundary(arm: Arm, columns: Columns, all_: list[Chain], fixed: Array, tolerance: float) -> list[Chain]:
+    """Branches that begin just behind the route's start and meet the arm's posture there: it stands on a boundary."""
+    found = []
+    for c in all_:
+        if c.first == 0 or columns.s[c.first] > 10 * ENDS:
+            continue
+        step = change(arm, fixed, c.q[0])
+        if float(chord_bound(levers(arm), step)) <= tolerance:
+            share = (columns.s[: c.first] / columns.s[c.first]) ** 0.5  # joints leave a boundary as roots do
+            q = np.concatenate([c.q[0] - (1 - share)[:, None] * step, c.q])
+            labels = np.concatenate([np.repeat(c.labels[:1], c.first), c.labels])
+            found.append(Chain(arm, 0, q, labels))
+    return found
 
 
 def _approach(chain: Chain, end: int, near: Array, fixed: Array | None) -> float:
