@@ -168,5 +168,5 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
 
 
 def test_a_tilt_that_a_pitch_cannot_hold_is_refused() -> None:
-    with pytest.raises(UsageError, match="let --at have no tilt"):
+    with pytest.raises(UsageError, match="without a tilt"):
         placing(armkin.load("labvolt_5150"), [300, 0, 50, 20, 0, 0], task="xyz_pitch_roll")

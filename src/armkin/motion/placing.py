@@ -58,7 +58,7 @@ def _phi(arm: Arm, task: Task, axis: Array) -> float:
     if np.linalg.norm(np.cross(up, axis)) > _IN_PLANE:
         raise UsageError(
             f"task {task.name} holds the tool in the arm's plane, which turns: on a drawing it can only point along "
-            "the base's z; let --at have no tilt"
+            "the base's z; place it without a tilt"
         )
     q = arm.home[None]
     k = task.labels.index("phi")

@@ -224,9 +224,15 @@ class Walk:
         for share in PLAN:
             pace = replace(self.pace, tolerance=share * self.pace.tolerance)
             made = stretches(self.arm, route, s, run, near, pace, fixed=fixed)
-            if max((missed(self.arm, route, way_of(one)) or (0.0,))[0] for one in made) <= self.pace.tolerance:
-                break
-        return made
+            off = max((missed(self.arm, route, way_of(one)) or (0.0,))[0] for one in made)
+            if off <= self.pace.tolerance:
+                return made
+        raise NoSolutionError(
+            f"a given point would lie {off:.4f} mm off the motion, tolerance {self.pace.tolerance:g} mm: give a larger "
+            "tolerance, or fewer points at a time; nothing was moved",
+            deviation_mm=off,
+            tolerance_mm=self.pace.tolerance,
+        )
 
     def append_curves(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
         """Put a run's curves into the plan, with the pauses where they begin."""

@@ -47,7 +47,7 @@ def read(name: str) -> PathFile:
     """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
     if foreign(name):
         raise PathFileError(
-            f"{name}: a drawing says where it stands only with --at X,Y,Z: armkin path ROBOT {name} --at 300,0,50",
+            f"{name}: a drawing does not say where its zero lies in the arm's frame; read_drawing and a place do",
             file=name,
         )
     return parse(_bytes(name), name)

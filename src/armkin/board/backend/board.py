@@ -46,7 +46,7 @@ CAPABILITIES = {
     "calibration": "read LeRobot's calibration files",
     "settings": "compare its settings with the robot file",
     "write_settings": "write those that differ",
-    "recall": "tell where a motion was held: --resume is for boards with armkin's firmware",
+    "recall": "tell where a motion was held: only boards with armkin's firmware can go on with one",
 }
 
 
@@ -244,7 +244,7 @@ class Board(ABC):
     def check_home(self, joints: Sequence[str] = (), *, rest_at_home: bool = False) -> None:
         """Raise UsageError, before a port is opened, for what does not home, or not this arm, or not so."""
         self.need("home")
-        if extra := [*joints, *["--rest-at-home"] * rest_at_home]:
+        if extra := [*joints, *["rest at home"] * rest_at_home]:
             raise UsageError(f"boards of kind {self.kind} home all joints at once: leave {' '.join(extra)} out")
 
     def home(
