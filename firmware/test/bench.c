@@ -143,7 +143,8 @@ void bench_power(void) {
     memset(bench_pins, 0, sizeof bench_pins);
     bench_switches = 0xFF;
     bench_abort = bench_power_level = true;
-    bench_frozen = hal_spilled = false;
+    bench_frozen = false;
+    hal_spilled = 0;
     bench_reset(0);
 }
 

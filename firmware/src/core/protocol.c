@@ -203,7 +203,7 @@ static void watch_line(void) {
     if (!hal_spilled || !answer_fits()) {
         return;
     }
-    hal_spilled = false;
+    hal_spilled = 0;
     if (!session.error) {
         session.detail = E_SPILL;
         send_ack(CREDIT);
