@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
     from armkin.motors import rounding as rounding
+    from armkin.reachability.map import Reach as Reach
+    from armkin.reachability.map import reach as reach
     from armkin.reachability.survey import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
@@ -91,6 +93,8 @@ _HOME = {
     "joints": "motors",
     "pulses": "motors",
     "rounding": "motors",
+    "Reach": "reachability.map",
+    "reach": "reachability.map",
     "workspace": "reachability.survey",
 }
 

@@ -73,6 +73,7 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Pulses, ("pulses", DOF, 0, 130, 0, "--best")),
     (answers.Workspace, ("workspace", DOF, "--samples", 100, "--measure", "step_error")),
     (answers.Workspace, ("workspace", "planar_2dof", "--samples", 100)),
+    (answers.Reach, ("reach", DOF, "--grid", 100, "--azimuths", 12)),
     (answers.Robots, ("robots",)),
     *((answers.Export, ("export", name)) for name in ("three_dof", "stanford", "ra02_screws", "panda")),
     (answers.Ports, ("ports",)),

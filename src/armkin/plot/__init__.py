@@ -4,6 +4,7 @@ canvas.py  matplotlib: figures, axes in true proportion, files
 poses.py   `plot_poses`: branches, a path, a single pose
 path.py    a planned path
 cloud.py   `plot_workspace`: the cloud and its projections
+reach.py   a map of reach, cut twice
 
 The same input gives the same file, to the byte.
 """

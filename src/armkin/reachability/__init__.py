@@ -5,6 +5,12 @@ measures.py  manipulability and step error at a pose
 volume.py    volume or area, with its error
 cloud.py     .csv, .npz, .ply
 survey.py    `workspace`: all of it in one pass of bounded memory
+
+Where, with which orientations, by how many branches:
+
+cells.py     rings of cells about joint 1's axis, and the orientations in each
+answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
+map.py       `reach`: all rings, in chunks, by any engine
 """
 
 from armkin.reachability.survey import Workspace, workspace

@@ -26,6 +26,7 @@ from armkin.cli.answers.arm import Near as Near
 from armkin.cli.answers.arm import Ports as Ports
 from armkin.cli.answers.arm import PulsePositions as PulsePositions
 from armkin.cli.answers.arm import Pulses as Pulses
+from armkin.cli.answers.arm import Reach as Reach
 from armkin.cli.answers.arm import Robots as Robots
 from armkin.cli.answers.arm import Rounded as Rounded
 from armkin.cli.answers.arm import ShippedRobot as ShippedRobot
@@ -64,6 +65,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "ik": (Ik,),
     "pulses": (Pulses,),
     "workspace": (Workspace,),
+    "reach": (Reach,),
     "info": (Info,),
     "robots": (Robots,),
     "export": (Export,),

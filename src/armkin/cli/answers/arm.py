@@ -159,6 +159,20 @@ class Workspace(Head):
     seconds: float
 
 
+class Reach(Head):
+    """Where the arm reaches, with which orientations."""
+
+    task: str
+    cells: int
+    orientations: Annotated[int, "asked in each cell"]
+    answers: Annotated[int, "cells times orientations"]
+    solves: Annotated[int, "poses given to the solver"]
+    method: Annotated[Literal["arcs", "poses"], "by arcs of joint 1 (and the last joint), or pose by pose"]
+    reached: Annotated[int, "cells of which some orientation is reached"]
+    volume_mm3: Annotated[float, "of these cells"]
+    seconds: float
+
+
 _Ends = TypedDict("_Ends", {"from": list[float], "to": list[float]})
 
 

@@ -17,6 +17,7 @@ COMMANDS = {
     "relax": "Switch bus servos off, to move the arm by hand and read it.",
     "zero": "Record where the zero of bus servos is.",
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
+    "reach": "Where the arm reaches, with which orientations.",
     "plot": "A picture of the arm.",
     "teach": "A page in the browser: see the arm, choose a branch, send it.",
     "robots": "The robots that come with armkin, and what each can do.",

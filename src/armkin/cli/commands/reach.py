@@ -1,0 +1,97 @@
+"""`armkin reach`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.numbers import number, whole
+from armkin.cli.options import Cluster, Json, Robot, Scene, Workers
+
+if TYPE_CHECKING:
+    from armkin.cli.answers import Reach as Answer
+    from armkin.reachability.map import Reach
+
+
+def reach(
+    robot: Robot,
+    grid: Annotated[str, typer.Option("--grid", metavar="MM", help="Size of a cell.")] = "50",
+    azimuths: Annotated[str, typer.Option("--azimuths", metavar="M", help="Cells of a ring about joint 1.")] = "36",
+    directions: Annotated[str, typer.Option("--directions", metavar="N", help="Of the tool's z axis.")] = "100",
+    rolls: Annotated[str, typer.Option("--rolls", metavar="L", help="Turns about it.")] = "12",
+    tool_down: Annotated[bool, typer.Option("--tool-down", help="Only with the tool's z axis straight down.")] = False,
+    scene: Scene = None,
+    workers: Workers = 1,
+    cluster: Cluster = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", "-o", metavar="FILE", help="All cells: .npz, .parquet, .csv; after a kill it goes on."),
+    ] = None,
+    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
+    json: Json = False,
+) -> None:
+    """Where the arm reaches, with which orientations.
+
+    Cells are sectors of rings about joint 1's axis, so that one solve answers whole arcs of azimuths and rolls,
+    exactly. Columns: centre, share of orientations, branches, places that one branch alone reaches, measures.
+    """
+    import armkin
+    from armkin.reachability.cells import MOST, Grid
+
+    arm = inputs.load(robot, scene)
+    if plot is not None:  # say what is missing before the work, not after it
+        from armkin.plot import canvas
+
+        canvas.check(plot)
+        canvas.require()
+    step, ring = number(grid, "--grid"), whole(azimuths, "--azimuths", 1, MOST)
+    many, turns = whole(directions, "--directions", 1, MOST), whole(rolls, "--rolls", 1, MOST)
+    cells = len(Grid(arm, step, ring, many, turns, tool_down).rings) * ring
+    with output.progress("cells", cells) as tick:
+        found = armkin.reach(
+            arm,
+            grid=step,
+            azimuths=ring,
+            directions=many,
+            rolls=turns,
+            tool_down=tool_down,
+            out=out,
+            workers=workers,
+            cluster=cluster,
+            progress=tick,
+        )
+    if plot is not None:
+        from armkin.plot.reach import plot_reach
+
+        plot_reach(found, plot)
+    answer = _answer(found)
+    with output.destination(None) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(answer))
+
+
+def _answer(found: Reach) -> Answer:
+    return {
+        **render.head(found.grid.arm),
+        "task": found.grid.task.name,
+        "cells": found.cells,
+        "orientations": found.orientations,
+        "answers": found.answers,
+        "solves": found.solves,
+        "method": "arcs" if found.method == "arcs" else "poses",
+        "reached": found.reached,
+        "volume_mm3": found.volume_mm3,
+        "seconds": found.seconds,
+    }
+
+
+def _text(answer: Answer) -> str:
+    share = 100 * answer["reached"] / answer["cells"]
+    how = "by arcs of joint 1" if answer["method"] == "arcs" else "pose by pose"
+    return (
+        f"{answer['robot']}: {answer['reached']:,} of {answer['cells']:,} cells reached ({share:.1f} %), "
+        f"{answer['volume_mm3'] / 1e9:.4g} m3\n\n"
+        f"{answer['answers']:,} poses (task {answer['task']}, {answer['orientations']:,} orientations a cell) "
+        f"from {answer['solves']:,} solves {how}, in {answer['seconds']:.2f} s\n"
+    )

@@ -1,0 +1,299 @@
+"""What a ring of cells is answered: shares, counts of branches, measures.
+
+One solve stands for many poses. Turning a target about joint 1's axis adds to joint 1 alone, and turning it about the
+tool's z axis adds to the last joint alone where that joint's axis is the tool's z: within real limits each branch of
+one solve is legal on an arc of azimuths and on an arc of rolls. An arc is kept as its first index and its length, and
+as a word of bits, one a roll; the union of the branches' arcs is a few operations on words. Where the axes do not allow
+it, and for targets on an edge, poses are solved one by one, and the same words are filled in from them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import jacobian
+from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.solve import ik
+from armkin.model.limits import SLACK
+from armkin.motors import joints_per_pulse
+from armkin.reachability.cells import STRAIGHT, Grid
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+TURN = 2 * math.pi
+MEASURES = ("manipulability", "limit_margin", "step_error_mm")
+Words = NDArray[np.uint64]
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A grid, and by which arcs it is answered; measures: whether the columns that need Jacobians are filled."""
+
+    grid: Grid
+    measures: bool = True
+
+    @cached_property
+    def arcs(self) -> bool:
+        """Whether joint 1's turn is an arc."""
+        arm = self.grid.arm
+        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and not arm.keep_out
+        return plain and arm.n <= 6 and arm.n == self.grid.task.constraints and not self.grid.down_is_apart
+
+    @cached_property
+    def roll_arcs(self) -> bool:
+        """Whether the last joint's turn is an arc, too: the tool's z axis lies on that joint's axis."""
+        arm, end = self.grid.arm, self.grid.arm.link[-1]
+        on_axis = np.abs(end[:2, 3]).max() <= STRAIGHT * arm.reach and np.abs(end[:2, 2]).max() <= STRAIGHT
+        return self.arcs and self.grid.task.orientation == "full" and not arm.prismatic[-1] and bool(on_axis)
+
+    @cached_property
+    def round_azimuths(self) -> bool:
+        """Whether joint 1 has a copy within limits at every azimuth, so that one stands for all.
+
+        Not with measures, as its distance to the limits differs.
+        """
+        return self.arcs and not self.measures and _whole_turn(self.grid.arm, 0)
+
+    @cached_property
+    def round_rolls(self) -> bool:
+        """Whether the last joint has one at every roll."""
+        return self.roll_arcs and _whole_turn(self.grid.arm, -1)
+
+    @property
+    def solves_a_ring(self) -> int:
+        """Poses that a ring gives to the solver."""
+        g = self.grid
+        return (1 if self.arcs else g.azimuths) * g.directions_count * (1 if self.roll_arcs else g.rolls_count)
+
+    @cached_property
+    def arc_words(self) -> tuple[Words, Words]:
+        """Bits of an arc by length and first index: rolls (L + 1, L, W), azimuths as whole words (M + 1, M, M)."""
+        L = self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1
+        M = self.grid.azimuths if self.arcs and not self.round_azimuths else 1
+        return _packed(_arcs(L)), np.where(_arcs(M), ~np.uint64(0), np.uint64(0))
+
+
+def answered(question: Question, rings: Array) -> dict[str, Array]:
+    """The columns of some rings (R, 2), M rows each, besides x, y, z."""
+    grid, M = question.grid, question.grid.azimuths
+    count = question.solves_a_ring // (1 if question.arcs else M)
+    if question.arcs:
+        at = np.repeat(rings, count, axis=0)
+        azimuth = np.zeros(len(at))
+    else:
+        at = np.repeat(rings, M * count, axis=0)
+        azimuth = np.tile(np.repeat(np.arange(M) * (TURN / M), count), len(rings))
+    each = np.arange(len(at)) % count
+    L = 1 if question.roll_arcs else grid.rolls_count
+    roll = np.asarray((each % L) * (TURN / grid.rolls_count), dtype=float)
+    target = grid.targets(at, azimuth, each // L, roll)
+    found = _Answers(question, target, at, each // L).columns(count)
+    cells = len(rings) * M
+    return {name: values.reshape(cells) for name, values in found.items()}
+
+
+class _Answers:
+    """The answers of S solves, each for M azimuths and W words of rolls (both 1 where they are no arcs)."""
+
+    def __init__(self, question: Question, target: Array, at: Array, direction: NDArray[np.intp]) -> None:
+        self.question, self.grid, self.arm = question, question.grid, question.grid.arm
+        self.at, self.direction = at, direction
+        s = ik(self.arm, target)
+        self.s, self.valid = s, s.valid
+        self.count = self.grid.rolls_count if question.roll_arcs else 1
+        legal = s.within_limits & s.clear if self.arm.keep_out else s.within_limits
+        rolls, turns = question.arc_words
+        S, B = s.valid.shape
+        if question.arcs:
+            last = self.arm.n - 1 if question.roll_arcs else self.arm.n
+            inner = s.valid & _inside(self.arm, s.q, range(1, last))
+            first, length = _arc(self.arm, s.q[:, :, 0], 0, turns.shape[1], 1)
+            self.azimuths = turns[np.where(inner, length, 0), first]  # (S, B, M)
+            self.rolls = np.full((S, B, 1), np.uint64(1))
+            if question.roll_arcs:
+                sense = 1 if self.arm.link[-1][2, 2] > 0 else -1
+                first, length = _arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
+                self.rolls = rolls[length, first]
+        else:
+            self.azimuths = np.where(legal, ~np.uint64(0), np.uint64(0))[:, :, None]
+            self.rolls = np.full((S, B, 1), np.uint64(1))
+
+    def columns(self, orientations: int) -> dict[str, Array]:
+        """Columns (R * M,), so many solves a ring (or a cell)."""
+        once, twice, branches = self._united()
+        weight = self.count if self.question.round_rolls else 1
+        anywhere = np.broadcast_to(np.any(self.valid, axis=1, keepdims=True) * self.count, branches.shape)
+        each = [weight * _bits(once), weight * _bits(once & ~twice), weight * branches, anywhere]
+        each = self._edges([values.astype(float) for values in each])
+        M = self.grid.azimuths if self.question.arcs else 1
+        reached, single, legal, there = (self._summed(values, orientations, M) for values in each)
+        total = orientations * self.count
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = np.where(reached > 0, legal / reached, 0.0)
+        columns = {"share": reached / total, "share_any": there / total, "branches": mean, "single": single / total}
+        if self.question.measures:
+            columns |= self._measures(orientations, M)
+        return columns
+
+    @staticmethod
+    def _summed(values: Array, orientations: int, M: int) -> Array:
+        """Sums over the solves of a cell: (S, M or 1) -> (R, M)."""
+        sums = values.reshape(-1, orientations, values.shape[1]).sum(axis=1)
+        return np.asarray(np.broadcast_to(sums, (len(sums), M)))
+
+    def _united(self) -> tuple[Words, Words, Array]:
+        """Rolls that at least one and at least two branches reach (S, M, W), and how many (branch, roll) there are."""
+        S, B, M = self.azimuths.shape
+        W = self.rolls.shape[2]
+        once, twice = np.zeros((S, M, W), np.uint64), np.zeros((S, M, W), np.uint64)
+        for b in range(B):
+            one = self.azimuths[:, b, :, None] & self.rolls[:, b, None, :]
+            twice |= once & one
+            once |= one
+        counts = _bits(self.rolls).astype(float)
+        branches = ((self.azimuths != 0) * counts[:, :, None]).sum(axis=1)
+        return once, twice, branches
+
+    def _edges(self, each: list[Array]) -> list[Array]:
+        """Targets on an edge by arcs: merging branches, free joints. All their poses are asked."""
+        if not self.question.arcs:
+            return each
+        M, L = self.grid.azimuths, self.count
+        rows = np.flatnonzero((self.s.status == Status.BOUNDARY) | (self.s.status == Status.SINGULAR))
+        if len(rows):
+            each = [np.broadcast_to(values, (len(values), M)).copy() for values in each]
+        for row in rows.tolist():
+            s = self._asked(row)
+            legal = s.within_limits.sum(axis=1)
+            for values, found in zip(each, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
+                values[row] = found.reshape(M, L).sum(axis=1)
+        return each
+
+    def _asked(self, row: int) -> Solutions:
+        """All poses of one solve, azimuth by azimuth."""
+        M, L = self.grid.azimuths, self.count
+        azimuth, turn = np.divmod(np.arange(M * L), L)
+        each = np.full(M * L, row)
+        roll = turn * (TURN / L)
+        if not self.question.roll_arcs and self.grid.rolls_count > 1:
+            roll = np.full(
+                M * L, (row % self.question.solves_a_ring % self.grid.rolls_count) * (TURN / self.grid.rolls_count)
+            )
+        return ik(self.arm, self.grid.targets(self.at[each], azimuth * (TURN / M), self.direction[each], roll))
+
+    def _measures(self, orientations: int, M: int) -> dict[str, Array]:
+        """Best manipulability and limit margin, least step error over legal answers; nan where there is none."""
+        legal = (self.azimuths != 0) & np.asarray(np.any(self.rolls != 0, axis=2, keepdims=True))  # (S, B, M or 1)
+        some: Bool = np.asarray(legal.any(axis=2))
+        q = self.s.q[some]
+        found = {
+            "manipulability": _manipulability(self.arm, q)[:, None],
+            "limit_margin": self._margins(q, legal.shape[2]),
+            "step_error_mm": -_step_error(self.arm, q)[:, None],
+        }
+        for name, values in found.items():
+            each = np.full(legal.shape, -np.inf)
+            each[some] = np.where(np.isnan(values), -np.inf, values)
+            best = np.where(legal, each, -np.inf).max(axis=1, initial=-np.inf)
+            best = best.reshape(-1, orientations, best.shape[1]).max(axis=1)
+            best = np.where(np.isfinite(best), np.abs(best) if name == "step_error_mm" else best, np.nan)
+            found[name] = np.asarray(np.broadcast_to(best, (len(best), M)))
+        return found
+
+    def _margins(self, q: Array, M: int) -> Array:
+        """Least distance to a limit as a share of the range, of the best copies: (K, M); nan without limits."""
+        margin = np.full((len(q), M), np.inf)
+        for j in range(self.arm.n):
+            low, high = self.arm.lower[j], self.arm.upper[j]
+            if not (math.isfinite(low) and math.isfinite(high)) or low == high:
+                continue
+            away = q[:, j, None] - 0.5 * (low + high)
+            if j == 0 and self.question.arcs:
+                away = away + np.arange(M) * (TURN / M)
+            if not self.arm.prismatic[j]:
+                step = TURN / self.count if j == self.arm.n - 1 and self.question.roll_arcs else TURN
+                away = away - step * np.rint(away / step)
+            margin = np.minimum(margin, 0.5 - np.abs(away) / (high - low))
+        return np.where(np.isfinite(margin), margin, np.nan)
+
+
+def _inside(arm: Arm, q: Array, joints: range) -> Bool:
+    """Whether some copies of these joints are within limits: (..., n) -> (...)."""
+    inside = np.ones(q.shape[:-1], bool)
+    for j in joints:
+        low, high = arm.lower[j] - SLACK, arm.upper[j] + SLACK
+        value = q[..., j]
+        if not arm.prismatic[j]:
+            if not (math.isfinite(low) and math.isfinite(high)):
+                continue
+            middle = 0.5 * (low + high)
+            value = value - TURN * np.rint((value - middle) / TURN)
+        inside &= (value >= low) & (value <= high)
+    return inside
+
+
+def _arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The turns i 2 pi / count at which a joint, q + sense times the turn, is within limits: the first, how many."""
+    low, high = float(arm.lower[joint]) - SLACK, float(arm.upper[joint]) + SLACK
+    if _whole_turn(arm, joint):
+        return np.zeros(q.shape, np.intp), np.full(q.shape, count)
+    if sense < 0:
+        q, low, high = -q, -high, -low
+    step, q = TURN / count, np.nan_to_num(q)
+    first, last = np.ceil((low - q) / step), np.floor((high - q) / step)
+    length = np.clip(last - first + 1, 0, count).astype(np.intp)
+    return (first % count).astype(np.intp), length
+
+
+def _whole_turn(arm: Arm, joint: int) -> bool:
+    low, high = float(arm.lower[joint]), float(arm.upper[joint])
+    return not (math.isfinite(low) and math.isfinite(high)) or high - low + 2 * SLACK >= TURN
+
+
+def _arcs(count: int) -> Bool:
+    """All arcs of a circle of so many places: (length, first, place)."""
+    length, first, place = np.ogrid[: count + 1, :count, :count]
+    return np.asarray((place - first) % count < length)
+
+
+def _packed(bits: Bool) -> Words:
+    """Flags (..., L) as words of 64: (..., W)."""
+    L = bits.shape[-1]
+    whole = np.zeros((*bits.shape[:-1], -(-L // 64) * 64), bool)
+    whole[..., :L] = bits
+    packed = np.packbits(whole, axis=-1, bitorder="little")
+    return packed.view("<u8").astype(np.uint64)
+
+
+def _bits(words: Words) -> NDArray[np.int64]:
+    """How many bits are set in the words of the last axis."""
+    if hasattr(np, "bitwise_count"):
+        return np.asarray(np.bitwise_count(words).sum(axis=-1, dtype=np.int64))
+    flat = np.ascontiguousarray(words).view(np.uint8)
+    return np.asarray(_ONES[flat].sum(axis=-1, dtype=np.int64))
+
+
+_ONES = np.array([bin(i).count("1") for i in range(256)], dtype=np.int64)
+
+
+def _manipulability(arm: Arm, q: Array) -> Array:
+    """See `armkin.reachability.measures`."""
+    from armkin.reachability.measures import measure
+
+    return measure(arm, "manipulability")(q) if len(q) else np.zeros(0)
+
+
+def _step_error(arm: Arm, q: Array) -> Array:
+    """Sum over the motors of half a pulse times its lever at the tip (N,) [mm]; nan for an arm without drives."""
+    if not len(q) or not len(arm.motor_gain) or not arm.motor_gain.any(axis=0).all():
+        return np.full(len(q), np.nan)
+    levers = jacobian(arm, q)[:, :3] @ (0.5 * joints_per_pulse(arm))
+    return np.asarray(np.linalg.norm(levers, axis=1).sum(axis=1))

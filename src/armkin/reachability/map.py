@@ -1,0 +1,236 @@
+"""`armkin.reach`: where an arm reaches, with which share of orientations, by how many branches, and how well."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from armkin.columns import npz
+from armkin.columns.formats import format_of
+from armkin.columns.parts import Parts
+from armkin.columns.table import Table
+from armkin.engines.run import Engine, in_order
+from armkin.errors import UsageError
+from armkin.files import check, whole
+from armkin.formula.arrays import Array
+from armkin.reachability.answers import TURN, Question, answered
+from armkin.reachability.cells import Grid
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+SOLVES = 40_000  # of a chunk: about a second with all measures
+BLOCK = 2_048  # solves at once: their words stay in the cache
+KEEP = 5_000_000  # cells that a result with a file still holds as arrays
+UNITS = {
+    "x_mm": "mm", "y_mm": "mm", "z_mm": "mm", "share": "1", "share_any": "1", "branches": "1", "single": "1",
+    "manipulability": "mm^k", "limit_margin": "1", "step_error_mm": "mm",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Columns by name, one row a cell, and what they come to; `units` has each column's unit.
+
+    x_mm, y_mm, z_mm: the cell's centre in the frame of targets. share, share_any: of its orientations, reached within
+    limits, and limits and keep-outs apart. branches: legal ones, mean over reached orientations. single: share that
+    exactly one legal branch reaches. manipulability, limit_margin: best, step_error_mm: least over all legal answers.
+    """
+
+    grid: Grid
+    columns: dict[str, Array]  # empty where they are in a file alone
+    method: str  # "arcs" | "poses"
+    cells: int
+    answers: int
+    solves: int
+    reached: int
+    volume_mm3: float
+    seconds: float
+    units = UNITS
+
+    def __getattr__(self, name: str) -> Array:
+        if name in UNITS and name in self.__dict__.get("columns", ()):
+            column: Array = self.columns[name]
+            return column
+        raise AttributeError(f"Reach has no '{name}'; its columns are {', '.join(UNITS)}")
+
+    @property
+    def orientations(self) -> int:
+        """Of a cell."""
+        return self.grid.orientations
+
+
+class Chunk(NamedTuple):
+    """Some rings, by their number."""
+
+    number: int
+    rings: Array
+
+
+def reach(
+    arm: Arm,
+    *,
+    grid: float = 50.0,
+    azimuths: int = 36,
+    directions: int = 100,
+    rolls: int = 12,
+    tool_down: bool = False,
+    measures: bool = True,
+    out: str | os.PathLike[str] | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Reach:
+    """Ask every cell of a grid about joint 1's axis for every orientation; cells: `armkin.reachability.cells`.
+
+    grid [mm], azimuths of a ring, directions of the tool's z axis, rolls about it; tool_down: straight down alone.
+    measures: False leaves the columns nan that need Jacobians. out: a .npz, .parquet or .csv of all columns; run again
+    after a kill, it goes on. workers: processes; cluster: a Dask scheduler's address. progress: gets the cells done.
+
+    >>> import armkin
+    >>> found = armkin.reach(armkin.load("robots/three_dof.yaml"), grid=100.0, azimuths=12)
+    >>> found.method, found.cells, found.reached
+    ('arcs', 744, 200)
+    """
+    started = time.perf_counter()
+    question = Question(Grid(arm, float(grid), int(azimuths), int(directions), int(rolls), bool(tool_down)), measures)
+    rings = question.grid.rings
+    if not len(rings):
+        raise UsageError(f"grid: {grid:g} mm: no cell within a reach of {arm.reach:.0f} mm; take a finer grid")
+    run = _Run(question, None if out is None else os.fspath(out), Engine(workers, cluster), progress)
+    columns = run.done(list(chunks(question)))
+    return Reach(
+        question.grid,
+        columns,
+        "arcs" if question.arcs else "poses",
+        len(rings) * question.grid.azimuths,
+        len(rings) * question.grid.azimuths * question.grid.orientations,
+        run.solves,
+        run.reached,
+        run.volume,
+        time.perf_counter() - started,
+    )
+
+
+def chunks(question: Question) -> Iterator[Chunk]:
+    """All rings, some at a time; the same ones for every engine."""
+    rings = question.grid.rings
+    each = max(SOLVES // question.solves_a_ring, 1)
+    for number, start in enumerate(range(0, len(rings), each)):
+        yield Chunk(number, rings[start : start + each])
+
+
+def work(question: Question, chunk: Chunk) -> tuple[int, Table]:
+    """The columns of a chunk: a pure function, wherever it runs."""
+    grid, M = question.grid, question.grid.azimuths
+    each = max(BLOCK // question.solves_a_ring, 1)
+    parts = [answered(question, chunk.rings[i : i + each]) for i in range(0, len(chunk.rings), each)]
+    cells = len(chunk.rings) * M
+    at = np.repeat(chunk.rings, M, axis=0)
+    p = grid.positions(at, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
+    table: Table = {f"{name}_mm": np.ascontiguousarray(p[:, i]) + 0.0 for i, name in enumerate("xyz")}
+    for name in list(UNITS)[3:]:
+        table[name] = np.concatenate([part[name] for part in parts]) if name in parts[0] else np.full(cells, np.nan)
+    return chunk.number, table
+
+
+class _Run:
+    """A map that is made: its chunks, its file, and its sums."""
+
+    def __init__(
+        self, question: Question, out: str | None, engine: Engine, progress: Callable[[int], None] | None
+    ) -> None:
+        self.question, self.out, self.engine, self.progress = question, out, engine, progress
+        self.cells = self.reached = self.solves = 0
+        self.volume = 0.0
+        self.parts: Parts | None = None
+        if out is not None:
+            if Path(out).suffix.lower() not in (".npz", ".parquet", ".csv"):
+                raise UsageError(f"{out}: a map is written as .npz, .parquet or .csv; end the name with one of them")
+            check(out)
+            if format_of(out).name == "parquet":
+                from armkin.columns.parquet import require
+
+                require()
+            self.parts = Parts(out, _asked(question))
+
+    def done(self, all_chunks: list[Chunk]) -> dict[str, Array]:
+        """Answer all chunks; the columns, unless they are in a file and too many."""
+        kept: dict[int, Table] = {}
+        cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
+        keep = self.parts is None or cells <= KEEP
+        if self.parts is not None and len(all_chunks) > 1:
+            self.parts.begin()
+        try:
+            for number, table in in_order(self.engine, work, self.question, self._missing(all_chunks, kept, keep)):
+                if self.parts is not None and self.parts.held:
+                    self.parts.keep(number, {}, npz.encoded(table))
+                self._count(all_chunks[number], table)
+                if keep:
+                    kept[number] = table
+            if self.out is not None:
+                self._write(len(all_chunks), kept)
+        finally:
+            if self.parts is not None:
+                self.parts.leave()
+        tables = [kept[number] for number in sorted(kept)]
+        return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keep else {}
+
+    def _missing(self, all_chunks: list[Chunk], kept: dict[int, Table], keep: bool) -> Iterator[Chunk]:
+        for chunk in all_chunks:
+            if self.parts is None or not self.parts.held or self.parts.about(chunk.number) is None:
+                yield chunk
+                continue
+            table = _table(self.parts.read(chunk.number))
+            self._count(chunk, table)
+            if keep:
+                kept[chunk.number] = table
+
+    def _count(self, chunk: Chunk, table: Table) -> None:
+        grid = self.question.grid
+        there = np.asarray(table["share"]) > 0
+        r = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
+        self.volume += float(r[there].sum()) * grid.step**2 * TURN / grid.azimuths
+        self.reached += int(there.sum())
+        self.solves += len(chunk.rings) * self.question.solves_a_ring
+        self.cells += len(there)
+        if self.progress is not None:
+            self.progress(self.cells)
+
+    def _write(self, count: int, kept: dict[int, Table]) -> None:
+        assert self.out is not None
+        assert self.parts is not None
+        format, parts = format_of(self.out), self.parts
+
+        def tables() -> Iterator[Any]:
+            for number in range(count):
+                data = parts.read(number) if parts.held else npz.encoded(kept[number])
+                yield io.BytesIO(data if format.name == "npz" else format.encoded(_table(data)))
+
+        with whole(self.out, "wb") as file:
+            if format.name == "csv":
+                file.write((",".join(UNITS) + "\n").encode())
+            format.together(file, tables)
+        if parts.held:
+            parts.remove()
+
+
+def _asked(question: Question) -> dict[str, Any]:
+    """What the columns depend on."""
+    grid, arm = question.grid, question.grid.arm
+    names = ("step", "azimuths", "directions", "rolls", "tool_down")
+    asked = {("grid" if name == "step" else name): getattr(grid, name) for name in names}
+    arm_is = {"robot file": arm.sha256, "scene": arm.scene_sha256, "joints": arm.n, "reach": arm.reach}
+    return {"command": "reach", **arm_is, **asked, "measures": question.measures}
+
+
+def _table(data: bytes) -> Table:
+    with np.load(io.BytesIO(data)) as archive:
+        return dict(archive)

@@ -1,0 +1,178 @@
+"""`armkin.reach`: arcs against asking every pose, engines, going on after a kill, bad input."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import UsageError
+from armkin.reachability import map as maps
+from armkin.reachability.answers import TURN, Question, answered
+from armkin.reachability.cells import Grid
+from command_line import ROOT, Result, run
+
+ARMS = (
+    "ur5e",
+    "puma560",
+    "ar4",
+    "three_dof",
+    "stanford",
+    "planar_3dof",
+    "so101",
+    "wx250s",
+    "kuka_kr6_r700",
+    "jaco_j2n6s300",
+)
+
+
+def asked(grid: Grid, rings: np.ndarray) -> np.ndarray:
+    """share, share_any, branches, single of every cell, by asking each pose."""
+    N, L = grid.directions_count, grid.rolls_count
+    each, rows = np.arange(N * L), []
+    for ring in rings:
+        for k in range(grid.azimuths):
+            turn = np.full(N * L, k * TURN / grid.azimuths)
+            roll = (each % L) * TURN / L
+            s = armkin.ik(grid.arm, grid.targets(np.repeat(ring[None], N * L, 0), turn, each // L, roll))
+            legal = s.within_limits.sum(axis=1)
+            mean = legal.sum() / max((legal > 0).sum(), 1)
+            rows.append([(legal > 0).mean(), s.valid.any(axis=1).mean(), mean, (legal == 1).mean()])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_arcs_are_what_each_pose_says(name: str) -> None:
+    arm = armkin.load(name)
+    few = name in ("jaco_j2n6s300",)
+    grid = Grid(arm, arm.reach / 9, 3 if few else 7, 4 if few else 9, 2 if few else 5, False)
+    question = Question(grid)
+    rings = grid.rings[np.random.default_rng(4).permutation(len(grid.rings))[: 2 if few else 20]]
+    found = answered(question, rings)
+    assert question.arcs
+    columns = np.stack([found[name] for name in ("share", "share_any", "branches", "single")], axis=1)
+    assert np.abs(columns - asked(grid, rings)).max() < 1e-12
+    assert columns[:, 1].max() > 0
+
+
+@pytest.mark.parametrize("name", ["puma560", "cobra600", "three_dof"])
+def test_pose_by_pose_says_the_same_as_arcs(name: str) -> None:
+    """A calibrated arm is asked pose by pose; one whose ratios are all but 1 reaches the same."""
+    from dataclasses import replace
+
+    arm = armkin.load(name)
+    nearly = replace(arm, ratio=np.where(np.arange(arm.n) == 1, 1 + 1e-15, 1.0))
+    one, other = (armkin.reach(a, grid=arm.reach / 4, azimuths=5, directions=7, rolls=4) for a in (arm, nearly))
+    assert (one.method, other.method) == ("arcs", "poses")
+    for column in one.columns:
+        assert np.allclose(one.columns[column], other.columns[column], rtol=1e-6, atol=1e-9, equal_nan=True), column
+
+
+def test_cells_stand_where_the_contract_puts_them() -> None:
+    arm = armkin.load("ur5e")
+    found = armkin.reach(arm, grid=300.0, azimuths=4, directions=3, rolls=2)
+    rings = found.grid.rings
+    assert found.cells == 4 * len(rings)
+    assert found.answers == found.cells * 6
+    first = found.grid.frame[:3, 3] + found.grid.frame[:3, :3] @ [150.0, 0.0, rings[0, 1] * 300.0]
+    assert np.allclose([found.x_mm[0], found.y_mm[0], found.z_mm[0]], first)
+    r2 = (rings[:, 0] + 0.5) ** 2 * 9e4 + rings[:, 1] ** 2 * 9e4
+    assert r2.max() <= arm.reach**2 * (1 + 1e-9)
+    assert np.array_equal(rings, np.unique(rings, axis=0))
+    R = found.grid.targets(rings[:3], np.zeros(3), np.arange(3), np.zeros(3))[:, :3, :3]
+    assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3))
+    z = 1 - (2 * np.arange(3) + 1) / 3
+    assert np.allclose((found.grid.frame[:3, :3].T @ R[..., 2].T)[2], z)
+    assert found.units["x_mm"] == "mm"
+
+
+def test_keep_outs_take_orientations_away_and_are_asked_pose_by_pose() -> None:
+    free = armkin.reach(armkin.load("three_dof"), grid=120.0, azimuths=8)
+    scene = ROOT / "examples/scenes/three_dof.yaml"
+    blocked = armkin.reach(armkin.load("three_dof", scene=scene), grid=120.0, azimuths=8)
+    assert (free.method, blocked.method) == ("arcs", "poses")
+    assert (blocked.share <= free.share + 1e-12).all()
+    assert blocked.reached < free.reached
+    assert np.allclose(blocked.share_any, free.share_any)
+
+
+def reach(*more: object) -> Result:
+    return run("reach", "puma560", "--grid", 300, "--azimuths", 6, "--directions", 8, "--rolls", 4, *more)
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chunks of a few rings."""
+    monkeypatch.setattr(maps, "SOLVES", 64)
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("end", ["npz", "parquet"])
+def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str) -> None:
+    def digest(path: Path) -> str:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+
+    one, two, three = (tmp_path / f"{name}.{end}" for name in "abc")
+    assert reach("--out", one).code == 0
+    assert reach("--out", two, "--workers", 2).code == 0
+    work, done = maps.work, 0
+
+    def stops(*words: object) -> object:
+        nonlocal done
+        done += 1
+        if done == 4:
+            raise KeyboardInterrupt
+        return work(*words)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(maps, "work", stops)
+        assert reach("--out", three).code == 130
+    assert (tmp_path / f"c.{end}.parts" / "00000002").exists()
+    other = run("reach", "puma560", "--grid", 200, "--out", three)
+    assert other.code == 2
+    assert "belongs to another job: " in other.err
+    assert reach("--out", three).code == 0
+    assert digest(one) == digest(two) == digest(three)
+    assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{end}" for name in "abc"}
+
+
+def test_a_picture_of_the_section_and_a_slice(tmp_path: Path) -> None:
+    assert reach("--plot", tmp_path / "reach.png").code == 0
+    assert (tmp_path / "reach.png").stat().st_size > 20_000
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"grid": 0.0}, "a cell needs a size above 0"),
+        ({"grid": float("nan")}, "a cell needs a size above 0"),
+        ({"grid": 0.01}, "take a coarser grid"),
+        ({"grid": 1e6}, "no cell within a reach"),
+        ({"azimuths": 0}, "azimuths: 0; at least 1"),
+        ({"rolls": -1}, "rolls: -1; at least 1"),
+        ({"directions": 10**6, "rolls": 100}, "orientations a cell"),
+        ({"out": "map.ply"}, "a map is written as"),
+    ],
+)
+def test_bad_input_is_told(settings: dict[str, float], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        armkin.reach(armkin.load("puma560"), **settings)  # type: ignore[arg-type]
+
+
+def test_tool_down_is_one_direction() -> None:
+    found = armkin.reach(armkin.load("ur5e"), grid=250.0, azimuths=4, rolls=3, tool_down=True)
+    assert found.orientations == 3
+    T = found.grid.targets(found.grid.rings[:1], np.zeros(1), np.zeros(1, int), np.zeros(1))
+    assert np.allclose(T[0, :3, 2], [0, 0, -1])
+    pitch = armkin.reach(armkin.load("so101"), grid=100.0, azimuths=4, rolls=1, tool_down=True)
+    grid = pitch.grid
+    cell = int(np.argmax(pitch.share))
+    assert pitch.share[cell] == 1.0
+    ring, turn = grid.rings[cell // 4][None], np.full(1, cell % 4 * TURN / 4)
+    s = armkin.ik(grid.arm, grid.targets(ring, turn, np.zeros(1, int), np.zeros(1)))
+    assert np.allclose(armkin.fk(grid.arm, s.q[0, s.best[0]])[:3, 2], [0, 0, -1], atol=1e-9)
+    with pytest.raises(UsageError, match="does not prescribe"):
+        armkin.reach(armkin.load("three_dof"), tool_down=True)
