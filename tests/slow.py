@@ -157,6 +157,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "motion/test_singular_paths.py": (),
     "motion/test_time_law.py": ("test_a_long_way_takes_little_memory_beside_its_own",),
     "plot/test_plot.py": (),
+    "reachability/test_place.py": (),
     "reachability/test_reach.py": (
         "test_a_picture_of_the_section_and_a_slice",
         "test_arcs_are_what_each_pose_says",

@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from armkin.motors import rounding as rounding
     from armkin.reachability.map import Reach as Reach
     from armkin.reachability.map import reach as reach
+    from armkin.reachability.place import Place as Place
+    from armkin.reachability.place import place as place
     from armkin.reachability.survey import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
@@ -95,6 +97,8 @@ _HOME = {
     "rounding": "motors",
     "Reach": "reachability.map",
     "reach": "reachability.map",
+    "Place": "reachability.place",
+    "place": "reachability.place",
     "workspace": "reachability.survey",
 }
 

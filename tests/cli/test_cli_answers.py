@@ -74,6 +74,7 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     (answers.Workspace, ("workspace", DOF, "--samples", 100, "--measure", "step_error")),
     (answers.Workspace, ("workspace", "planar_2dof", "--samples", 100)),
     (answers.Reach, ("reach", DOF, "--grid", 100, "--azimuths", 12)),
+    (answers.Place, ("place", DOF, "TARGETS", "--step", 200, "--yaw", 90)),
     (answers.Robots, ("robots",)),
     *((answers.Export, ("export", name)) for name in ("three_dof", "stanford", "ra02_screws", "panda")),
     (answers.Ports, ("ports",)),
@@ -104,7 +105,7 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     ("kind", "words"), CASES, ids=lambda part: " ".join(map(str, part)) if type(part) is tuple else ""
 )
 def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...], tmp_path: Path) -> None:
-    made = {"CSV": measured, "SWITCHED": switched}
+    made = {"CSV": measured, "SWITCHED": switched, "TARGETS": targets}
     result = run(*(made[str(word)](tmp_path) if word in made else word for word in words), "--json")
     assert result.code in (0, 3), result.err
     check(result.json, kind, kind.__name__)
@@ -121,6 +122,12 @@ def measured(folder: Path) -> Path:
     tips[7] += 40.0
     np.savetxt(folder / "tips.csv", np.hstack([np.rad2deg(q), tips]), delimiter=",")
     return folder / "tips.csv"
+
+
+def targets(folder: Path) -> Path:
+    """Two targets of an arm that may stand anywhere."""
+    (folder / "targets.csv").write_text("x,y,z\n600,0,200\n600,300,200\n")
+    return folder / "targets.csv"
 
 
 def switched(folder: Path) -> Path:

@@ -5,6 +5,7 @@ poses.py   `plot_poses`: branches, a path, a single pose
 path.py    a planned path
 cloud.py   `plot_workspace`: the cloud and its projections
 reach.py   a map of reach, cut twice
+place.py   places for an arm, as a floor
 
 The same input gives the same file, to the byte.
 """

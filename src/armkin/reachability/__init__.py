@@ -11,6 +11,7 @@ Where, with which orientations, by how many branches:
 cells.py     rings of cells about joint 1's axis, and the orientations in each
 answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
 map.py       `reach`: all rings, in chunks, by any engine
+place.py     `place`: where to put an arm for given targets
 """
 
 from armkin.reachability.survey import Workspace, workspace

@@ -114,13 +114,13 @@ class _Answers:
         S, B = s.valid.shape
         if question.arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
-            inner = s.valid & _inside(self.arm, s.q, range(1, last))
-            first, length = _arc(self.arm, s.q[:, :, 0], 0, turns.shape[1], 1)
+            inner = s.valid & inside(self.arm, s.q, range(1, last))
+            first, length = arc(self.arm, s.q[:, :, 0], 0, turns.shape[1], 1)
             self.azimuths = turns[np.where(inner, length, 0), first]  # (S, B, M)
             self.rolls = np.full((S, B, 1), np.uint64(1))
             if question.roll_arcs:
                 sense = 1 if self.arm.link[-1][2, 2] > 0 else -1
-                first, length = _arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
+                first, length = arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
                 self.rolls = rolls[length, first]
         else:
             self.azimuths = np.where(legal, ~np.uint64(0), np.uint64(0))[:, :, None]
@@ -225,7 +225,20 @@ class _Answers:
         return np.where(np.isfinite(margin), margin, np.nan)
 
 
-def _inside(arm: Arm, q: Array, joints: range) -> Bool:
+def limit_margin(arm: Arm, q: Array) -> Array:
+    """Least distance to a limit as a share of the joint's range, of the best copies: (..., n) -> (...); inf: none."""
+    margin = np.full(q.shape[:-1], np.inf)
+    for j in range(arm.n):
+        low, high = arm.lower[j], arm.upper[j]
+        if math.isfinite(low) and math.isfinite(high) and low < high:
+            away = q[..., j] - 0.5 * (low + high)
+            if not arm.prismatic[j]:
+                away = away - TURN * np.rint(away / TURN)
+            margin = np.minimum(margin, 0.5 - np.abs(away) / (high - low))
+    return margin
+
+
+def inside(arm: Arm, q: Array, joints: range) -> Bool:
     """Whether some copies of these joints are within limits: (..., n) -> (...)."""
     inside = np.ones(q.shape[:-1], bool)
     for j in joints:
@@ -240,7 +253,7 @@ def _inside(arm: Arm, q: Array, joints: range) -> Bool:
     return inside
 
 
-def _arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The turns i 2 pi / count at which a joint, q + sense times the turn, is within limits: the first, how many."""
     low, high = float(arm.lower[joint]) - SLACK, float(arm.upper[joint]) + SLACK
     if _whole_turn(arm, joint):

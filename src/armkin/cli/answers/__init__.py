@@ -7,6 +7,7 @@ moving.py  answers about an arm that moves, and about its board
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
 """
 
+from armkin.cli.answers.arm import BestPlace as BestPlace
 from armkin.cli.answers.arm import Branch as Branch
 from armkin.cli.answers.arm import Calibrate as Calibrate
 from armkin.cli.answers.arm import Closest as Closest
@@ -23,6 +24,8 @@ from armkin.cli.answers.arm import Ik as Ik
 from armkin.cli.answers.arm import Info as Info
 from armkin.cli.answers.arm import KeepOuts as KeepOuts
 from armkin.cli.answers.arm import Near as Near
+from armkin.cli.answers.arm import Place as Place
+from armkin.cli.answers.arm import PlacedRobot as PlacedRobot
 from armkin.cli.answers.arm import Ports as Ports
 from armkin.cli.answers.arm import PulsePositions as PulsePositions
 from armkin.cli.answers.arm import Pulses as Pulses
@@ -66,6 +69,7 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "pulses": (Pulses,),
     "workspace": (Workspace,),
     "reach": (Reach,),
+    "place": (Place,),
     "info": (Info,),
     "robots": (Robots,),
     "export": (Export,),

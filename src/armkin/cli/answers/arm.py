@@ -173,6 +173,30 @@ class Reach(Head):
     seconds: float
 
 
+class BestPlace(TypedDict):
+    """Where to put a robot: its frame, in the frame of the targets."""
+
+    xyz: list[float]
+    yaw_deg: float
+    reached: Annotated[int, "targets"]
+    of: int
+    margin_mm: Annotated[float, "to the nearest place of the grid, at this yaw, that does not reach all"]
+
+
+class PlacedRobot(Head):
+    """The places of one robot."""
+
+    best: BestPlace
+    places: int
+    reach_all: Annotated[int, "places that reach all targets"]
+
+
+class Place(TypedDict):
+    """Where to put robots, each by itself."""
+
+    robots: list[PlacedRobot]
+
+
 _Ends = TypedDict("_Ends", {"from": list[float], "to": list[float]})
 
 

@@ -1,0 +1,130 @@
+"""`armkin place`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armkin.cli import inputs, output, render
+from armkin.cli.numbers import listed, number
+from armkin.cli.options import Cluster, Json, Workers
+from armkin.errors import NoSolutionError, UsageError
+
+if TYPE_CHECKING:
+    from armkin.cli.answers import BestPlace, PlacedRobot
+    from armkin.cli.answers import Place as Answer
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.reachability.place import Place
+
+
+def place(
+    words: Annotated[list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets.")],
+    area: Annotated[
+        str | None,
+        typer.Option("--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Of the places. [default: all that may reach]"),
+    ] = None,
+    step: Annotated[str, typer.Option("--step", metavar="MM", help="From place to place.")] = "50",
+    yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="From yaw to yaw.")] = "15",
+    z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
+    workers: Workers = 1,
+    cluster: Cluster = None,
+    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
+    json: Json = False,
+) -> None:
+    """Where to put an arm, so that it reaches all targets.
+
+    Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
+    one is farthest from places that do not reach all. Exit code 3: no place does; the best part is told.
+    """
+    import armkin
+
+    if len(words) < 2:
+        raise UsageError("place takes robots, then a file of targets: armkin place ur5e targets.csv")
+    if words[-1].lower().endswith((".yaml", ".yml")):
+        raise UsageError(f"{words[-1]}: place takes targets, rows of a CSV file; give the path's points as such rows")
+    if plot is not None:
+        from armkin.plot import canvas
+
+        canvas.check(plot)
+        canvas.require()
+    arms = [inputs.load(word) for word in words[:-1]]
+    settings = {"step": number(step, "--step"), "z": number(z, "--z")}
+    turn = number(yaw, "--yaw")
+    if settings["step"] <= 0 or turn <= 0:
+        raise UsageError("--step and --yaw must be above 0")
+    bounds = None if area is None else listed(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
+    from armkin.model.units import DEGREE
+
+    found = []
+    with output.progress("positions") as tick:
+        for arm in arms:
+            found += armkin.place(
+                arm,
+                _targets(arm, words[-1]),
+                area=bounds,
+                yaw=turn * DEGREE,
+                workers=workers,
+                cluster=cluster,
+                progress=tick,
+                **settings,
+            )
+    if plot is not None:
+        from armkin.plot.place import plot_place
+
+        plot_place(found, plot)
+    answer: Answer = {"robots": [_answer(one) for one in found]}
+    with output.destination(None) as write:
+        write(f"{render.to_json(answer)}\n" if json else _text(found))
+    if not any(one.reach_all for one in found):
+        most = max(found, key=lambda one: int(one.reached.max()))
+        raise NoSolutionError(
+            f"no place reaches all {most.of} targets; {most.arm.name} reaches {int(most.reached.max())} at best"
+        )
+
+
+def _targets(arm: Arm, source: str) -> Array:
+    """The targets of a file, as the arm's task reads them."""
+    import numpy as np
+
+    from armkin.cli.csv_rows import batch_rows
+    from armkin.inverse.tasks.fitting import task_for
+    from armkin.model import units
+
+    task = task_for(arm)
+    rows = [chunk.values for chunk in batch_rows(source, task.labels, f"task {task.name} of {arm.name}")]
+    return units.targets_in(task.labels, np.concatenate(rows))
+
+
+def _answer(found: Place) -> PlacedRobot:
+    from armkin.model.units import DEGREE
+
+    i, j, k = found.best
+    best: BestPlace = {
+        "xyz": found.xyz.tolist(),
+        "yaw_deg": round(float(found.yaw[k] / DEGREE), 9),
+        "reached": int(found.reached[i, j, k]),
+        "of": found.of,
+        "margin_mm": float(found.margin[i, j, k]),
+    }
+    return {**render.head(found.arm), "best": best, "places": found.reached.size, "reach_all": found.reach_all}
+
+
+def _text(found: Sequence[Place]) -> str:
+    rows = [["robot", "x/mm", "y/mm", "z/mm", "yaw/deg", "reached", "margin/mm", "places that reach all"]]
+    for one in found:
+        i, j, k = one.best
+        reached = f"{one.reached[i, j, k]} of {one.of}"
+        numbers = [*map(render.short, one.xyz.tolist()), render.short(float(one.yaw[k]) * 57.29577951308232)]
+        rows.append(
+            [
+                one.arm.name,
+                *numbers,
+                reached,
+                f"{one.margin[i, j, k]:.1f}",
+                f"{one.reach_all:,} of {one.reached.size:,}",
+            ]
+        )
+    return render.table(rows, indent="") + "\n"

@@ -1,0 +1,41 @@
+"""Where to put arms: a floor coloured by how many targets each place reaches, with the best place marked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.plot.canvas import INK, SOFT, flat, picture
+
+if TYPE_CHECKING:
+    from armkin.reachability.place import Place
+
+
+def plot_place(found: Sequence[Place], out: str) -> None:
+    """One floor an arm: of each position the share of targets that its best yaw reaches."""
+    with picture(out, 5.6 * len(found), 5.4) as figure:
+        for number, one in enumerate(found):
+            width = 1.0 / len(found)
+            axes = flat(figure, ((number + 0.14) * width, 0.12, 0.66 * width, 0.7), ("x / mm", "y / mm"))
+            share = one.reached.max(axis=2).T / one.of
+            half = 0.5 * float(one.x[1] - one.x[0] if len(one.x) > 1 else 50.0)
+            corners = (one.x[0] - half, one.x[-1] + half, one.y[0] - half, one.y[-1] + half)
+            drawn = axes.imshow(share, origin="lower", extent=corners, vmin=0, vmax=1, cmap="viridis")
+            x, y, yaw = *one.xyz[:2], float(one.yaw[one.best[2]])
+            size = 0.15 * one.arm.reach
+            axes.plot(*_heading(x, y, yaw, size), color="white", lw=3.5)
+            axes.plot(*_heading(x, y, yaw, size), color=INK, lw=1.5)
+            axes.plot([x], [y], "o", color=INK, mec="white", ms=8)
+            bar = figure.colorbar(drawn, cax=figure.add_axes(((number + 0.83) * width, 0.15, 0.02 * width, 0.64)))
+            bar.outline.set_visible(False)
+            left = (number + 0.05) * width
+            text = f"best: {x:g}, {y:g} mm, {np.degrees(yaw):g} deg, {int(one.reached[one.best])} of {one.of}"
+            figure.text(left, 0.95, one.arm.name, fontsize=12, va="top", color=INK)
+            figure.text(left, 0.9, f"share of targets reached;  {text}", fontsize=8.5, va="top", color=SOFT)
+
+
+def _heading(x: float, y: float, yaw: float, size: float) -> tuple[list[float], list[float]]:
+    """A stroke from a place along its x axis."""
+    return [x, x + size * float(np.cos(yaw))], [y, y + size * float(np.sin(yaw))]

@@ -1,0 +1,76 @@
+"""`armkin.place`: places against asking each directly, margins, answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.errors import UsageError
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.reachability import place as places
+from command_line import run
+
+
+@pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof", "planar_3dof", "so101", "stanford"])
+def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
+    arm, rng = armkin.load(name), np.random.default_rng(0)
+    low, high = (np.where(np.isfinite(ends), ends, end) for ends, end in ((arm.lower, -3.0), (arm.upper, 3.0)))
+    q = rng.uniform(0.4 * low, 0.4 * high, (4, arm.n))
+    targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
+    yaw = np.radians(60.0)
+    [found] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
+    question = places.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
+    assert found.of == 4
+    assert found.reached.max() > 0
+    for _ in range(60):
+        i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
+        at = np.array([found.x[i], found.y[j]])
+        assert places._legal(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+
+
+def test_a_margin_is_the_distance_to_the_nearest_place_that_does_not_reach_all() -> None:
+    targets = [[600, 0, 200], [600, 300, 200]]
+    arm = armkin.load("three_dof")
+    [whole] = armkin.place(arm, targets, step=100.0, yaw=np.pi / 4)
+    good = whole.reached == whole.of
+    for i, j, k in np.argwhere(good)[::3]:
+        x, y = np.argwhere(~good[:, :, k]).T
+        assert whole.margin[i, j, k] == pytest.approx(100.0 * np.hypot(x - i, y - j).min())
+    assert not whole.margin[~good].any()
+    best = whole.margin[whole.best]
+    assert best == whole.margin[good].max()
+    # a small area inside knows what is around it
+    i, j, _ = whole.best
+    at = [float(whole.x[i]), float(whole.y[j])]
+    [small] = armkin.place(arm, targets, area=[at[0], at[0], at[1], at[1]], step=100.0, yaw=np.pi / 4)
+    assert small.margin.max() == best
+
+
+def test_the_command_tells_the_best_and_exits_3_where_none_reaches_all(tmp_path: Path) -> None:
+    path, far = tmp_path / "targets.csv", tmp_path / "far.csv"
+    path.write_text("x,y,z\n600,0,200\n600,300,200\n")
+    far.write_text("x,y,z\n0,0,200\n9000,0,200\n")
+    more = ("--step", 150, "--yaw", 90)
+    found = run("place", "three_dof", "roarm_m2", path, *more, "--plot", tmp_path / "floor.png", "--json")
+    assert found.code == 0
+    assert [robot["robot"] for robot in found.json["robots"]] == ["three_dof", "roarm_m2"]
+    assert {robot["best"]["reached"] for robot in found.json["robots"]} == {2}
+    assert (tmp_path / "floor.png").stat().st_size > 10_000
+    none = run("place", "three_dof", far, *more, "--json", "--area", "-300,300,-300,300")
+    assert none.code == 3
+    assert none.json["robots"][0]["best"]["reached"] == 1
+    assert "no place reaches all 2 targets; three_dof reaches 1 at best" in none.err
+
+
+def test_bad_input_is_told(tmp_path: Path) -> None:
+    arm = armkin.load("three_dof")
+    for settings in ({"step": 0.0}, {"yaw": -1.0}, {"area": (1, 0, 0, 1)}, {"area": (0, 1)}, {"step": 0.001}):
+        with pytest.raises(UsageError):
+            armkin.place(arm, [[600, 0, 200]], **settings)
+    assert run("place", "three_dof").code == 2
+    assert run("place", "three_dof", tmp_path / "none.csv").code == 1
+    assert "rows of a CSV file" in run("place", "three_dof", tmp_path / "path.yaml").err
