@@ -19,6 +19,7 @@ PROMISED = {
     7: ["[1067, -5370, 3000] after"],
     8: ["308.1 mm in", "left, elbow up"],
     9: ["right, elbow down", "<- chosen"],
+    10: ["cells are reached", "places reach all 6 targets"],
 }
 
 
