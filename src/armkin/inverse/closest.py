@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,15 +15,17 @@ from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual
-from armkin.inverse.tasks.task import Task, read_targets
+from armkin.inverse.tasks.task import Task, read_targets, targets_of
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-STARTS = 40
-STEPS = 60
-FINALISTS = 6
+POOL = 4000  # postures within limits of which each target starts from the nearest
+STARTS = 14  # of them
+STEPS = 10
+FINALISTS = 4
+AT_ONCE = 256  # targets worked on together
 FLAT = 1e-8  # largest component of the gradient at a minimum; cost in squared reaches
 
 
@@ -47,8 +50,8 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
 
     target: one target (m,) or (4, 4). What is minimised is the squared distance plus the
     squared angle times the square of a quarter of the reach, so that a radian weighs as much
-    as a quarter of the reach. Projected Levenberg-Marquardt from many starts (`near`, home
-    and a fixed spread within limits); the best local minimum is returned, ties going to the
+    as a quarter of the reach. Projected Levenberg-Marquardt from some starts (`near`, home
+    and the nearest of many postures within limits); the best local minimum is returned, ties going to the
     one nearest to `near`.
 
     >>> import armkin
@@ -59,32 +62,79 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     definition = task_for(arm, task)
     goal, lead, _ = read_targets(definition, target)
     if lead:
-        raise UsageError("closest takes one target at a time")
+        raise UsageError("closest takes one target at a time; closest_each takes many")
+    close = one_pose(arm, arm.home if near is None else near, "near")
+    return _of_chunk(arm, definition, goal, close[None])[0]
+
+
+def closest_each(
+    arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None
+) -> list[Closest]:
+    """What `closest` says of each of many targets (N, m) or (N, 4, 4); near: (n,) or (N, n)."""
+    definition = task_for(arm, task)
+    goal = read_targets(definition, targets).values
+    close = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
+    parts = [slice(start, start + AT_ONCE) for start in range(0, len(goal), AT_ONCE)]
+    return [one for part in parts for one in _of_chunk(arm, definition, goal[part], close[part])]
+
+
+def _of_chunk(arm: Arm, task: Task, target: Array, near: Array) -> list[Closest]:
+    """The nearest poses of targets (N, m) or (N, 4, 4); near: (N, n)."""
+    N, n = near.shape
+    pool, features = _pool(arm, task)
+    goal = _features(arm, task, target)
+    apart = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # and the goal's own square
+    nearest = np.argpartition(apart, STARTS, axis=1)[:, :STARTS]
+    nearest.sort(axis=1)
+    home = np.broadcast_to(np.clip(arm.home, arm.lower, arm.upper), (N, 1, n))
+    starts = np.concatenate([np.clip(near, arm.lower, arm.upper)[:, None], home, pool[nearest]], axis=1)
+    every = starts.shape[1]
+    q = _descend(arm, task, starts.reshape(-1, n).copy(), np.repeat(target, every, axis=0))
+    cost = _cost(arm, task, q, np.repeat(target, every, axis=0)).reshape(N, every)
+    order = np.argsort(cost, axis=1, kind="stable")[:, :FINALISTS]
+    q = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1).reshape(-1, n)
+    each = np.repeat(target, FINALISTS, axis=0)
+    q, converged = _finish(arm, task, q, each)
+    cost = _cost(arm, task, q, each).reshape(N, FINALISTS)
+    moved = np.abs((q.reshape(N, FINALISTS, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
+    equal = cost <= cost.min(axis=1, keepdims=True) * (1 + 1e-9) + 1e-18
+    best = np.arange(N) * FINALISTS + np.where(equal, moved, np.inf).argmin(axis=1)
+    T = fk(arm, q[best])
+    missing, p = residual(task, T, q[best], target), task.position
+    return [
+        Closest(
+            q=q[k],
+            position=T[i, :3, 3],
+            distance=float(np.linalg.norm(missing[i, :p])),
+            angle=float(np.linalg.norm(missing[i, p:])),
+            converged=bool(converged[k]),
+        )
+        for i, k in enumerate(best)
+    ]
+
+
+@lru_cache(maxsize=16)
+def _pool(arm: Arm, task: Task) -> tuple[Array, Array]:
+    """Postures spread within limits (P, n), and what is compared of them with targets: see `_features`."""
     rng = np.random.default_rng(11)
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
     high = np.where(np.isfinite(arm.upper), arm.upper, np.maximum(span, arm.home + span))
-    close = one_pose(arm, arm.home if near is None else near, "near")
-    starts = np.concatenate([[close, arm.home], rng.uniform(low, high, (STARTS, arm.n))])
-    q = np.clip(starts, arm.lower, arm.upper)
-    q = _descend(arm, definition, q, np.repeat(goal, len(q), axis=0))
-    cost = _cost(arm, definition, q, np.repeat(goal, len(q), axis=0))
-    q = q[np.argsort(cost, kind="stable")[:FINALISTS]]
-    q, converged = _finish(arm, definition, q, np.repeat(goal, len(q), axis=0))
-    cost = _cost(arm, definition, q, np.repeat(goal, len(q), axis=0))
-    unit = radian_or_reach(arm)
-    moved = np.abs((q - close) / unit).sum(axis=1)
-    best = np.flatnonzero(cost <= cost.min() * (1 + 1e-9) + 1e-18)
-    k = int(best[np.argmin(moved[best])])
-    missing = residual(definition, fk(arm, q[k : k + 1]), q[k : k + 1], goal)[0]
-    p = definition.position
-    return Closest(
-        q=q[k],
-        position=fk(arm, q[k])[:3, 3],
-        distance=float(np.linalg.norm(missing[:p])),
-        angle=float(np.linalg.norm(missing[p:])),
-        converged=bool(converged[k]),
-    )
+    q = rng.uniform(low, high, (POOL, arm.n))
+    return q, _features(arm, task, targets_of(task, fk(arm, q), q))
+
+
+def _features(arm: Arm, task: Task, target: Array) -> Array:
+    """Numbers (N, f) of targets whose distance is about that of what is minimised."""
+    full = task.orientation == "full"
+    point = target[:, :3, 3] if full else target[:, : task.position]
+    sums = target[:, task.position : task.position + len(task.sums)] if not full else np.zeros((len(target), 0))
+    parts = [point / arm.reach, 0.25 * np.cos(sums), 0.25 * np.sin(sums)]
+    if full:
+        parts.append((0.25 / 2**0.5) * target[:, :3, :3].reshape(-1, 9))
+    elif task.orientation == "axis":
+        parts.append(0.25 * target[:, 3:])
+    return np.concatenate(parts, axis=1)
 
 
 def _weighted(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
@@ -98,7 +148,7 @@ def _weighted(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Arr
 def _downhill(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Half the negative gradient of the squared residual (M, n), joints in rad or reaches."""
     r, J = _weighted(arm, task, q, target)
-    downhill: Array = np.einsum("mrn,mr->mn", J, r)
+    downhill: Array = (r[:, None] @ J)[:, 0]
     return downhill
 
 
@@ -154,10 +204,10 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     active = np.arange(len(q))
     for _ in range(STEPS):
         r, J = _weighted(arm, task, q[active], target[active])
-        downhill = np.einsum("mrn,mr->mn", J, r)
+        downhill = (r[:, None] @ J)[:, 0]
         held = _stopped(arm, q[active], downhill)
         J = np.where(held[:, None, :], 0.0, J)
-        H = np.einsum("mri,mrj->mij", J, J) + damping[active][:, None, None] * np.eye(arm.n)
+        H = J.swapaxes(1, 2) @ J + damping[active][:, None, None] * np.eye(arm.n)
         step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         trial = np.clip(q[active] + step * unit, arm.lower, arm.upper)

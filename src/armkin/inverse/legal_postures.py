@@ -17,7 +17,6 @@ from armkin.inverse.closest import closest
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
 from armkin.inverse.solutions import Status
-from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
 OFF = 1e-7  # [rad, reaches] how far outside limits a double root may be that stands for one on them
@@ -47,7 +46,8 @@ def listed(goals: Goals, out: Batch) -> Batch:
             continue
         legal = closest(arm, target[k], task.name, near=near[k]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
-        if not limits.outside(arm, exact[0]).any():  # the correction may take a double root beyond its limit
+        # the correction may take a double root beyond its limit
+        if ((exact[0] >= arm.lower) & (exact[0] <= arm.upper)).all():
             legal = exact[0]
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
