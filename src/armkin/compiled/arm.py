@@ -18,10 +18,10 @@ from armkin.compiled.results import Results
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
-from armkin.inverse import solve
+from armkin.inverse import near_itself, solve, target_rounding
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
-from armkin.inverse.numeric.tolerances import FAR
+from armkin.inverse.numeric.tolerances import FAR, SOLUTION
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
@@ -80,12 +80,18 @@ class CompiledArm:
         return self._of(None).clearance(q)
 
     def ik(
-        self, targets: ArrayLike, task: str | None = None, near: ArrayLike | None = None, *, workers: int = 1
+        self,
+        targets: ArrayLike,
+        task: str | None = None,
+        near: ArrayLike | None = None,
+        *,
+        workers: int = 1,
+        rounding: ArrayLike | None = None,
     ) -> Solutions:
         """All branches, as `armkin.ik`; workers: threads that share a large batch."""
         if workers != 1:
             check(workers)
-        return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers)
+        return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers, rounding)
 
     def _of(self, task: str | None) -> _CompiledTask:
         """The library for a task, built at its first use."""
@@ -160,24 +166,25 @@ class _CompiledTask:
             out[far] = python(self.arm, flat[far])
         return out.reshape(*values.shape[:-1], *shape)
 
-    def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int) -> Solutions:
-        """All branches of targets in the task's shape."""
+    def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None = None) -> Solutions:
+        """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""
         if not self.branches:
-            return solve.ik(self.arm, targets, self.name, near=near)
-        if self._single is not None and type(targets) is np.ndarray and targets.shape == self.goal_shape:
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
+        alone = self._single is not None and said is None
+        if alone and type(targets) is np.ndarray and targets.shape == self.goal_shape:
             found = self._alone(targets, near)
             if found is not None:
                 return found
         if self.turned is not self.arm:
-            return self._commanded(targets, near, workers)
+            return self._commanded(targets, near, workers, said)
         given = arrays.real(targets, "targets")
         m = len(self.goal_shape)
         if given.shape[-m:] != self.goal_shape or given.ndim < m:
-            return solve.ik(self.arm, targets, self.name, near=near)  # says what is wrong
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)  # says what is wrong
         lead = given.shape[: given.ndim - m]
         close = self.arm.home if near is None else arrays.real(near, "near")
         if close.shape not in ((self.n,), (*lead, self.n)) or not np.isfinite(close).all():
-            return solve.ik(self.arm, targets, self.name, near=near)
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
         target = np.ascontiguousarray(given.reshape(-1, *self.goal_shape))
         each, rounding = np.ascontiguousarray(close), np.zeros(len(target))
         solved = self._solved if self.geometry.pairs is not None else self._in_blocks
@@ -187,6 +194,12 @@ class _CompiledTask:
             target, rounding = np.ascontiguousarray(read.values), read.rounding
             out = solved(target, each, workers, read=True)
             assert out is not None
+        single = target_rounding.is_single(targets)
+        rounding, most = target_rounding.of_targets(self.arm, self.task, target, rounding, single, said, lead)
+        rows = near_itself.standing(self.arm, self.task, target, each, most)
+        if len(rows):
+            beside = each if each.ndim == 1 else each.reshape(-1, self.n)[rows]
+            out.write(rows, solve.ik(self.arm, target[rows], self.name, near=beside, rounding=most[rows] - SOLUTION))
         if self.arm.prismatic.any():
             out.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
@@ -275,11 +288,11 @@ class _CompiledTask:
             out.write(rows, found)
         return out
 
-    def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int) -> Solutions:
+    def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:
         """A calibrated arm, by way of its actual joint values."""
         inner = compile(self.turned)
         close = solve._actual_near(self.arm, near)
-        return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers))
+        return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=said))
 
 
 def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]:

@@ -95,8 +95,10 @@ class Answer(NamedTuple):
     names: tuple[str, ...] = ()  # of all branches that the arm may have
 
 
-def solve(request: Request, targets: Array) -> list[Answer]:
+def solve(request: Request, targets: Array, rounding: Array | None = None) -> list[Answer]:
     """Answer targets (N, ...) [mm, rad]; with swept joints and `every` no more than `most_targets`.
+
+    rounding: (N,) of the targets, see `armkin.ik`.
 
     Raises UsageError if the task does not fit the arm, no branch has the name asked for, or more than
     MOST_SWEEPS combinations are swept.
@@ -109,7 +111,7 @@ def solve(request: Request, targets: Array) -> list[Answer]:
     found = [_Found() for _ in targets]
     for held in _holds(request):
         one = _locked(arm, tuple(held.items()))
-        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)])
+        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)], rounding=rounding)
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}

@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.forward import position
+from armkin.inverse.batch import Batch, Goals, named, wider
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import HAIR, SOLUTION, THERE
+from armkin.inverse.solutions import Status
 from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
-    from armkin.inverse.batch import Batch, Goals
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -80,3 +82,50 @@ def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]
     out.within[rows[stays], place[stays]] = True
     left: NDArray[np.intp] = rows[solves & ~stays]
     return left
+
+
+def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> NDArray[np.intp]:
+    """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within most (N,) [reaches, rad].
+
+    Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
+    """
+    rows = np.flatnonzero(most > 1.001 * SOLUTION)
+    if not len(rows):
+        return rows
+    close = np.broadcast_to(near, (len(target), arm.n))
+    tip = position(arm, near)
+    point = target[rows, :3, 3] if task.orientation == "full" else target[rows, : task.position]
+    away = np.abs(point - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]).max(axis=1)
+    rows = rows[away <= most[rows] * arm.reach]
+    rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
+    there: NDArray[np.intp] = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
+    return there
+
+
+def stand(goals: Goals, out: Batch, most: Array) -> Batch:
+    """The same branches, with `near` among them where it solves a rounded target: see `standing`.
+
+    In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
+    others, the target is a boundary.
+    """
+    arm, task, target, near = goals
+    rows = standing(arm, task, target, near, most)
+    if not len(rows):
+        return out
+    away = newton.wrapped_distance(arm, out.q[rows], near[rows, None])
+    away = np.where(out.valid[rows], away, np.inf)
+    if not away.shape[1]:
+        away = np.full((len(rows), 1), np.inf)
+    place, there = away.argmin(axis=1), away.min(axis=1) <= THERE
+    some = np.flatnonzero(~there & np.isfinite(away.min(axis=1)))
+    way = newton.difference(arm, out.q[rows[some], place[some]], near[rows[some]])
+    between = near[rows[some]] + 0.5 * way * radian_or_reach(arm)
+    there[some] = newton.missing(arm, task, between, target[rows[some]]) <= most[rows[some]]
+    count = out.valid[rows].sum(axis=1)
+    place = np.where(there, place, count)
+    if int(place.max(initial=-1)) >= out.q.shape[1]:
+        out = wider(out, int(place.max()) + 1)
+    out.q[rows, place], out.valid[rows, place], out.within[rows, place] = near[rows], True, True
+    out.branch[rows] = named(out.branch[rows].astype(np.int64), out.valid[rows])
+    out.status[rows[count == 0]] = Status.BOUNDARY
+    return out

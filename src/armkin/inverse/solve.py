@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
-from armkin.inverse import chunks, legal_postures, near_itself, one_target
+from armkin.inverse import chunks, legal_postures, near_itself, one_target, target_rounding
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -48,13 +48,16 @@ def ik(
     near: ArrayLike | None = None,
     examine: bool = True,
     workers: int = 1,
+    rounding: ArrayLike | None = None,
 ) -> Solutions:
     """All real branches of inverse kinematics.
 
     targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
     arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home;
     examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
-    them: some of their branches may be missing; workers: threads that share a large batch, whose results are the same.
+    them: some of their branches may be missing; workers: threads that share a large batch, whose results are the same;
+    rounding: () or (...) how far the targets' numbers may be off [reaches, rad], by default what the arrays show: near,
+    where it solves its target to within that, is a branch and the best one.
     Raises UsageError if the task does not fit the arm or a target is malformed.
 
     >>> import armkin, numpy as np
@@ -65,13 +68,23 @@ def ik(
     """
     if workers != 1:
         check(workers)
-    values = arrays.real(targets, "targets")
-    if examine and values.ndim <= 2 and (alone := one_target.solve(arm, values, task, near)) is not None:
+    values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
+    if (
+        rounding is None
+        and not single
+        and examine
+        and values.ndim <= 2
+        and (alone := one_target.solve(arm, values, task, near)) is not None
+    ):
         return alone
     if (turned := actual(arm)) is not arm:
         return _commanded(
-            arm, ik(turned, targets, task, near=_actual_near(arm, near), examine=examine, workers=workers)
-        )
+            arm,
+            ik(
+                turned, targets, task,
+                near=_actual_near(arm, near), examine=examine, workers=workers, rounding=rounding,
+            ),
+        )  # fmt: skip
     definition, geometry = solver(arm, task)
     given, lead = shaped(definition, values)
     close = arm.home if near is None else arrays.real(near, "near")
@@ -83,13 +96,15 @@ def ik(
     each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count, target, rounding = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
+        out, count, target, shown = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
     else:
-        target, _, rounding = read_targets(definition, values)
+        target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
+    shown, most = target_rounding.of_targets(arm, definition, target, shown, single, rounding, lead)
     if examine:
         out = legal_postures.listed(Goals(arm, definition, target, each), out)
+        out = near_itself.stand(Goals(arm, definition, target, each), out, most)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
@@ -112,7 +127,7 @@ def ik(
         method=geometry.name,
         why=geometry.why,
         complete=out.complete.reshape(lead),
-        rounding=rounding.reshape(lead),
+        rounding=shown.reshape(lead),
     )
 
 

@@ -124,7 +124,7 @@ def ik(
     inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     goal = units.targets_in(what.labels, values)
-    [found] = choose.solve(request, goal)
+    [found] = choose.solve(request, goal, _rounding(arm, what, values))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
@@ -143,11 +143,18 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _compiled(arm: Arm, targets: Array, task: str | None, near: Array) -> Solutions:
+def _rounding(arm: Arm, task: Task, values: Array) -> Array:
+    """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with."""
+    from armkin.inverse import target_rounding
+
+    return target_rounding.printed(units.label_units(task.labels), values, arm.reach)
+
+
+def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, rounding: Array | None = None) -> Solutions:
     """`armkin.ik` by machine code."""
     import armkin
 
-    return armkin.compile(arm).ik(targets, task, near)
+    return armkin.compile(arm).ik(targets, task, near, rounding=rounding)
 
 
 @dataclass
@@ -179,7 +186,8 @@ class Questions:
         from armkin.columns import branches
 
         targets = units.targets_in(self.task.labels, chunk.values)
-        found = branches.listed(self.request, targets, np.asarray(chunk.numbers), self.all_branches)
+        rounding = _rounding(self.request.arm, self.task, chunk.values)
+        found = branches.listed(self.request, targets, np.asarray(chunk.numbers), self.all_branches, rounding=rounding)
         return found.table, ~found.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
@@ -205,7 +213,7 @@ class Questions:
         for first in range(0, len(chunk.values), most):
             part = chunk.values[first : first + most]
             targets = units.targets_in(self.task.labels, part)
-            found = choose.solve(self.request, targets)
+            found = choose.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
             each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
             for values, goal, (request, one) in zip(part.tolist(), targets, each, strict=True):
                 yield _answer(

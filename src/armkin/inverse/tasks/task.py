@@ -37,7 +37,7 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
-ROTATION = 1e-6  # largest distance from orthonormal columns that is taken for the rounding of a rotation
+ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
 ROUNDED = 1e-14  # and that needs no correction
 LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
 
@@ -80,7 +80,7 @@ def read_targets(task: Task, targets: ArrayLike) -> Targets:
 
     A pose whose rotation was rounded, to six decimals or to float32, is answered as the rotation next to
     it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
-    length or a matrix that is no rotation to 1e-6.
+    length or a matrix that is no rotation to 5e-6.
     """
     flat, lead = shaped(task, targets)
     rounding = np.zeros(len(flat))
@@ -128,7 +128,7 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
     entries = pose.read(T)
     off = _off(T, entries)
     if not (off <= ROTATION).all():
-        raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 1e-6")
+        raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 5e-6")
     some = np.flatnonzero(off > ROUNDED)
     if len(some):
         T = T.copy()
@@ -162,7 +162,7 @@ def _off(T: Array, entries: pose.Pose) -> Array:
 
 
 def nearest_rotation(R: Array) -> Array:
-    """The rotations next to matrices (N, 3, 3) that are rotations to 1e-6: their orthogonal polar factors.
+    """The rotations next to matrices (N, 3, 3) that are rotations to 5e-6: their orthogonal polar factors.
 
     Two steps of Newton and Schulz, R (3 - R^T R) / 2, each of which squares the distance
     (Higham, Functions of Matrices, 2008, eq. 8.20).

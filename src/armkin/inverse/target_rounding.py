@@ -1,0 +1,83 @@
+"""How far a target's numbers may be off by their rounding: what `near` may miss and still stand there.
+
+An arm that is asked for its own pose, printed in six digits or kept in float32, is asked for another pose: near a
+singular posture the exact answer to that one is far away. docs/solution.md says what follows.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin.errors import UsageError
+from armkin.formula import arrays
+from armkin.formula.arrays import Array
+from armkin.inverse.numeric.tolerances import SOLUTION
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+# A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
+# the defect of nine rounded entries is less than a quarter of it in one case of 100,000.
+DEFECTS = 4.0
+FLOAT32 = 2.0**-24  # of a number: half a unit of its last place
+FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
+
+
+class Rounding(NamedTuple):
+    """Of N targets: the rounding that is known (N,) and the residual that solves them (N,), both [reaches, rad]."""
+
+    known: Array
+    most: Array
+
+
+def is_single(targets: Any) -> bool:
+    """Whether targets are an array in float32."""
+    return getattr(targets, "dtype", None) == np.float32
+
+
+def of_targets(
+    arm: Arm, task: Task, target: Array, defect: Array, single: bool, given: ArrayLike | None, lead: tuple[int, ...]
+) -> Rounding:
+    """The rounding of targets (N, ...), a batch of shape lead.
+
+    defect: (N,) of rotations; single: they were given in float32; given: () or (...) what the caller says it is.
+    Raises UsageError for a rounding that is negative, not finite or of another shape.
+    """
+    if given is not None:
+        said = arrays.real(given, "rounding")
+        if said.shape not in ((), lead) or not np.isfinite(said).all() or (said < 0.0).any():
+            shapes = "() or " + str(lead) if lead else "()"
+            raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {said.shape}")
+        known = np.broadcast_to(said, lead).reshape(-1).astype(float)
+        return Rounding(known, SOLUTION + known)
+    known = defect
+    if single:
+        point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+        largest = np.abs(point).max(axis=1, initial=0.0) / arm.reach
+        known = np.maximum(defect, FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
+    return Rounding(known, SOLUTION + DEFECTS * known)
+
+
+def printed(units: Sequence[str], values: Array, reach: float) -> Array:
+    """The rounding (N,) [reaches, rad] of targets as they are printed, (N, m) in units ("mm", "deg", "").
+
+    Half the last decimal of each number that has three or more, together; 390 and 400.0 are exact.
+    """
+    values = np.asarray(values, float).reshape(-1, len(units))
+    off = np.zeros_like(values)
+    left = np.ones(values.shape, bool)
+    for decimals in range(MOST):
+        scaled = values * 10.0**decimals
+        here = left & (np.abs(scaled - np.rint(scaled)) <= 4e-16 * np.maximum(np.abs(scaled), 1.0))
+        if decimals >= FEWEST:
+            off[here] = 0.5 * 10.0**-decimals
+        left &= ~here
+    scale = [np.pi / 180.0 if unit == "deg" else 1.0 / reach if unit == "mm" else 1.0 for unit in units]
+    size: Array = np.linalg.norm(off * scale, axis=1)
+    return size

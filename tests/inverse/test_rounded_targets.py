@@ -1,0 +1,104 @@
+"""An arm that stands at a singular posture and is asked for its own pose, rounded, stays where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_every_branch import shipped
+
+import armkin
+from armkin import Status
+from armkin.errors import UsageError
+from armkin.inverse.target_rounding import printed
+from armkin.inverse.tasks.task import LABELS
+from armkin.model.units import targets_out
+from command_line import run
+
+DIGITS = (6, 8, 12, 0)  # 0: float32
+
+
+def postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
+    """Within limits, joint 5 straight (of a CRX joint 3 folded), every other one at typed angles."""
+    arm, _ = shipped(name)
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(np.clip(arm.lower, -3.0, 3.0), np.clip(arm.upper, -3.0, 3.0), (count, arm.n))
+    q[::2] = np.radians(15.0 * np.rint(np.degrees(q[::2]) / 15.0))
+    q[:, 4] = 0.0
+    return arm, np.clip(q, arm.lower, arm.upper)
+
+
+def rounded(T: np.ndarray, digits: int) -> np.ndarray:
+    return np.round(T, digits) if digits else T.astype(np.float32)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia"])
+def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
+    """Up to 37 of 40 moved by more than 10 degrees; some were called unreachable."""
+    arm, q = postures(name, 4, 3)
+    T = armkin.fk(arm, q)
+    for digits in DIGITS:
+        given = rounded(T, digits)
+        many = armkin.ik(arm, given, near=q)
+        assert (many.best >= 0).all(), digits
+        best = many.q[np.arange(len(q)), many.best]
+        np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=f"{digits} digits")
+        k = digits % len(q)
+        one = armkin.ik(arm, given[k], near=q[k])
+        np.testing.assert_array_equal(one.q[one.best], best[k])
+        assert one.status == many.status[k]
+
+
+@pytest.mark.parametrize("name", ["ur5e", "puma560"])
+def test_machine_code_stays_as_python_does(name: str) -> None:
+    arm, q = postures(name, 4, 5)
+    T, fast = armkin.fk(arm, q), armkin.compile(armkin.load(name))
+    for digits in (7, 0):
+        found, slow = fast.ik(rounded(T, digits), near=q), armkin.ik(arm, rounded(T, digits), near=q)
+        best = found.q[np.arange(len(q)), found.best]
+        np.testing.assert_array_equal(best, slow.q[np.arange(len(q)), slow.best])
+        np.testing.assert_allclose(best, q, rtol=0, atol=1e-6)
+
+
+def test_where_it_is_the_only_row_the_target_is_a_boundary() -> None:
+    """Stretched, and printed a little beyond the reach."""
+    arm, _ = shipped("planar_2dof")
+    target, near = [500.0004, 0.0], np.zeros(2)
+    assert armkin.ik(arm, target, near=near).status == Status.UNREACHABLE
+    for targets in (target, [target] * 3):
+        s = armkin.ik(arm, targets, near=near, rounding=1e-6)
+        assert np.all(s.status == Status.BOUNDARY)
+        assert np.all(s.valid.sum(axis=-1) == 1)
+        assert np.all(s.best == 0)
+        assert np.all(s.q[..., 0, :] == near)
+        assert np.all(s.rounding == 1e-6)
+
+
+def test_a_near_outside_limits_is_no_answer_however_the_target_is_rounded() -> None:
+    arm, _ = shipped("irb120")
+    q = np.full(6, 0.3)
+    q[4], q[0] = 0.0, arm.upper[0] + 1e-3
+    s = armkin.ik(arm, np.round(armkin.fk(arm, q), 6), near=q)
+    assert s.best < 0 or np.abs(s.q[s.best] - q).max() > 1e-4
+
+
+@pytest.mark.parametrize("wrong", [-1e-9, np.nan, [1e-9, 1e-9]])
+def test_a_rounding_that_is_none_is_refused(wrong: float | list[float]) -> None:
+    arm, _ = shipped("ur5e")
+    with pytest.raises(UsageError, match="rounding: expected finite numbers from 0"):
+        armkin.ik(arm, armkin.fk(arm, arm.home), rounding=wrong)
+
+
+def test_printed_decimals_are_counted_from_the_third_on() -> None:
+    rows = np.array([[390.0, 400.5, 12.25], [390.125, 0.0, 0.0], [0.123456, -2.5, 1.0 / 3.0]])
+    off = printed(["mm", "mm", "deg"], rows, 1000.0)
+    np.testing.assert_allclose(off, [0.0, 0.5e-6, 0.5e-9], rtol=1e-9)
+
+
+def test_six_printed_decimals_on_the_command_line_move_no_joint() -> None:
+    q = [10.0, -80.0, 70.0, -30.0, 0.0, 20.0]
+    T = armkin.fk(armkin.load("ur5e"), np.radians([q]))
+    words = [f"{value:.6f}" for value in targets_out(LABELS["pose"], T)[0]]
+    done = run("ik", "ur5e", *words, "--near", ",".join(map(str, q)), "--json")
+    assert done.code == 0
+    best = done.json["branches"][done.json["best"]]
+    np.testing.assert_allclose(best["joints"], q, atol=1e-9)
