@@ -9,6 +9,7 @@ one_target.py       a single pose of a closed form in plain numbers, without num
 batch.py            arrays of all targets, as the solvers fill them
 chunks.py           closed forms: chunks of a batch that stay in the cache; workers.py: threads that share it
 near_itself.py      `near` where it solves its target itself
+target_rounding.py  how far a target's numbers may be off, which `near` may miss
 singularities.py    boundaries and singular postures
 doubtful.py         targets that may be singular: regular_targets.py decides most at once, singularities.py the rest
 fold_singularities.py  postures at which two roots meet, told from self-motions

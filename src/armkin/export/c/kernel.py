@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from armkin import forward
 from armkin.export.c import formulas
 from armkin.formula import c_and_js_code, recording
+from armkin.inverse.closed.precision import DOUBLE, SINGLE, recorded_for
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -32,7 +33,8 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
             near = f"near[{j} * ARM_LANES + i]"
             ways = [("c", f"ARM_COS({near})"), ("s", f"ARM_SIN({near})")]
             declared += [(f"p{j}", near)] if arm.prismatic[j] else [(f"{w}{j}", text) for w, text in ways]
-    recorded = formulas.candidates(arm, task, geometry, prefer)
+    with recorded_for(SINGLE if single else DOUBLE):
+        recorded = formulas.candidates(arm, task, geometry, prefer)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
     *values, miss, _ = formulas.by_branch(recorded, code)
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]

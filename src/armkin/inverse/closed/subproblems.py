@@ -19,7 +19,8 @@ import numpy as np
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.inverse.numeric.tolerances import FREE, ONE_ROOT, TANGENT, TOUCHING
+from armkin.inverse.closed.precision import precision
+from armkin.inverse.numeric.tolerances import TOUCHING
 
 
 class Pair(NamedTuple):
@@ -109,7 +110,7 @@ def signs(axis: int) -> Array:
 
 def linear(
     a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, prefer: Pair | None, disc: Entry | None = None,
-    tangent: float = TANGENT,
+    tangent: float | None = None,
 ) -> tuple[Pair, Doubt]:  # fmt: skip
     """Solve ``a cos(q) + b sin(q) = c`` for both roots (Siciliano et al., Robotics, eq. 2.A; IK-Geo subproblem 4).
 
@@ -126,9 +127,10 @@ def linear(
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     if disc is None:
         disc = h2 - c * c
-    edge = np.abs(disc) < tangent * h2
+    close = precision()
+    edge = np.abs(disc) < (close.tangent if tangent is None else tangent) * h2
     root = np.sqrt(np.maximum(disc, 0.0)) * sign
-    least = FREE * scale * scale
+    least = close.free * scale * scale
     if isinstance(h2, float) and isinstance(least, float):
         free: Entry = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
         inverse: Entry = 1.0 / max(h2, least)
@@ -145,7 +147,7 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
     """``a^2 + b^2 - c^2`` for `linear`, zero where rounding alone parts the two roots."""
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     disc = h2 - c * c
-    out: Entry = np.where(np.abs(disc) < ONE_ROOT * h2, 0.0, disc)
+    out: Entry = np.where(np.abs(disc) < precision().one_root * h2, 0.0, disc)
     return out
 
 
@@ -170,7 +172,8 @@ def rotation_between(
     if the target is reached; the pair of a target that is not is then not normalised.
     Returns the pair and doubt: where u or v vanishes, so that the angle is free.
     """
-    least = FREE * scale * scale
+    close = precision()
+    least = close.free * scale * scale
     if length2 is not None:
         free = length2 < least
         inverse = 1.0 / np.maximum(length2, least)

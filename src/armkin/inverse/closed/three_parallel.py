@@ -17,9 +17,10 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between
 from armkin.inverse.closed.three_link import ThreeLink
-from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -85,7 +86,6 @@ class ThreeParallel:
         self.cos5, self.sin5 = float(m[0] * b[0] + m[1] * b[1]), float(m[1] * b[0] - m[0] * b[1])
         self.rest5 = float(m[2] * b[2])
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
-        self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
         self.m = [float(v) for v in m]
         self.B = pose.constant(L5)
         # distance along the common direction from joint 2 to the point where axes 5 and 6 meet
@@ -113,7 +113,9 @@ class ThreeParallel:
         ]
         w = pose.turn_back(D, turned)
         disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, self.tangent)
+        close = precision()
+        tangent = close.sharp if self.orthogonal else close.tangent  # of an oblique wrist both roots merge whole
+        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
         c5, s5 = fifth
         mx, my, mz = self.m
         v = pose.turn_back(

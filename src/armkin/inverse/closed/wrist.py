@@ -6,8 +6,9 @@ import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
+from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
-from armkin.inverse.numeric.tolerances import EXACT, SHARP, TANGENT
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse
 
@@ -45,7 +46,6 @@ class Wrist:
         self.rest5 = float(A[2, 2] * b[2])
         self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
         self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
-        self.tangent = SHARP if self.orthogonal else TANGENT  # of an oblique wrist both roots merge whole
 
     def solve(
         self, x: list[Entry], z: list[Entry], prefer: Prefer
@@ -55,7 +55,9 @@ class Wrist:
         if self.mirrored:
             return self._mirrored(x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
-        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, self.tangent)
+        close = precision()
+        tangent = close.sharp if self.orthogonal else close.tangent  # of an oblique wrist both roots merge whole
+        fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, tangent)
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         return [fourth, fifth, sixth], [], doubt5 | doubt4, wrong
 
@@ -91,4 +93,4 @@ class Wrist:
             sign * np.arctan2(fifth.s, fifth.c),
             q6 - flipped * np.copysign(np.pi, q6),
         ]
-        return [fourth, fifth, sixth], angles, (disc < SHARP) | doubt4, wrong
+        return [fourth, fifth, sixth], angles, (disc < precision().sharp) | doubt4, wrong
