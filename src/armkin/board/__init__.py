@@ -5,6 +5,7 @@ planner.py    plans one after another, rows as they come, where the arm stands
 path_run.py   a planned path, part by part, the gripper between
 stopping.py   signals while an arm moves
 summaries.py  what a plan comes to and where the arm stands, as JSON has it
+conformance.py  the suite that every kind passes, for those of other packages, too
 ports/        what every port can do; serial ports, and the lock that keeps two programs from one arm
 backend/      what every kind of board can do: Board is the one class that a kind is
 firmware/     our own firmware's protocol, sessions, configuration, motion; resuming of a motion that was held

@@ -1,0 +1,304 @@
+"""What every kind of board must hold, as a suite that is given a way to start a kind's emulator.
+
+    @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
+    def test_my_kind(case): case(start)
+
+`start` gives an `Emulated`: a board on which the arm stands at home, and what its motors really do. Never a false
+position, never success for what was not done, never a hang: a case that finds one raises AssertionError.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from armkin.board.backend import Backend, StoppedError
+from armkin.board.backend.board import Board
+from armkin.board.backend.starting import StartError
+from armkin.board.ports import Port, note_path, record_path
+from armkin.errors import ArmkinError, LinkError
+from armkin.formula.arrays import Array
+from armkin.motors import joints
+
+PATIENCE = 120.0  # [s] that a motion may take longer than planned, whatever happens
+_numbers = itertools.count()
+
+
+@dataclass
+class Emulated:
+    """An emulator of a kind's board on which the arm stands at home."""
+
+    board: Board
+    port: Port
+    pins: Callable[[], Sequence[float]]  # counts where the motors really stand
+    reset: Callable[[], None] | None = None  # the board starts anew
+    foreign: Sequence[Callable[[], None]] = ()  # what another program does to it on its port
+    stall: Callable[[], None] | None = None  # an axis sticks, of a kind that sees it
+    tolerance: int = 0  # [counts] of a position at rest
+    line: Line = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.line = Line(self.port)
+
+
+class Line:
+    """The way to an emulator: what goes over it may be lost, doubled or damaged, and it may be cut."""
+
+    simulated = False  # nobody vouches for a position by itself
+
+    def __init__(self, port: Port) -> None:
+        self._port, self.baud = port, port.baud
+        self.name = f"conformance-{os.getpid()}-{next(_numbers)}"
+        self.spoil: Callable[[bytes], bytes] = bytes
+        self.cut = False
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._whole()
+        self._port.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, or comes within `timeout` seconds."""
+        self._whole()
+        return self.spoil(self._port.read(timeout))
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+        return self._port.now()
+
+    def close(self) -> None:
+        """The emulator stays."""
+
+    def _whole(self) -> None:
+        if self.cut:
+            raise LinkError(f"port {self.name} is gone")
+
+
+Start = Callable[[], Emulated]
+
+
+@contextmanager
+def _started(start: Start) -> Iterator[Emulated]:
+    one = start()
+    try:
+        yield one
+    finally:
+        for path in (note_path(one.line.name), record_path(one.line.name)):
+            with suppress(OSError):
+                os.unlink(path)
+
+
+def _pins(one: Emulated) -> list[int]:
+    return [round(value) for value in one.pins()]
+
+
+def _connected(one: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
+    """The arm, whose place is known: from the board, or on the word of somebody who looks."""
+    machine = one.board.connect(one.line, stop)
+    lost = machine.position() == "lost"
+    machine.prepare(assume=joints(machine.arm, _pins(one)) if lost else None)
+    return machine
+
+
+def _near(one: Emulated, counts: Sequence[int]) -> bool:
+    return bool(np.abs(np.array(counts) - one.pins()).max() <= one.tolerance)
+
+
+def _check_truth(one: Emulated) -> str:
+    """What the board says of its position, which must be true: known, lost, or an error in words."""
+    one.line.spoil, one.line.cut = bytes, False
+    _rest(one)
+    try:
+        machine = one.board.connect(one.line)
+    except LinkError as error:
+        return str(error)
+    known = machine.position() != "lost"
+    assert not known or _near(one, machine.counts()), f"a false position: {machine.counts()}, pins at {_pins(one)}"
+    return "known" if known else "lost"
+
+
+def _rest(one: Emulated) -> None:
+    """Wait until nothing moves any more."""
+    end, before = one.line.now() + PATIENCE, list[int]()
+    while before != (now := _pins(one)) and one.line.now() < end:
+        before = now
+        until = one.line.now() + 1.0
+        while one.line.now() < until:
+            one.port.read(0.05)
+
+
+def _carried_out(one: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
+    """Run a motion; False if it was refused or broke off in words. What is said to be done must be done."""
+    began = one.line.now()
+    plan = machine.plan(machine.counts(), goal, speed=speed)
+    try:
+        machine.run([plan])
+    except (ArmkinError, StoppedError):
+        done = False
+    else:
+        done = True
+        assert _near(one, plan.end.tolist()), f"said to be done: {plan.end.tolist()}, pins at {_pins(one)}"
+    assert one.line.now() - began < plan.duration + PATIENCE, "a hang"
+    return done
+
+
+def _goals(one: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:
+    rng, arm = np.random.default_rng(seed), one.board.arm
+    span = np.where(np.isfinite(arm.upper - arm.lower), arm.upper - arm.lower, 1.0)
+    while True:
+        yield np.clip(arm.home + rng.uniform(-size, size, arm.n) * np.minimum(span, 1.0), arm.lower, arm.upper)
+
+
+def moves_are_read_back_exactly(start: Start, moves: int = 200) -> None:
+    """Where the board says that it stands is where its motors stand, after each of many moves."""
+    with _started(start) as one:
+        machine = _connected(one)
+        for goal in itertools.islice(_goals(one, 3), moves):
+            assert _carried_out(one, machine, goal)
+            assert _near(one, machine.counts())
+
+
+def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, moves: int = 6) -> None:
+    """One answer in some is lost, said twice, or has a bit flipped."""
+    for kind, share in itertools.product(("lost", "doubled", "damaged"), (0.01, 0.1)):
+        rng = random.Random(f"{kind} {share}")
+
+        def spoil(data: bytes, kind: str = kind, share: float = share, rng: random.Random = rng) -> bytes:
+            if not data or rng.random() > share:
+                return data
+            k = rng.randrange(len(data))
+            changed = data[:k] + bytes([data[k] ^ 1 << rng.randrange(8)]) + data[k + 1 :]
+            return {"lost": b"", "doubled": data + data, "damaged": changed}[kind]
+
+        with _started(start) as one:
+            _connected(one)
+            for goal in itertools.islice(_goals(one, 5), moves):
+                with suppress(ArmkinError):
+                    one.line.spoil = spoil
+                    machine = one.board.connect(one.line)
+                    if machine.position() != "lost":
+                        machine.prepare()
+                        _carried_out(one, machine, goal)
+                if _check_truth(one) != "known":
+                    with suppress(ArmkinError):
+                        _connected(one)
+
+
+def _while_moving(one: Emulated, asks: int, act: Callable[[], None]) -> bool:
+    """A motion during which something happens, the stop having been asked for so many times."""
+    count = itertools.count()
+
+    def stop() -> bool:
+        if next(count) == asks:
+            act()
+        return False
+
+    machine = _connected(one, stop)
+    return _carried_out(one, machine, _away(one), 0.5)
+
+
+def _away(one: Emulated) -> Array:
+    """A goal some way from where the arm stands."""
+    here = joints(one.board.arm, _pins(one))
+    return max(itertools.islice(_goals(one, 7, 0.4), 20), key=lambda q: float(np.abs(q - here).max()))
+
+
+def a_reset_in_a_motion_is_told(start: Start, moments: int = 5) -> None:
+    """The motion is not said to be done, and what is said of the position is true."""
+    for k in range(moments):
+        with _started(start) as one:
+            if one.reset is None:
+                return
+            _while_moving(one, 1 + 6 * k, one.reset)
+            _check_truth(one)
+
+
+def another_program_makes_nothing_false(start: Start) -> None:
+    """It speaks before, between and in motions."""
+    for number, asks in itertools.product(range(len(start().foreign)), (None, 1, 8, 25)):
+        with _started(start) as one:
+            act = one.foreign[number]
+            if asks is None:
+                act()
+                _check_truth(one)
+                with suppress(ArmkinError):
+                    _carried_out(one, _connected(one), next(_goals(one, 1)))
+                act()
+            else:
+                with suppress(ArmkinError):
+                    _while_moving(one, asks, act)
+            _check_truth(one)
+
+
+def a_cable_that_is_pulled_makes_nothing_false(start: Start, moments: int = 20) -> None:
+    """At many moments of a motion; the next program says where the arm stands, or that nobody knows."""
+
+    with _started(start) as one:
+
+        def pull() -> None:
+            one.line.cut = True
+
+        for k in range(moments):
+            with suppress(ArmkinError):
+                assert not _while_moving(one, 2 * k, pull) or not one.line.cut
+            _check_truth(one)
+
+
+def a_stalled_axis_is_told(start: Start) -> None:
+    """By kinds that can see one: the motion is not said to be done."""
+    with _started(start) as one:
+        if one.stall is None:
+            return
+        assert not _while_moving(one, 1, one.stall)
+
+
+def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, places: int = 20) -> None:
+    """At many places of a motion."""
+    with _started(start) as one:
+        for k in range(places):
+            count, armed = itertools.count(), list[bool]()
+
+            def stop(count: Iterator[int] = count, armed: list[bool] = armed, k: int = k) -> bool:
+                return bool(armed) and next(count) > 3 * k
+
+            machine = _connected(one, stop)
+            goal = _away(one)
+            armed.append(True)
+            with suppress(StoppedError):
+                machine.run([machine.plan(machine.counts(), goal, speed=0.5)])
+            assert _check_truth(one) == "known", "a hold has lost the position"
+            assert _carried_out(one, _connected(one), goal)
+
+
+def a_plan_that_begins_elsewhere_moves_nothing(start: Start) -> None:
+    """It is a bug of who made it, and no motion."""
+    with _started(start) as one:
+        machine = _connected(one)
+        before, there = _pins(one), machine.plan(machine.counts(), _away(one))
+        plan = machine.plan(there.end.tolist(), machine.arm.home)
+        try:
+            machine.run([plan])
+        except StartError:
+            pass
+        else:
+            raise AssertionError("a plan that begins elsewhere was carried out")
+        _rest(one)
+        assert np.abs(np.array(before) - one.pins()).max() <= one.tolerance
+
+
+CASES: tuple[Callable[[Start], None], ...] = (
+    moves_are_read_back_exactly,
+    answers_that_are_lost_doubled_or_damaged_make_nothing_false,
+    a_reset_in_a_motion_is_told,
+    another_program_makes_nothing_false,
+    a_cable_that_is_pulled_makes_nothing_false,
+    a_stalled_axis_is_told,
+    a_hold_keeps_the_position_and_the_next_motion_goes_on,
+    a_plan_that_begins_elsewhere_moves_nothing,
+)
