@@ -57,7 +57,7 @@ def test_a_held_joint_outside_its_limits_or_a_way_beyond_the_reach_moves_nothing
     path.write_text(MOVES)
     done = run("path", planar, path, "--lock", "q3=120", "--task", "xy", "--port", "sim")
     assert done.code == 3
-    assert "q3 = 120 deg is outside -90 to 90 deg: nothing was moved" in done.err
+    assert "q3 = 120 deg is outside -90 to 90 deg" in done.err
     path.write_text("moves:\n  - point: [450, 200]\n  - line: [850, 200]\n")
     done = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json")
     assert done.code == 3
