@@ -59,7 +59,7 @@ def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int,
     assert status.counts[0] == net(board)
     host.order(protocol.set_position(0, {0: status.counts[0] - latch - 5000}))
     assert host.status().known == 0b11111
-    assert board.stats()["memory"]["stack_never_touched"] >= 200
+    assert board.stats()["memory"]["stack_never_touched"] >= 128
 
 
 def test_homing_gives_up_after_its_travel(board: EmulatedBoard) -> None:

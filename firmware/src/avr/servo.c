@@ -90,9 +90,9 @@ APART void servo_frame(void) {
     }
     busy = rising = true;
     ahead = 0;
-    TIFR2 = 1 << OCF2A;
     moment = TCNT2 + 16 + EARLY;
     OCR2A = moment - EARLY;
+    TIFR2 = 1 << OCF2A;  // the compare is set: a match with the one before would count as a turn of the first pulse
     TIMSK2 = 1 << OCIE2A;
 }
 
