@@ -97,6 +97,14 @@ def test_a_port_without_grbl_is_named() -> None:
         opened(board)
 
 
+def test_errors_that_nobody_asked_for_keep_no_board_from_answering() -> None:
+    """A new grblHAL board says error:7 of its empty memory; another program may have left a line to be refused."""
+    board = Grbl(hal=True)
+    board._say("error:7")
+    board.write(b"G999\n")
+    assert opened(board).hal
+
+
 def test_a_cable_that_is_pulled_is_told() -> None:
     board = Grbl()
     session = opened(board)

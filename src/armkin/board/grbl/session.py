@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from armkin.board.grbl import replies
@@ -25,6 +26,7 @@ _ANSWER = 2.0  # [s] a line may take that moves nothing
 _POLL = 0.1  # [s] between status requests in motion
 _SILENCE = 2.0  # [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
 _HELD = 15.0  # [s] the same while it holds: somebody may have pressed its button, or a byte was damaged into a hold
+_LATE = 0.05  # [s] that answers to another program's lines may come behind
 _NONSENSE = ")&"  # no line, whatever it is the end of
 _KEPT = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
 _READINGS = 13  # of an answer, until three in a row agree
@@ -77,11 +79,13 @@ class Session:
         end = self.port.now() + _BOOT
         while self.port.now() < end:
             self.port.write(replies.STATUS)
-            if self._wait(lambda: self.report is not None, 0.25):
-                assert self.report is not None
+            with suppress(GrblError):  # of another program's line, or of the memory that a new board has not written
+                self._wait(lambda: self.report is not None, 0.25)
+            if self.report is not None:
                 return self.report
             self.port.write(b")")  # grblHAL hears no `?` in a comment that nobody has ended
-            self._pump(0.01)
+            with suppress(GrblError):
+                self._pump(0.01)
         raise LinkError(
             f"{self.port.name} does not answer as GRBL does: is it the right port, and its rate {self.port.baud}?"
         )
@@ -109,9 +113,11 @@ class Session:
         try:
             obeyed = self._wait(lambda: not self._sent, _ANSWER)
         except GrblError as error:
-            if error.error:
-                return
-            raise
+            if not error.error:
+                raise
+            with suppress(GrblError):  # the first error may have been that of another program's line
+                self._wait(lambda: False, _LATE)
+            return
         if not obeyed:
             raise LinkError(f"GRBL on {self.port.name} takes no lines: does it dwell for another program?")
         self.realtime(replies.HOLD)
