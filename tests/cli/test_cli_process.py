@@ -68,15 +68,17 @@ def test_signals(number: int, code: int, tmp_path: Path) -> None:
     ) as p:
         assert p.stdin is not None
         assert p.stderr is not None
-        p.stdin.write(MANY)
+        p.stdin.write(b"1,2,3\n" * 100_000)  # several chunks
         p.stdin.flush()
-        while not list(tmp_path.iterdir()):  # it has begun to write
+        end = time.monotonic() + 60
+        while not (tmp_path / "out.parts" / "00000000").exists():  # it has begun to write
+            assert time.monotonic() < end
             time.sleep(0.01)
         p.send_signal(number)
         assert p.wait(60) == code
         assert p.stderr.read() == b""
         p.stdin.close()
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["out.parts"]  # what is finished, to go on with
 
 
 def on_a_terminal(words: list[str], stdin: bytes, **environment: str) -> str:
