@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from served import Page, served
 
 sys.path.append(str(Path(__file__).parents[1] / "firmware"))
 
@@ -17,3 +19,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if any(getattr(one, "__module__", None) == "browsing" for one in used):
             item.add_marker(pytest.mark.browser)
             item.add_marker(pytest.mark.xdist_group("emulator"))
+
+
+@pytest.fixture
+def sim() -> Iterator[Page]:
+    """A page in control of a simulated board at rest."""
+    with served(board="sim") as server:
+        page = Page(server)
+        page.hear("control", lambda news: news["holder"] == "yours")
+        page.idle()
+        yield page
+        page.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,6 @@ from armkin.teach.board_thread import Job
 from command_line import COUNTS, POSE, ROOT, run
 
 HOME = [0, 90, -90]
-
-
-@pytest.fixture
-def sim() -> Iterator[Page]:
-    with served(board="sim") as server:
-        page = Page(server)
-        page.hear("control", lambda news: news["holder"] == "yours")
-        page.idle()
-        yield page
-        page.close()
 
 
 def test_a_pose_is_sent_as_by_the_command_line(sim: Page) -> None:

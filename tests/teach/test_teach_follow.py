@@ -20,16 +20,6 @@ NEAR = [6, 90, -90]
 
 
 @pytest.fixture
-def sim() -> Iterator[Page]:
-    with served(board="sim") as server:
-        page = Page(server)
-        page.hear("control", lambda news: news["holder"] == "yours")
-        page.idle()
-        yield page
-        page.close()
-
-
-@pytest.fixture
 def following(sim: Page) -> Page:
     """A page that the arm follows: it has done so, and stands."""
     assert sim.act("follow", on=True) == (200, {"on": True})
