@@ -15,7 +15,7 @@ TYPE_CHECKING = False  # as in the package: this is imported before signals are 
 if TYPE_CHECKING:
     from types import FrameType
 
-_AGAIN_S = 0.001
+_AGAIN_S = 0.01
 _waiting: set[int] = set()  # signals that come again
 _NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # one module goes by its first two names
 
@@ -31,6 +31,7 @@ def put_off(number: int, frame: FrameType | None) -> bool:
     while frame is not None and not str(frame.f_globals.get("__name__")).startswith(_NOT_IN):
         frame = frame.f_back
     if frame is None:
+        _waiting.discard(number)
         return False
     if number not in _waiting:
         _waiting.add(number)
@@ -39,11 +40,18 @@ def put_off(number: int, frame: FrameType | None) -> bool:
 
 
 def _again(number: int, main: int) -> None:
+    """Send the signal until it is taken.
+
+    Once would not do: this thread runs as soon as the other one lets go of the interpreter, which is just before
+    it waits in a read, and a signal that comes before the read ends none.
+    """
     import signal
 
-    time.sleep(_AGAIN_S)
-    _waiting.discard(number)
-    if sys.platform == "win32":
-        _thread.interrupt_main(number)
-    else:
-        signal.pthread_kill(main, number)  # a read that waits by then must end as well
+    while True:
+        time.sleep(_AGAIN_S)
+        if number not in _waiting:
+            return
+        if sys.platform == "win32":
+            _thread.interrupt_main(number)
+        else:
+            signal.pthread_kill(main, number)
