@@ -83,11 +83,12 @@ def pico_rows() -> None:
     """The Pico's rows; no silicon has been measured."""
     flash, ram = flash_and_ram(PICO)
     row("pico6: flash, variables", f"{flash} B, {ram} B")
-    for interval in (pico.CLOCK // 100_000, 160):
-        got = pico.stepping(interval)
+    for interval, held_off_us in ((pico.CLOCK // 100_000, 0.0), (100, 0.0), (100, 0.48)):
+        got = pico.stepping(interval, held_off_us=held_off_us)
         fault = "" if got.exact and not (got.overruns or got.violations) else "  FAULTS"
         what = f"pico6: {got.rate / 1000:.0f} kHz on six axes, farthest edge"
-        row(what, f"{got.off_us:.3f} us, {got.overruns} overruns{fault}")
+        what += f", interrupts {held_off_us} us late" if held_off_us else ""
+        row(what, f"{got.off_us:.3f} us, {got.overruns} overruns, {100 * got.asleep:.0f} % idle{fault}")
     row("pico6: first step after the first batch", f"{pico.first_step_ms('uart'):.2f} ms")
     for by, axes, rates, batch in (
         ("USB", pico.SIX, (10_000, 15_000, 20_000), 11),

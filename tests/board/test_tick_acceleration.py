@@ -23,7 +23,7 @@ from armkin.model import build as arms
 from armkin.motion.profile import Profile, trapezoid
 from armkin.motors import pulses
 
-CLOCKS = {"three_dof": (16_000_000, 448), "ar4_pico6": (125_000_000, 160), "parol6_pico6": (125_000_000, 160)}
+CLOCKS = {"three_dof": (16_000_000, 448), "ar4_pico6": (25_000_000, 100), "parol6_pico6": (25_000_000, 100)}
 
 
 def intervals(s: Segment) -> NDArray[np.float64]:

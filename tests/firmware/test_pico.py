@@ -89,17 +89,24 @@ def test_it_fits_the_memory_with_room_for_the_stack() -> None:
 # Steps
 
 
-def test_six_axes_at_100_khz_and_every_edge_is_where_the_protocol_puts_it() -> None:
-    got = stepping(CLOCK // 100_000, ticks=1500)
+def test_six_axes_at_250_khz_and_every_edge_is_where_the_protocol_puts_it() -> None:
+    """Also while every interrupt comes 0.48 us late, which another one of 60 cycles would make."""
+    got = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.48)
     assert got.exact
-    assert (got.rate, got.off_us, got.overruns, got.violations) == (100_000, 0, 0, 0)
+    assert (got.rate, got.off_us, got.overruns, got.violations) == (250_000, 0, 0, 0)
     assert got.high_us == pytest.approx(1.92)
+    assert got.asleep > 0.3
+
+
+def test_interrupts_that_come_later_than_there_is_room_for_are_told() -> None:
+    late = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.64)
+    assert (late.exact, late.error) == (False, Error.OVERRUN)
 
 
 def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard) -> None:
-    """Every segment turns every axis round, 160 cycles a tick (156 kHz), with the times of a DRV8825."""
-    host = ready(board, replace(WIDE, max_rate=160_000, max_accel=(1 << 24) - 1))
-    work = tuple(whole(10, 160, 0, ((-1) ** n * 10,) * 6) for n in range(6))
+    """Every segment turns every axis round, 100 cycles a tick (250 kHz), with the times of a DRV8825."""
+    host = ready(board, replace(WIDE, max_rate=250_000, max_accel=(1 << 24) - 1))
+    work = tuple(whole(10, 100, 0, ((-1) ** n * 10,) * 6) for n in range(6))
     host.order(Batch(SIX, (0,) * 6, work, at_rest=True).payload(0))
     host.run(0.01)
     assert host.rest().overruns == 0

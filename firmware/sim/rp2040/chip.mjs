@@ -1,7 +1,8 @@
-// A Raspberry Pi Pico: rp2040js (npm) with a clock that counts system cycles, PIO in step with the processor, and resets.
+// A Raspberry Pi Pico: rp2040js (npm) with a clock that counts system cycles, a PIO of our own (pio.mjs), and resets.
 //
-// rp2040js lets its PIO run freely beside the processor, knows no boot ROM, no chip reset and no cost of an exception. Those are here.
+// rp2040js knows no boot ROM, no chip reset and no cost of an exception. Those are here.
 import { RP2040 } from 'rp2040js';
+import { Pio } from './pio.mjs';
 
 export const CLOCK_HZ = 125_000_000;
 const NANOS = 1e9 / CLOCK_HZ;
@@ -12,7 +13,6 @@ const EXCEPTION_ENTRY = 15; // cycles (Cortex-M0+ TRM, 3.7); its return takes 13
 const EXCEPTION_RETURN = 13;
 const LOOK = 2500; // cycles between two looks outside: half a byte on the line
 const CHIP_RESET = 0x40064;
-const TX_FIFO_WAIT = 3; // rp2040js's WaitType
 
 /** The flash that a UF2 file describes (https://github.com/microsoft/uf2), after the checks of the boot ROM's loader. */
 export function readUf2(file) {
@@ -57,7 +57,9 @@ export class Chip {
     this.outside = { next: Infinity, due: () => {} };
     this.sram = null;
     this.pendingReset = null;
-    this.absent = 0; // cycles that the processor does nothing: an interrupt that is held off
+    this.absent = 0; // cycles that the processor does nothing
+    this.heldOff = 0; // cycles that every interrupt comes later
+    this.slept = 0; // cycles in WFI
     this.boot('power');
   }
 
@@ -98,7 +100,7 @@ export class Chip {
     const back = core.exceptionReturn.bind(core);
     this.extra = 0;
     core.exceptionEntry = (number) => {
-      this.extra += EXCEPTION_ENTRY;
+      this.extra += EXCEPTION_ENTRY + this.heldOff;
       entry(number);
     };
     // With interrupts off, WFI ends when one is pending, and it is taken once they are on again; rp2040js takes it at once.
@@ -145,50 +147,17 @@ export class Chip {
     }
   }
 
-  // ---- PIO 0, state machine 0, in step with the processor
-
   #pio() {
-    const pio = (this.pioBlock = this.rp2040.pio[0]);
-    this.machine = pio.machines[0];
-    this.pioNext = Infinity; // the machine's next cycle, while it has something to do
-    this.pioNow = null; // while it acts
-    pio.run = () => {};
-    const write = pio.writeUint32.bind(pio);
-    pio.writeUint32 = (offset, value) => {
-      write(offset, value);
-      if (this.pioNext === Infinity) {
-        const divider = this.machine.clockDivInt || 65536;
-        this.pioNext = Math.ceil((this.cycle + 1) / divider) * divider;
-      }
-      pio.checkChangedPins();
-    };
-  }
-
-  #runPio() {
-    const { machine, pioBlock } = this;
-    const divider = machine.clockDivInt || 65536;
-    while (this.pioNext <= this.cycle) {
-      if (!machine.enabled || (machine.waiting && machine.waitType === TX_FIFO_WAIT && machine.txFIFO.empty)) {
-        this.pioNext = Infinity;
-        return;
-      }
-      const opcode = pioBlock.instructions[machine.pc];
-      if (!machine.waiting && (opcode & 0xffe0) === 0x0040 && (opcode & 31) === machine.pc && machine.x > 0) {
-        this.pioNext += machine.x * divider; // `jmp x--` to itself: all but its last turn at once
-        machine.x = 0;
-        continue;
-      }
-      this.pioNow = this.pioNext;
-      machine.step();
-      pioBlock.checkChangedPins();
-      this.pioNow = null;
-      this.pioNext += divider;
-    }
+    this.pio = [0, 1].map((number) => new Pio(this.rp2040, this, number, 7 + 2 * number));
+    this.pio.forEach((block, number) => {
+      this.rp2040.pio[number] = block;
+      this.rp2040.peripherals[0x50200 + 0x100 * number] = block;
+    });
   }
 
   /** The cycle of what a pin is doing just now. */
   get now() {
-    return this.pioNow ?? Math.round(this.clock.nanosCounter / NANOS);
+    return this.pio[0].now ?? this.pio[1].now ?? Math.round(this.clock.nanosCounter / NANOS);
   }
 
   // ---- time
@@ -226,15 +195,19 @@ export class Chip {
         this.cycle += this.absent;
         this.absent = 0;
       } else if (core.waiting) {
-        const next = Math.min(end, Math.ceil(alarm), this.pioNext);
-        this.cycle = Math.max(next, this.cycle + 1);
+        const next = Math.min(end, Math.ceil(alarm), this.pio[0].next, this.pio[1].next);
+        const woken = Math.max(next, this.cycle + 1);
+        this.slept += woken - this.cycle;
+        this.cycle = woken;
       } else {
         this.cycle += core.executeInstruction() + this.extra;
         this.extra = 0;
         alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
       }
-      if (this.pioNext <= this.cycle) {
-        this.#runPio();
+      for (const block of this.pio) {
+        if (block.next <= this.cycle) {
+          block.run(this.cycle);
+        }
       }
       const nanos = this.cycle * NANOS;
       if (alarm <= this.cycle) {

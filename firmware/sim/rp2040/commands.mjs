@@ -31,6 +31,7 @@ export class Commands {
   constructor(board) {
     Object.assign(this, board);
     this.timers = []; // [cycle, command]
+    this.since = { cycle: 0, slept: 0 };
   }
 
   get next() {
@@ -60,15 +61,17 @@ export class Commands {
     cycles() {},
 
     stats() {
-      const { chip, pins, line } = this;
+      const { chip, pins, line, since } = this;
+      const asleep = (chip.slept - since.slept) / Math.max(1, chip.cycle - since.cycle);
       return {
         board: 'pico6', mcu: 'rp2040', clock_hz: CLOCK_HZ, state: chip.booted ? 'running' : 'no boot block', seconds: chip.cycle / CLOCK_HZ,
-        resets: chip.resets, last_reset: chip.lastReset, ...pins.stats(), uart: line.stats(), usb: this.usb.stats(), line: line.ways,
+        resets: chip.resets, last_reset: chip.lastReset, asleep, ...pins.stats(), uart: line.stats(), usb: this.usb.stats(), line: line.ways,
       };
     },
 
     clear() {
       this.pins.clear();
+      this.since = { cycle: this.chip.cycle, slept: this.chip.slept };
     },
 
     reset([kind]) {
@@ -167,6 +170,11 @@ export class Commands {
     /** The processor does nothing for so long. */
     absent([time]) {
       this.chip.absent = cycles(time);
+    },
+
+    /** Every interrupt comes so much later than it would. */
+    'hold-off'([time]) {
+      this.chip.heldOff = cycles(time);
     },
 
     /** The program runs in a circle from here on. */

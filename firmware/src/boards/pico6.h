@@ -10,13 +10,13 @@
 #define UNIT_DIVISOR 3125
 #define QUEUE_SLOTS 128  // a power of two
 #define FRAME_MAX 250
-#define MIN_INTERVAL 160  // cycles between ticks: 156 kHz
+#define MIN_INTERVAL 100  // cycles between ticks: 250 kHz
 #define RECEIVE 2047      // bytes
 
 // What a tick has room for, 0.1 us: see rp2040/stepper.c.
-#define STEP_HIGH_MAX 40
-#define STEP_LOW_MAX 22
-#define DIR_SETUP_MAX 15
+#define STEP_HIGH_MAX 20
+#define STEP_LOW_MAX 20
+#define DIR_SETUP_MAX 7
 
 // axis, STEP and DIR: GP2 ... GP7, GP8 ... GP13
 #define STEPPER_PINS(P) \

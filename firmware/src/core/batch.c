@@ -11,18 +11,19 @@ enum { HEAD = 6 };                     // type, tag, mask, flags, n
 enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
 
 enum { QUICK_INTERVAL = MIN_INTERVAL + MIN_INTERVAL / 4 };  // a tick that counts the bend costs more
-_Static_assert(MIN_INTERVAL > 128, "the reciprocal of an interval has 16 bits");
+#define RECIPROCAL (1UL << (VELOCITY_BITS - 15))
+_Static_assert(RECIPROCAL / MIN_INTERVAL < 1UL << 16, "the reciprocal of an interval has 16 bits");
 
 // A segment's time in 1/256 of 50 ms, from units of 256 cycles.
 #define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
 enum { LONGEST = 255, LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
 
 // Velocities are rounded down in two places.
-static const uint32_t ROUNDING = 4 * ((1UL << 23) / MIN_INTERVAL);
+static const uint32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
 
 // What is the same for all axes of a segment.
 struct pace {
-    uint16_t first, last;  // 2^23 / interval
+    uint16_t first, last;  // RECIPROCAL / interval
     uint32_t time;         // 1/256 of 50 ms
     uint8_t window;        // the same, rounded up, at most 255
 };
@@ -96,9 +97,9 @@ static enum error read_head(const uint8_t *p, bool wide, struct segment *s, stru
     if (!times_valid(s, &last)) {
         return E_INTERVAL;
     }
-    pace->first = pace->last = (1UL << 23) / s->interval;
+    pace->first = pace->last = RECIPROCAL / s->interval;
     if (s->add) {
-        pace->last = (1UL << 23) / (uint32_t)last;
+        pace->last = RECIPROCAL / (uint32_t)last;
     }
     const uint32_t units = motion_units(s);
     pace->time = units < 65536 ? units * WINDOW >> 16 : ((units >> 8) * WINDOW >> 16) << 8;

@@ -3,8 +3,8 @@
 #include "errors.h"
 #include "memory.h"
 
-// Velocities are compared in 2^-38 steps a cycle: that makes 31 bits of the fastest.
-#define VELOCITY_BITS 38
+// Velocities are compared in 2^-38 steps a cycle, 2^-37 where ticks come faster: that makes 31 bits of the fastest.
+#define VELOCITY_BITS (MIN_INTERVAL > 128 ? 38 : 37)
 #define JUMP_MAX (1UL << 23)  // from there on an axis's acceleration is not checked
 
 struct limits {

@@ -27,7 +27,7 @@
 #include "../core/hal.h"
 #include "pico.h"
 
-enum { DEADLINE = 120, AFTER = 6, PULSE = 4 };  // cycles; AFTER "pull A", and of a pulse, besides the waits
+enum { DEADLINE = 78, AFTER = 6, PULSE = 4 };  // cycles; AFTER "pull A", and of a pulse, besides the waits
 _Static_assert(DIR_FIRST == STEP_FIRST + STEPPERS && STEPPERS == 6, "twelve pins in a row");
 _Static_assert(MIN_INTERVAL >= DEADLINE + AFTER, "room for A");
 _Static_assert((DIR_SETUP_MAX + STEP_HIGH_MAX) * CLOCK / 10000000 < MIN_INTERVAL, "");

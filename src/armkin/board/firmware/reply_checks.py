@@ -12,7 +12,7 @@ _INFO: dict[str, tuple[int, int]] = {
     "queue": (8, 128),
     "frame": (100, 250),
     "receive": (64, 65_535),
-    "min_interval": (129, 32_767),
+    "min_interval": (65, 32_767),
     "clock": (1_000_000, 1_000_000_000),
     "boots": (1, 65_535),
 }

@@ -6,7 +6,6 @@ from armkin.board.firmware.protocol import Error, Image, Segment
 from armkin.board.sim.frames import RefusedError
 from armkin.board_kinds import Board
 
-_BITS = 38  # velocities are in 2^-38 steps a cycle
 _UNCHECKED = 1 << 23  # change in a window from which on an acceleration is not checked
 
 
@@ -25,6 +24,7 @@ class Velocity:
 
     def __init__(self, board: Board, image: Image) -> None:
         self.board, self.image = board, image
+        self._bits = 23 if board.min_interval > 128 else 22  # velocities are in 2^-15 of 2^-bits steps a cycle
         self.at = [0] * len(image.axes)
         self.window = 0  # of the last segment: its time in 1/256 of 50 ms, rounded up, at most 255
 
@@ -39,7 +39,7 @@ class Velocity:
         scale = (1 << 32) // (self.board.clock // 20)
         units = s.units()
         self._time = units * scale >> 16 if units < 65536 else ((units >> 8) * scale >> 16) << 8
-        self._first, self._last = (1 << 23) // s.interval, (1 << 23) // s.last_interval
+        self._first, self._last = (1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval
         self._add = s.add != 0
         self._before, self.window = self.window, min(self._time + 1, 255)
 
@@ -62,14 +62,14 @@ class Velocity:
 
     @property
     def _second(self) -> float:
-        return float((1 << _BITS) / self.board.clock)
+        return float((1 << 15 + self._bits) / self.board.clock)
 
     def _step(self, axis: int) -> int:
         a = self.image.axes[axis].max_accel
         return min(int(a * 5 / 4 * 0.05 / 256 * self._second), _UNCHECKED - 1) + 1
 
     def _jumps(self, axis: int, before: int, after: int, window: int) -> bool:
-        step, slack = self._step(axis), 4 * ((1 << 23) // self.board.min_interval)
+        step, slack = self._step(axis), 4 * ((1 << self._bits) // self.board.min_interval)
         return step < _UNCHECKED and abs(after - before) > step * window + slack
 
     def _bends(self, axis: int, first: int, last: int) -> bool:
