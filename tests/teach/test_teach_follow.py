@@ -141,7 +141,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
             until(page, "document.querySelector('#follow').checked && document.documentElement.dataset.asking === 'no'")
             assert other.hear("board", lambda state: state["follows"])
 
-        def drag(slider: int, value: int) -> None:
+        def drag(slider: int, value: float) -> None:
             page.locator("#sliders input[type=range]").nth(slider).fill(str(value))
             settled(page)
 
@@ -204,7 +204,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         page.click("#take")
         until(page, "!document.querySelector('#panels').inert")
         at = server.actions.stands()
-        drag(0, 40)
+        drag(0, 37.5)
         assert still(at)
 
 

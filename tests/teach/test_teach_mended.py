@@ -90,3 +90,47 @@ def test_a_server_that_is_gone_is_not_said_to_know_the_arm(browser: Browser) -> 
             assert page.is_disabled("#send")
             assert page.inner_text("#position") == ""
             assert "does not answer" in page.inner_text("#trouble")
+
+
+def test_what_one_needs_is_in_sight_and_stays_there(browser: Browser) -> None:
+    for size in ((1280, 800), (390, 800)):
+        shape = {"width": size[0], "height": size[1]}
+        with served(board="sim") as server, opened(browser, server.address, viewport=shape) as page:
+            send = page.locator("#send").bounding_box()
+            assert send is not None
+            assert send["y"] + send["height"] <= size[1]
+            at = page.locator("#target").bounding_box()
+            page.evaluate("document.querySelector('#home').click()")  # it has no switches
+            until(page, "document.querySelector('#trouble').textContent.includes('homing')")
+            assert page.locator("#target").bounding_box() == at  # the error has pushed nothing away
+            slider = page.locator("#sliders input[type=range]").first
+            assert slider.evaluate("slider => getComputedStyle(slider).touchAction") == "pan-y"
+            assert float(slider.get_attribute("step") or "") == pytest.approx(360 / 12800)  # a pulse
+            if size[0] > 800:
+                continue
+            assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+            low = "[...document.querySelectorAll('button')].filter((one) => one.offsetHeight && one.offsetHeight < 44)"
+            assert page.evaluate(f"{low}.map((one) => one.id || one.textContent)") == []
+
+
+def test_the_branch_that_is_pointed_at_is_solid_and_f_fits_the_arm_in(browser: Browser) -> None:
+    with served("ur5e") as server, opened(browser, server.address) as page:
+        for k, angle in enumerate((20, -70, 80, -60, 70, 10)):
+            page.fill(f"#box-{k}", str(angle))
+        page.keyboard.press("Tab")
+        settled(page)
+        page.hover("#branch-3")
+        until(page, "document.querySelector('#canvas').dataset.solid === '1'")
+        page.mouse.move(10, 300)
+        until(page, "document.querySelector('#canvas').dataset.solid === '0'")
+        assert page.get_attribute("#target label:nth-child(4)", "title") is not None
+        page.mouse.wheel(0, -3000)  # closer
+        handle = "document.querySelector('#canvas').dataset.handle.split(' ').map(Number)"
+        x, y = page.evaluate(handle)
+        page.keyboard.press("f")
+        until(page, f"Math.abs({handle}[0] - argument) > 1", x)
+        x, y = page.evaluate(handle)
+        box = page.locator("#canvas").bounding_box()
+        assert box is not None
+        assert 0 < x < box["width"]
+        assert 0 < y < box["height"]

@@ -37,8 +37,9 @@ def scene(arm: Arm) -> dict[str, Any]:
                 "prismatic": bool(sliding),
                 "ratio": float(ratio),
                 "at": float(at),
+                "step": step,
             }
-            for name, unit, (low, high), home, sliding, ratio, at in zip(
+            for name, unit, (low, high), home, sliding, ratio, at, step in zip(
                 arm.joint_names,
                 units.names(arm),
                 limits,
@@ -46,6 +47,7 @@ def scene(arm: Arm) -> dict[str, Any]:
                 arm.prismatic,
                 arm.ratio,
                 form.at,
+                _steps(arm),
                 strict=True,
             )
         ],
@@ -64,6 +66,15 @@ def first_lock(arm: Arm) -> str | None:
     except UsageError:
         return arm.joint_names[(arm.n - 1) // 2 - 1] if arm.n > 6 else None
     return arm.joint_names[2] if arm.n == 7 else None
+
+
+def _steps(arm: Arm) -> list[float]:
+    """What each joint resolves [deg | mm]: the most that a pulse turns it; 0.1 where there are no drives."""
+    try:
+        per_pulse = np.abs(joints_per_pulse(arm)).max(axis=1)
+    except UsageError:
+        return [0.1] * arm.n
+    return [float(step) or 0.1 for step in units.joints_out(arm, per_pulse)]
 
 
 def _motors(arm: Arm) -> dict[str, Any]:

@@ -141,7 +141,7 @@ export class Board {
     const before = this.state;
     this.state = state;
     get("no-board").hidden = true;
-    get("with-board").hidden = false;
+    get("with-board").hidden = get("sending").hidden = false;
     const { doing, position } = state;
     const words = state.connected || doing ? WORDS[position] : "not connected";
     get("standing").textContent = `${doing ? `${doing}: ` : ""}${words} · ${state.board} on ${state.port}`;

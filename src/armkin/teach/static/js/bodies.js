@@ -21,7 +21,9 @@ export class Shapes {
     /** @param {number} i */
     this.radius = (i) => arm.reach * (0.042 - (0.022 * i) / Math.max(n, 1));
     /** @type {Part[][]} */
-    this.bodies = arm.bodies.map((corners, i) => this.tubes(corners, this.radius(i)));
+    this.bodies = arm.bodies.map((corners, i) => (i ? this.tubes(this.raised(corners, i), this.radius(i)) : this.foot(corners)));
+    /** Each body but the base as a thin line, without drums. */
+    this.lines = arm.bodies.slice(1).map((corners, i) => this.tubes(corners, 0.2 * this.radius(i + 1)));
     /** @type {(Part|null)[]} a slide's rail, in the frame before its motion */
     this.rails = arm.joints.map(() => null);
     arm.joints.forEach((joint, i) => this.joint(joint, i));
@@ -58,6 +60,7 @@ export class Shapes {
     const centre = new Vector3(0, 0, joint.at);
     const z = new Vector3(0, 0, 1);
     if (!joint.prismatic) {
+      if (i === 0) centre.z += this.above(joint, 1.45 * r);
       const drum = new CylinderGeometry(1.45 * r, 1.45 * r, 2.9 * r, 24);
       this.bodies[i + 1].push({ geometry: along(drum, centre, z), drum: true });
       return;
@@ -68,6 +71,31 @@ export class Shapes {
     this.rails[i] = { geometry: along(rail, new Vector3(0, 0, joint.at + (low + high) / 2), z), drum: false };
     const box = new BoxGeometry(2.4 * r, 2.6 * r, 2.4 * r);
     this.bodies[i + 1].push({ geometry: along(box, centre, z), drum: true });
+  }
+
+  /** The base: a post that ends flat on what it stands on. @param {number[][]} corners @returns {Part[]} */
+  foot(corners) {
+    const [a, b] = corners.map((corner) => new Vector3(...corner));
+    const way = b.clone().sub(a);
+    if (way.length() < 1e-6 * this.arm.reach) return [];
+    const post = new CylinderGeometry(this.radius(0), this.radius(0), way.length(), 24);
+    return [{ geometry: along(post, a.addScaledVector(way, 0.5), way), drum: false }];
+  }
+
+  /** Body 1 begins in its drum. @param {number[][]} corners @param {number} i */
+  raised(corners, i) {
+    const joint = this.arm.joints[0];
+    if (i > 1 || joint.prismatic) return corners;
+    const [first, ...rest] = corners;
+    return [[first[0], first[1], first[2] + this.above(joint, 1.45 * this.radius(0))], ...rest];
+  }
+
+  /** How far joint 1's drum is raised along its axis to stand on the base's foot. @param {import("./types.js").Joint} joint @param {number} half */
+  above(joint, half) {
+    const [link, base] = [this.arm.links[0], this.arm.base];
+    const axis = [0, 1, 2].map((row) => link[row][2]);
+    const over = axis.reduce((sum, z, row) => sum + z * (link[row][3] + joint.at * z - base[row][3]), 0);
+    return Math.abs(over) < half ? Math.sign(over || 1) * half - over : 0;
   }
 
   /** Two fingers that continue the last piece of the arm. @returns {Part[]} */

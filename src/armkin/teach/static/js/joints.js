@@ -25,7 +25,7 @@ export class Joints {
       const name = make("label", { for: `box-${i}` }, joint.name);
       const marks = make("datalist", { id: `marks-${i}` }, make("option", { value: String(joint.home) }));
       const slider = make("input", {
-        type: "range", min: String(low), max: String(high), step: String((high - low) / 1000), list: `marks-${i}`,
+        type: "range", min: String(low), max: String(high), step: String(joint.step), list: `marks-${i}`,
         "aria-label": `${joint.name} slider`, title: `home: ${joint.home} ${joint.unit}`,
       });
       const box = make("input", { type: "number", step: "1", id: `box-${i}` });
@@ -37,7 +37,7 @@ export class Joints {
       slider.addEventListener("input", () => change(slider.valueAsNumber));
       typed(box, change);
       rows.append(name, slider, box, make("span", {}, joint.unit), this.lock(joint, locked), marks);
-      const ends = [joint.lower, joint.upper].map((end) => make("span", {}, end === null ? "no limit" : String(end)));
+      const ends = [joint.lower, joint.upper].map((end) => make("span", {}, end === null ? "no limit" : String(Number(end.toFixed(1)))));
       rows.append(make("span", { class: "ends", "aria-hidden": "true" }, ...ends));
       this.sliders.push(slider);
       this.boxes.push(box);

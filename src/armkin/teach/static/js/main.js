@@ -25,7 +25,9 @@ class Page {
     this.q = look.q;
     this.branch = "";
     this.joints = new Joints(arm, (q, byHand) => this.turn(q, byHand), () => this.refresh());
-    this.tip = new Tip((target) => this.aim(target, { goal: true }), (branch) => this.choose(branch), (q) => this.turn(q));
+    this.tip = new Tip((target) => this.aim(target, { goal: true }), (branch) => this.choose(branch), (q) => this.turn(q), () => {
+      if (!this.moving) this.showGhosts();
+    });
     this.motors = new Motors(arm, () => this.refresh());
     /** @type {import("./view.js").View | null} */
     this.view = null;
@@ -141,7 +143,7 @@ class Page {
     const ghosts = this.tip.ghosts();
     const stands = this.board.state?.joints;
     const away = stands?.some((value, i) => Math.abs(value - this.q[i]) > 0.1);
-    if (stands && away) ghosts.push({ joints: stands, colour: "#3a444f", faint: false });
+    if (stands && away) ghosts.push({ joints: stands, colour: "#3a444f", faint: false, solid: false });
     this.view?.showGhosts(ghosts);
   }
 
@@ -269,6 +271,7 @@ async function start() {
   const actions = {
     r: () => one.program.record(),
     p: () => one.program.play(),
+    f: () => one.view?.look("fit"),
     g: () => one.board.grip(one.board.open ? "closed" : "open"),
   };
   for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);

@@ -5,6 +5,17 @@ import { fixed, get, make, show, typed } from "./dom.js";
 /** Okabe and Ito's colours, as in the pictures of `armkin plot`; told apart also by the colour-blind. */
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
 
+/** What the numbers of a target mean. */
+const MEANING = /** @type {Object<string, string>} */ ({
+  roll: "turn about the tool's x axis: R = Rz(yaw) Ry(pitch) Rx(roll)",
+  pitch: "turn about the y axis: R = Rz(yaw) Ry(pitch) Rx(roll)",
+  yaw: "turn about the base's z axis",
+  phi: "sum of the parallel joints' angles: the tool's pitch in the arm's own plane",
+  theta: "sum of the joint angles: the tool's direction in the plane",
+  ax: "the tool's z axis, along the base's x; any length", ay: "the tool's z axis, along the base's y; any length",
+  az: "the tool's z axis, along the base's z; any length",
+});
+
 /** @param {number} k @returns {string} */
 const colour = (k) => COLOURS[k] ?? `hsl(${(k * 137) % 360} 60% 50%)`;
 
@@ -13,8 +24,12 @@ export class Tip {
    * @param {(target: number[]) => void} aimed
    * @param {(branch: import("./types.js").Branch) => void} chose
    * @param {(joints: number[]) => void} went
+   * @param {() => void} pointed another branch's button is pointed at, or none
    */
-  constructor(aimed, chose, went) {
+  constructor(aimed, chose, went, pointed) {
+    this.pointed = pointed;
+    /** Name of the branch whose button is pointed at. */
+    this.hovered = "";
     this.aimed = aimed;
     this.chose = chose;
     /** @type {HTMLInputElement[]} */
@@ -68,7 +83,7 @@ export class Tip {
           this.aim(i, this.target[i] + way * (units[i] === "" ? 0.01 : 1));
         });
         const said = units[i] ? `${name} / ${units[i]}` : name;
-        return make("label", {}, make("span", {}, said), this.boxes[i]);
+        return make("label", MEANING[name] ? { title: MEANING[name] } : {}, make("span", {}, said), this.boxes[i]);
       }),
     );
   }
@@ -128,6 +143,13 @@ export class Tip {
     if (k < 8) button.append(make("kbd", { "aria-hidden": "true" }, String(k + 1)));
     button.addEventListener("click", () => this.choose(k));
     button.addEventListener("keydown", (event) => this.step(event, k));
+    const hover = (/** @type {boolean} */ on) => {
+      this.hovered = on ? this.rows[k]?.branch.name ?? "" : "";
+      this.pointed();
+    };
+    for (const [name, on] of /** @type {[string, boolean][]} */ ([["pointerenter", true], ["pointerleave", false]])) {
+      button.addEventListener(name, () => hover(on));
+    }
     return button;
   }
 
@@ -151,8 +173,10 @@ export class Tip {
   ghosts() {
     const found = this.rows
       .filter((row) => !row.chosen)
-      .map(({ branch, colour }) => ({ joints: branch.joints, colour, faint: !branch.within_limits }));
-    if (this.nearest.length) found.push({ joints: this.nearest, colour: "#808890", faint: false });
+      .map(({ branch, colour }) => ({
+        joints: branch.joints, colour, faint: !branch.within_limits, solid: branch.name === this.hovered,
+      }));
+    if (this.nearest.length) found.push({ joints: this.nearest, colour: "#808890", faint: false, solid: false });
     return found;
   }
 }

@@ -3,7 +3,7 @@
  * What the server sends; lengths in mm, angles in degrees.
  *
  * @typedef {{name: string, unit: string, lower: number|null, upper: number|null, home: number,
- *   prismatic: boolean, ratio: number, at: number}} Joint
+ *   prismatic: boolean, ratio: number, at: number, step: number}} Joint
  * @typedef {{open: number, closed: number, unit: string, along: number[]}} Gripper
  * @typedef {{robot: string, robot_file: string, reach: number, base: number[][],
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,

@@ -64,6 +64,7 @@ export class View {
     this.orbit.addEventListener("change", () => this.draw());
     this.gizmo = new Gizmo(this);
     this.middle = new Vector3();
+    this.inside = false; // whether the whole arm was in the picture when it last rested
     this.theme();
     new ResizeObserver(() => this.size()).observe(canvas);
   }
@@ -119,21 +120,40 @@ export class View {
   }
 
   /**
-   * Look from one of the standard sides.
+   * Look from one of the standard sides, or fit what is seen in from the side that one looks from.
    * @param {string} name
    */
   look(name) {
-    const [x, y, z] = /** @type {Object<string, number[]>} */ (EYES)[name];
-    this.scene.updateMatrixWorld();
-    const box = new Box3().setFromObject(this.solid.group);
+    const [x, y, z] = /** @type {Object<string, number[]>} */ (EYES)[name]
+      ?? this.camera.position.clone().sub(this.orbit.target).setLength(2.1).toArray();
+    const box = this.box();
     for (const body of this.ghosts.bodies.flat()) if (body.visible) box.expandByObject(body);
-    if (this.gizmo.there) box.expandByPoint(this.gizmo.handle.position);
     const size = Math.max(0.9 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
     this.camera.position.set(x, y, z).multiplyScalar(size).add(this.middle);
     this.orbit.update();
+    this.inside = false; // until it is looked at
     this.draw();
+  }
+
+  /** What has to be seen: the arm, and its handle. */
+  box() {
+    this.scene.updateMatrixWorld();
+    const box = new Box3().setFromObject(this.solid.group);
+    if (this.gizmo.there) box.union(new Box3().setFromCenterAndSize(this.gizmo.handle.position, new Vector3().setScalar(0.3 * this.arm.reach)));
+    return box;
+  }
+
+  /** Fit the arm in when it has just left the picture; who looks closer on purpose is left alone. */
+  keep() {
+    const frames = this.solid.tool ? [...this.solid.at, this.solid.tool] : this.solid.at;
+    const seen = frames.every((T) => {
+      const at = new Vector3(T[3], T[7], T[11]).project(this.camera);
+      return Math.max(Math.abs(at.x), Math.abs(at.y)) < 1;
+    });
+    if (this.inside && !seen && !this.gizmo.dragging) this.look("fit");
+    else this.inside = seen;
   }
 
   /** @param {number[]} q */
@@ -147,7 +167,8 @@ export class View {
 
   /** Show ghosts instead of those shown. @param {import("./ghosts.js").Ghost[]} wanted */
   showGhosts(wanted) {
-    this.ghosts.show(wanted, this.solid);
+    this.ghosts.show(wanted);
+    this.canvas.dataset.solid = String(wanted.filter((ghost) => ghost.solid).length); // for tests
     this.draw();
   }
 
@@ -190,6 +211,7 @@ export class View {
 
   /** Nothing moves any more. */
   rest() {
+    this.keep();
     this.fine(true);
     this.renderer.render(this.scene, this.camera);
   }
