@@ -91,8 +91,11 @@ export class Board {
       this.beating = 0;
       this.ask("jog_end");
     };
-    button.addEventListener("pointerdown", begin);
-    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur", "lostpointercapture"]) {
+    button.addEventListener("pointerdown", (event) => {
+      button.setPointerCapture(event.pointerId); // held is what is pressed, also where the page moves beneath the pointer
+      begin();
+    });
+    for (const name of ["pointerup", "pointercancel", "blur", "lostpointercapture"]) {
       button.addEventListener(name, end);
     }
     button.addEventListener("keydown", (event) => {
