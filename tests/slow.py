@@ -13,6 +13,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_standard_input_without_end_is_refused",
     ),
     "attacks/test_signals.py": (),
+    "firmware/test_flash.py": (),
     "board/test_board_sim.py": ("test_mutated_frames_move_nothing_that_was_not_sent",),
     "board/test_conformance.py": (),
     "board/test_curves.py": ("test_a_path_at_random_arrives_at_exact_counts",),

@@ -120,7 +120,17 @@ static avr_t *make_chip(void) {
         fprintf(stderr, "simboard: libsimavr has no %s\n", chip_board->mcu);
         exit(1);
     }
-    avr_load_firmware(avr, &program);
+    if (program.flashsize)
+        avr_load_firmware(avr, &program);
+    if (loader.code) {
+        if (loader.at + loader.size > avr->flashend + 1) {
+            fprintf(stderr, "simboard: the boot loader ends at 0x%x, beyond the flash\n", loader.at + loader.size);
+            exit(2);
+        }
+        memcpy(avr->flash + loader.at, loader.code + loader.at, loader.size);
+        avr->reset_pc = avr->pc = loader.at;
+        avr->codeend = avr->flashend;
+    }
     avr->frequency = CLOCK_HZ;
     avr->sleep = on_sleep;
     avr->run_cycle_limit = CLOCK_HZ / 100;
@@ -164,6 +174,8 @@ void chip_reset(reset_kind kind) {
     else
         fill_random(avr->data + sram, top + 1 - sram);
     if (old) {
+        if (loader.code)                  /* which may have written it */
+            memcpy(avr->flash, old->flash, old->flashend + 1);
         avr_eeprom_desc_t d = {.ee = read_eeprom(old), .offset = 0, .size = old->e2end + 1};
         avr_ioctl(avr, AVR_IOCTL_EEPROM_SET, &d);
         free(d.ee);

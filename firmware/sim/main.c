@@ -17,6 +17,7 @@
 #include "pace.h"
 #include "pins.h"
 #include "port.h"
+#include "program.h"
 #include "schedule.h"
 #include "trace.h"
 #include "uart.h"
@@ -29,6 +30,7 @@ static const char USAGE[] =
     "  --speed N|max|step   simulated per real second (1); as fast as the host keeps talking; or only by `run`\n"
     "  --ahead MS           with --speed max: free run after the host's last byte (50)\n"
     "  --patience MS        simulated time waits for a host that has the port open and is silent for so long (0: never)\n"
+    "  --loader FILE        a real boot loader (Intel HEX), which every reset starts; without --elf the flash is empty\n"
     "  --bootloader MS      a bootloader that hides MCUSR and, after an external reset, takes MS\n"
     "  --no-reset-on-open   opening the port does not reset the board\n"
     "  --driver NAME        timing to hold: a4988 (default), drv8825, tmc2209\n"
@@ -107,10 +109,11 @@ static void loop(void) {
 }
 
 int main(int argc, char **argv) {
-    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, PATIENCE, BOOT, NO_RESET, DRIVER, DO, BAUD, TRACE, STATS, SEED, QUIET, HELP };
+    enum { BOARD = 1, ELF, LINK, CONTROL, STDIN, SPEED, AHEAD, PATIENCE, BOOT, LOADER, NO_RESET, DRIVER, DO, BAUD, TRACE, STATS, SEED, QUIET, HELP };
     static const struct option options[] = {
         {"board", 1, 0, BOARD}, {"elf", 1, 0, ELF}, {"link", 1, 0, LINK}, {"control", 1, 0, CONTROL},
         {"stdin", 0, 0, STDIN}, {"speed", 1, 0, SPEED}, {"ahead", 1, 0, AHEAD}, {"patience", 1, 0, PATIENCE}, {"bootloader", 1, 0, BOOT},
+        {"loader", 1, 0, LOADER},
         {"no-reset-on-open", 0, 0, NO_RESET}, {"driver", 1, 0, DRIVER}, {"do", 1, 0, DO}, {"baud", 1, 0, BAUD},
         {"trace", 1, 0, TRACE}, {"stats", 1, 0, STATS}, {"seed", 1, 0, SEED}, {"quiet", 0, 0, QUIET},
         {"help", 0, 0, HELP}, {0},
@@ -139,6 +142,10 @@ int main(int argc, char **argv) {
         case AHEAD: pace_ahead = (uint64_t)(positive("--ahead", optarg) * (CLOCK_HZ / 1e3)); break;
         case PATIENCE: pace_patience = (uint64_t)(positive("--patience", optarg) * (CLOCK_HZ / 1e3)); break;
         case BOOT: chip_bootloader_ms = positive("--bootloader", optarg); break;
+        case LOADER:
+            if (!loader_load(optarg))
+                die(optarg, "no boot loader in Intel HEX in it");
+            break;
         case NO_RESET: port_reset_on_open = false; break;
         case DRIVER:
             for (d = drivers; d->name && strcmp(d->name, optarg);)
@@ -160,11 +167,11 @@ int main(int argc, char **argv) {
         default: fputs(USAGE, stderr); return 2;
         }
     }
-    if (!b || !elf || optind < argc) {
+    if (!b || (!elf && !loader.code) || optind < argc) {
         fputs(USAGE, stderr);
         return 2;
     }
-    if (access(elf, R_OK))
+    if (elf && access(elf, R_OK))
         die(elf, strerror(errno));
     if (!chip_load(b, elf, seed, parts))
         die(elf, "no program for an AVR in it");

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gelf.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 enum { DATA_OFFSET = 0x800000, EEPROM_OFFSET = 0x810000 };     /* where the linker puts the data space */
 
 elf_firmware_t program;
+boot_loader loader;
 
 static struct {
     char *name;
@@ -38,7 +40,39 @@ static void read_symbols(Elf *elf) {
     }
 }
 
+bool loader_load(const char *hex) {
+    enum { MOST = 1 << 18 };              /* the flash of an ATmega2560 */
+    FILE *in = fopen(hex, "r");
+    uint32_t base = 0, end = 0;
+    char line[600];
+    loader.at = MOST;
+    loader.code = malloc(MOST);
+    memset(loader.code, 0xFF, MOST);      /* as empty flash */
+    while (in && fgets(line, sizeof line, in)) {
+        unsigned n, at, type, b, value = 0;
+        if (sscanf(line, ":%2x%4x%2x", &n, &at, &type) != 3)
+            break;
+        for (unsigned i = 0; i < n && sscanf(line + 9 + 2 * i, "%2x", &b) == 1; i++) {
+            value = value << 8 | b;
+            if (type == 0 && base + at + i < MOST)
+                loader.code[base + at + i] = (uint8_t)b;
+        }
+        if (type == 2 || type == 4)
+            base = value << (type == 2 ? 4 : 16);
+        if (type == 0 && n && base + at + n <= MOST) {
+            loader.at = base + at < loader.at ? base + at : loader.at;
+            end = base + at + n > end ? base + at + n : end;
+        }
+    }
+    if (in)
+        fclose(in);
+    loader.size = end > loader.at ? end - loader.at : 0;
+    return loader.size > 0;
+}
+
 bool program_load(const char *path) {
+    if (!path)
+        return true;
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     elf_version(EV_CURRENT);
     Elf *elf = fd < 0 ? NULL : elf_begin(fd, ELF_C_READ, NULL);

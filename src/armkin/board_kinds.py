@@ -23,6 +23,7 @@ class Board(NamedTuple):
     clock: int = 16_000_000  # [1/s]
     receive: int = 127  # [bytes] that may follow a frame without an answer
     power: str = "A1"  # input that senses the motors' power
+    chip: str = "atmega328p"
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -55,6 +56,7 @@ BOARDS = {
             576,
             receive=255,
             power="A4",
+            chip="atmega2560",
         ),
         Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 128, 1600),
         Board(
@@ -69,6 +71,7 @@ BOARDS = {
             clock=25_000_000,
             receive=2047,
             power="GP27",
+            chip="rp2040",
         ),
     )
 }

@@ -141,6 +141,7 @@ class EmulatedBoard:
     that follows the clock: a busy machine may give the host no time for longer than the firmware waits for it. A host
     asks ten times a second. 0, here or by `control("patience off")`: it never waits.
     `bootloader`: milliseconds that a bootloader takes after an external reset; it hides the reset's cause.
+    `loader`: a real boot loader, in Intel HEX, which every reset starts; without `elf` the flash is empty then.
     `commands`: of the control channel, carried out before the program starts: ("pin A0 0",).
     `baud`: the host's true rate, if it shall differ from what the board has set.
     `by`: which of a Pico's lines the port is.
@@ -155,6 +156,7 @@ class EmulatedBoard:
         ahead_ms: float = 50,
         patience: float = 0.12,
         bootloader: float | None = None,
+        loader: Path | None = None,
         reset_on_open: bool = True,
         driver: str = "a4988",
         commands: Sequence[str] = (),
@@ -166,13 +168,15 @@ class EmulatedBoard:
         self.board = board
         self.clock_hz = CYCLES_HZ.get(board, CLOCK_HZ)
         self.port = ""
-        self._elf = elf
+        self._elf, self._blank = elf, loader is not None and elf is None
         self._options = ["--speed", str(speed), "--ahead", str(ahead_ms)]
         self._options += ["--driver", driver, "--seed", str(seed)]
         if speed not in ("max", "step"):
             self._options += ["--patience", str(patience * 1e3)]
         if bootloader is not None:
             self._options += ["--bootloader", str(bootloader)]
+        if loader is not None:
+            self._options += ["--loader", str(loader)]
         if not reset_on_open:
             self._options.append("--no-reset-on-open")
         if baud is not None:
@@ -188,9 +192,9 @@ class EmulatedBoard:
 
     def __enter__(self) -> EmulatedBoard:
         simulator = build_simulator(self.board)
-        elf = self._elf or build_firmware(self.board)
+        program = [] if self._blank else ["--elf", str(self._elf or build_firmware(self.board))]
         self._folder = Path(tempfile.mkdtemp(prefix="armkin-board-"))
-        command = [*simulator, "--board", self.board, "--elf", str(elf), "--stdin", *self._options]
+        command = [*simulator, "--board", self.board, *program, "--stdin", *self._options]
         command += ["--link", str(self._folder / "port")]
         if self._traced:
             command += ["--trace", str(self._folder / "trace")]

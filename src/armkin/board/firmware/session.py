@@ -12,7 +12,7 @@ from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
 from armkin.board.firmware.reply_checks import DeviceError as DeviceError
 from armkin.board.firmware.reply_checks import ReplacedError as ReplacedError
 from armkin.board.firmware.serial_line import Line
-from armkin.board.ports import Port
+from armkin.board.ports import Port, leave_boot_loader
 from armkin.errors import LinkError
 
 _POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
@@ -23,6 +23,8 @@ _GIVE_UP = 1.5  # [s] without any answer,
 _TURN = 0.1  # [s] of which one turn counts at most: a program that had to wait longer for its own turn was deaf
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
+_LISTENS = 0.2  # [s] after the opening: by then a Mega's boot loader listens
+_TRIES = 0.5  # [s] in which a board that nothing has reset, or a Mega, answers
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
 _KEPT = 1000  # bytes of what is no board's
 _PROBES = 8
@@ -56,12 +58,15 @@ class Session:
 
         Raises LinkError if nothing answers, or something else than this protocol.
         """
-        begin, heard = self.port.now(), bytearray()
+        begin, heard, left = self.port.now(), bytearray(), False
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
-            if since < 0.3 or since > 1.8:
-                info = self._hello(0.06 if since < 0.3 else 0.15 if since < 3.0 else 0.4)
+            if since > _LISTENS and not left:
+                leave_boot_loader(self.port)
+                left = True
+            if since < _TRIES or since > 1.8:
+                info = self._hello(0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
                 if info is not None:
                     return info
             else:

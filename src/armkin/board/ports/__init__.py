@@ -6,9 +6,11 @@ port_lock.py    the lock that keeps two programs from one arm
 notes.py        small files beside it
 traced.py       a port whose bytes are logged
 serial_port.py  serial ports
+boot_loader.py  what an opened port may have started
 socket_port.py  the Unix socket of a program on this computer
 """
 
+from armkin.board.ports.boot_loader import leave_boot_loader
 from armkin.board.ports.notes import read_note, remove_note, write_note
 from armkin.board.ports.port import BAUD, SIM, Port
 from armkin.board.ports.port_lock import holder, holder_rate, note_path, record_path
@@ -27,6 +29,7 @@ __all__ = [
     "holder",
     "holder_rate",
     "is_socket",
+    "leave_boot_loader",
     "list_ports",
     "note_path",
     "read_note",

@@ -69,6 +69,24 @@ class SerialPort:
         """Seconds of the monotonic clock."""
         return time.monotonic()
 
+    def restart(self) -> None:
+        """Reset an Arduino that the opening did not reset; ports without DTR leave that to their opening."""
+        with suppress(Exception):
+            self._serial.dtr = self._serial.rts = False
+            time.sleep(0.05)  # its capacitor unloads
+            self._serial.dtr = self._serial.rts = True
+
+    def write_at(self, baud: int, data: bytes) -> None:
+        """Send bytes at another rate than the port's, which it has again when they are out."""
+
+        def send() -> None:
+            self._serial.baudrate = baud
+            self._serial.write(data)
+            self._serial.flush()
+            self._serial.baudrate = self.baud
+
+        self._guard(send)
+
     def close(self) -> None:
         """Give the port back."""
         with suppress(Exception):

@@ -13,28 +13,28 @@ class Traced:
     """A port that logs what is written to it and read from it."""
 
     def __init__(self, port: Port) -> None:
-        self._port = port
+        self.inner = port
         self.name, self.simulated, self.baud = port.name, port.simulated, port.baud
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
-        LOG.debug("%.6f %s > %r", self._port.now(), self.name, data)
-        self._port.write(data)
+        LOG.debug("%.6f %s > %r", self.inner.now(), self.name, data)
+        self.inner.write(data)
 
     def read(self, timeout: float) -> bytes:
         """What has come, or comes within `timeout` seconds."""
-        data = self._port.read(timeout)
+        data = self.inner.read(timeout)
         if data:
-            LOG.debug("%.6f %s < %r", self._port.now(), self.name, data)
+            LOG.debug("%.6f %s < %r", self.inner.now(), self.name, data)
         return data
 
     def now(self) -> float:
         """Seconds on the clock."""
-        return self._port.now()
+        return self.inner.now()
 
     def close(self) -> None:
         """Give the port back."""
-        self._port.close()
+        self.inner.close()
 
 
 def traced(port: Port) -> Port:

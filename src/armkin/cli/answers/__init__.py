@@ -17,6 +17,7 @@ from armkin.cli.answers.arm import Errors as Errors
 from armkin.cli.answers.arm import Export as Export
 from armkin.cli.answers.arm import Fk as Fk
 from armkin.cli.answers.arm import Flagged as Flagged
+from armkin.cli.answers.arm import Flash as Flash
 from armkin.cli.answers.arm import Found as Found
 from armkin.cli.answers.arm import Frame as Frame
 from armkin.cli.answers.arm import Head as Head
@@ -83,4 +84,5 @@ ANSWERS: dict[str, tuple[type, ...]] = {
     "setup": (Setup, SetupOfKlipper),
     "zero": (Zero,),
     "ports": (Ports,),
+    "flash": (Flash,),
 }

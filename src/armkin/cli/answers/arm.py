@@ -314,6 +314,16 @@ class Ports(TypedDict):
     ports: list[Found]
 
 
+class Flash(TypedDict):
+    """`flash --json`: what was written, and what the board then said."""
+
+    board: str
+    port: Annotated[str | None, "null: a Pico whose port has not come yet"]
+    bytes: Annotated[int, "of the program"]
+    uploader: Literal["armkin", "avrdude", "UF2"]
+    firmware: Annotated[str | None, "the version that the board says; null with port"]
+
+
 class Errors(TypedDict):
     """Distances between computed and measured tips, on rows that the fit has not seen."""
 

@@ -1,0 +1,95 @@
+"""`armkin flash`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from armkin.cli import completion, inputs, output, render
+from armkin.cli.options import Json
+from armkin.errors import UsageError
+
+
+def flash(
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[ROBOT]",
+            help="Robot file, or the name of a shipped robot: it says the board's kind.",
+            autocompletion=completion.robots,
+        ),
+    ] = None,
+    board: Annotated[
+        str | None,
+        typer.Option("--board", metavar="KIND", help="uno_cnc_shield, mega_ramps14, uno_servos or pico6."),
+    ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            "--port",
+            "-p",
+            metavar="PORT",
+            envvar="ARMKIN_PORT",
+            show_envvar=False,
+            autocompletion=completion.ports,
+            help="Device or COM port; a Pico: also its boot drive's folder. [default: ARMKIN_PORT, else the only one]",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """armkin's firmware onto a board.
+
+    The image is in the installed package; nothing is compiled. A Pico without armkin: hold BOOTSEL while you plug it
+    in, and name the folder of the drive that appears. At the end the board is asked what it is. The board restarts:
+    motors are off, and the arm's position is lost.
+    """
+    from armkin.flash import image, upload
+
+    kind = _kind(robot, board)
+    program = image(kind)
+    port = port or _only_port(kind)
+    with output.progress("bytes") as tick:
+        done = upload(program, port, tick)
+    found: dict[str, object] = {"board": kind, **done._asdict()}
+    with output.destination(None) as write:
+        write(render.to_json(found) + "\n" if json else _text(found))
+
+
+def _text(found: dict[str, object]) -> str:
+    if found["port"] is None:
+        return f"{found['board']}: {found['bytes']} bytes copied; armkin ports shows the Pico when it has restarted\n"
+    return f"{found['board']} on {found['port']}: firmware {found['firmware']}, {found['bytes']} bytes\n"
+
+
+def _kind(robot: str | None, board: str | None) -> str:
+    from armkin.board_kinds import BOARDS
+
+    named = board
+    if robot is not None:
+        arm = inputs.load(robot)
+        own = arm.board.kind if arm.board is not None else None
+        if board is not None and own is not None and own != board:
+            raise UsageError(f"{arm.name}'s board is {own}, and --board says {board}: leave one of them out")
+        named = board or own
+        if named is None:
+            raise UsageError(f"{arm.name} names no board: add --board, one of {', '.join(BOARDS)}")
+    if named is None:
+        raise UsageError(f"which board? Name a robot file with board:, or --board, one of {', '.join(BOARDS)}")
+    if named not in BOARDS:
+        raise UsageError(f"armkin has no firmware for '{named}': it has for {', '.join(BOARDS)}")
+    return named
+
+
+def _only_port(kind: str) -> str:
+    """The only port that looks like an Arduino or a Pico: what is not flashed cannot be asked."""
+    from armkin.board.ports import list_ports
+
+    found = [port.device for port in list_ports() if port.board]
+    if len(found) != 1:
+        seen = f"{len(found)} ports look like one ({', '.join(found)})" if found else "no port looks like an Arduino"
+        raise UsageError(
+            f"--port is missing, and {seen}\narmkin ports lists them; a Pico: also the folder of its boot drive"
+        )
+    output.note(f"using {found[0]}, the only port that looks like a board for {kind}")
+    return found[0]

@@ -1,0 +1,72 @@
+"""The drive that a Pico is while BOOTSEL was held, or after its firmware was asked for it: a UF2 file is copied there.
+
+Raspberry Pi Ltd, RP2040 datasheet, 2.8.4; https://github.com/microsoft/uf2 (INFO_UF2.TXT).
+"""
+
+from __future__ import annotations
+
+import os
+import string
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from armkin.errors import LinkError
+
+_INFO = "INFO_UF2.TXT"
+_CHIP = "RPI-RP2"  # in its line Board-ID, and the drive's name
+_APPEARS = 20.0  # [s] that a system may take to mount it
+
+
+def is_boot_drive(folder: Path) -> bool:
+    """Whether a Pico waits there for its program."""
+    with suppress(OSError):
+        return _CHIP in (folder / _INFO).read_text("ascii", errors="replace")
+    return False
+
+
+def mounted() -> Iterator[Path]:
+    """Boot drives where systems mount them."""
+    places = [Path(f"{letter}:/") for letter in string.ascii_uppercase] if sys.platform == "win32" else []
+    for pattern in ("Volumes/*", "media/*", "media/*/*", "run/media/*/*"):
+        places += sorted(Path("/").glob(pattern)) if sys.platform != "win32" else []
+    return filter(is_boot_drive, places)
+
+
+def appearing(stop: Callable[[], bool] = lambda: False, seconds: float = _APPEARS) -> Path:
+    """The boot drive, once it is mounted. Raises LinkError if none is within `seconds`, or several are."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not stop():
+        found = list(mounted())
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise LinkError(f"{len(found)} boot drives ({', '.join(map(str, found))}): name one of them")
+        time.sleep(0.1)
+    raise LinkError(
+        f"no drive {_CHIP} appeared within {seconds:.0f} s: mount it, then name its folder as the port\n"
+        "a Pico without armkin's firmware shows it when BOOTSEL is held while it is plugged in"
+    )
+
+
+def write(folder: Path, name: str, data: bytes) -> None:
+    """Copy a UF2 file there. The Pico starts it, and the drive is gone, as soon as all of it has come."""
+    if not is_boot_drive(folder):
+        raise LinkError(
+            f"{folder} is no Pico's boot drive: it has no {_INFO} that says {_CHIP}\n"
+            "hold BOOTSEL while you plug the Pico in, or name the serial port of one that runs armkin"
+        )
+    written = 0
+    try:
+        with (folder / name).open("wb", buffering=0) as file:
+            while written < len(data):
+                written += file.write(data[written : written + 65536])
+            with suppress(OSError):  # the drive goes when it has all
+                os.fsync(file.fileno())
+    except OSError as error:
+        if written < len(data):
+            raise LinkError(
+                f"{folder}: {error.strerror} after {written} of {len(data)} bytes; the same command writes it again"
+            ) from None

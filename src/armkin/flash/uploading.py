@@ -1,0 +1,150 @@
+"""A board's image onto it: which boot loader its chip has, what answers there, and the board's own word at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from armkin.board.firmware.session import Session
+from armkin.board.ports import SerialPort, list_ports
+from armkin.board_kinds import BOARDS, board_name
+from armkin.errors import LinkError
+from armkin.flash import avrdude, boot_drive, intel_hex
+from armkin.flash.images import Image
+from armkin.flash.stk500v1 import Stk500v1
+from armkin.flash.stk500v2 import Stk500v2
+
+_LOADERS: dict[str, type[Stk500v1] | type[Stk500v2]] = {"atmega328p": Stk500v1, "atmega2560": Stk500v2}
+_SIGNATURES = {
+    bytes.fromhex("1e950f"): "atmega328p",
+    bytes.fromhex("1e9514"): "atmega328p",  # the 328 without P, on some clones
+    bytes.fromhex("1e9516"): "atmega328p",  # and the PB
+    bytes.fromhex("1e9801"): "atmega2560",
+}
+_LISTENS = 1.6  # [s] after a reset that a boot loader is asked for
+_TO_BOOT_DRIVE = 1200  # baud: opening its port so sends a Pico to its boot drive
+_RESTART = 10.0  # [s] that a Pico may take to show its serial port again
+
+Loader = Stk500v1 | Stk500v2
+Tick = Callable[[int], None]
+
+
+class Flashed(NamedTuple):
+    """What was written, and what the board then said."""
+
+    port: str | None  # where the board answers; None: a Pico whose port has not come yet
+    bytes: int
+    uploader: str  # armkin, avrdude or UF2
+    firmware: str | None  # version, as the board says it
+
+
+def upload(
+    image: Image, port: str, tick: Tick = lambda done: None, stop: Callable[[], bool] = lambda: False
+) -> Flashed:
+    """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
+
+    tick: is told the bytes written so far. Raises LinkError, saying what was written: a boot loader stays where it is,
+    so that the same command may be repeated.
+    """
+    chip = BOARDS[image.kind].chip
+    if chip not in _LOADERS:
+        return _to_boot_drive(image, port, tick, stop)
+    flash = intel_hex.read(image.data.decode("ascii"))
+    loader, link, baud = _loader(chip, image.kind, port)
+    program = avrdude.program()
+    try:
+        if program is None:
+            _write(loader, flash, tick)
+    finally:
+        link.close()
+    if program is not None:
+        try:
+            avrdude.write(program, chip, port, baud, image.path)
+        except LinkError as error:
+            raise _cut(str(error), "some") from None
+        tick(len(flash))
+    return Flashed(port, len(flash), "avrdude" if program else "armkin", _asked(image.kind, port, stop))
+
+
+def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
+    """The boot loader that answers, its open port and the port's rate."""
+    wanted = _LOADERS[chip]
+    others = [other for other in _LOADERS.values() if other is not wanted]
+    for make, baud in [(loader, baud) for loader in (wanted, *others) for baud in loader.bauds]:
+        link = SerialPort(port, baud)
+        try:
+            link.restart()
+            loader = make(link)
+            if loader.answers(time.monotonic() + _LISTENS):
+                found = loader.signature()
+                if _SIGNATURES.get(found) == chip:
+                    return loader, link, baud
+                name = _SIGNATURES.get(found, f"of signature {found.hex(' ')}")
+                fitting = [board.kind for board in BOARDS.values() if board.chip == name]
+                raise LinkError(
+                    f"the chip on {port} is an {name}; {kind} is for an {chip}: nothing was written\n"
+                    f"boards with such a chip: {', '.join(fitting) or 'armkin has firmware for none with it'}"
+                )
+        except BaseException:
+            link.close()
+            raise
+        link.close()
+    raise LinkError(
+        f"no boot loader answers on {port} after a reset: nothing was written\n"
+        "is it the right port (armkin ports), an Arduino with its boot loader, and a cable that carries data?"
+    )
+
+
+def _write(loader: Loader, flash: bytes, tick: Tick) -> None:
+    """Write the flash's bytes, then compare them."""
+    size = loader.page
+    pages = [(at, flash[at : at + size].ljust(size, b"\xff")) for at in range(0, len(flash), size)]
+    at = 0
+    try:
+        for at, page in pages:
+            loader.write(at, page)
+            tick(min(at + size, len(flash)))
+        for at, page in pages:
+            if loader.read(at, size) != page:
+                raise LinkError(f"the flash at byte {at} is not what was written")
+        loader.leave()
+    except (LinkError, KeyboardInterrupt) as error:
+        raise _cut(str(error) or "stopped", f"{at}") from None
+
+
+def _cut(reason: str, done: str) -> LinkError:
+    return LinkError(
+        f"{reason.splitlines()[0]}: {done} bytes were written, so that the board has no whole program now\n"
+        "its boot loader stays: the same command writes it again"
+    )
+
+
+def _to_boot_drive(image: Image, port: str, tick: Tick, stop: Callable[[], bool]) -> Flashed:
+    folder = Path(port)
+    if not folder.is_dir():
+        SerialPort(port, _TO_BOOT_DRIVE).close()
+        folder = boot_drive.appearing(stop)
+    before = {found.device for found in list_ports()}
+    boot_drive.write(folder, image.path.name, image.data)
+    tick(len(image.data))
+    end = time.monotonic() + _RESTART
+    while time.monotonic() < end and not stop():
+        new = [found.device for found in list_ports() if found.device == port or found.device not in before]
+        if new:
+            return Flashed(new[0], len(image.data), "UF2", _asked(image.kind, new[0], stop))
+        time.sleep(0.1)
+    return Flashed(None, len(image.data), "UF2", None)
+
+
+def _asked(kind: str, port: str, stop: Callable[[], bool]) -> str:
+    """The firmware's version, of the board that was meant. Raises LinkError for another one, or none."""
+    link = SerialPort(port)
+    try:
+        info = Session(link, stop).open()
+    finally:
+        link.close()
+    if info.board != BOARDS[kind].number:
+        raise LinkError(f"written, but the board on {port} says that it is {board_name(info.board)}, not {kind}")
+    return ".".join(map(str, info.firmware))

@@ -1,0 +1,137 @@
+"""`armkin flash` against the boot loaders that Arduinos have, on the emulated chips."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from emulator import MCU, EmulatedBoard, build_firmware
+
+from armkin.board_kinds import BOARDS
+from armkin.flash import images
+from command_line import run
+
+LOADERS = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders")
+KINDS = ("uno_cnc_shield", "mega_ramps14")
+Make = Callable[[str], EmulatedBoard]
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Images as scripts/release makes them."""
+    folder = tmp_path_factory.mktemp("images")
+    for kind in KINDS:
+        (folder / images.file_name(kind)).write_bytes(build_firmware(kind).with_suffix(".hex").read_bytes())
+    sums = subprocess.run("sha256sum *.hex > SHA256SUMS", shell=True, cwd=folder, check=True)
+    assert sums.returncode == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def optiboot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """optiboot from its source, into a boot section of 1 kB: Debian's compiler makes more than 512 bytes of it."""
+    elf = tmp_path_factory.mktemp("optiboot") / "optiboot.elf"
+    options = ["-Os", "-fno-split-wide-types", "-mrelax", f"-mmcu={MCU['uno_servos']}", "-DF_CPU=16000000L"]
+    options += ["-DLED_START_FLASHES=3", "-DBAUD_RATE=115200", "-nostartfiles", "-nostdlib", "-Wl,--relax"]
+    places = ["-Wl,--section-start=.text=0x7c00", "-Wl,--section-start=.version=0x7ffe"]
+    source = LOADERS / "optiboot/optiboot.c"
+    subprocess.run(["avr-gcc", *options, *places, "-o", str(elf), str(source)], check=True, capture_output=True)
+    parts = ["-j", ".text", "-j", ".data", "-j", ".version", "--set-section-flags", ".version=alloc,load"]
+    subprocess.run(["avr-objcopy", *parts, "-O", "ihex", str(elf), str(elf.with_suffix(".hex"))], check=True)
+    return elf.with_suffix(".hex")
+
+
+@pytest.fixture(scope="session")
+def loaders(optiboot: Path) -> dict[str, Path]:
+    """Of each chip."""
+    return {"atmega328p": optiboot, "atmega2560": LOADERS / "stk500v2/stk500boot_v2_mega2560.hex"}
+
+
+@pytest.fixture
+def empty(loaders: dict[str, Path]) -> Make:
+    """A board of some kind with nothing but its boot loader."""
+    return lambda kind: EmulatedBoard(kind, loader=loaders[BOARDS[kind].chip], speed="max")
+
+
+@pytest.fixture(autouse=True)
+def _installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.flash.images.FOLDER", built)
+    monkeypatch.setattr(images.image, "__defaults__", (built,))
+
+
+@pytest.fixture
+def without_avrdude(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.flash.avrdude.program", lambda: None)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("uploader", ["armkin", "avrdude"])
+def test_an_empty_board_runs_armkin(kind: str, uploader: str, empty: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    if uploader == "armkin":
+        monkeypatch.setattr("armkin.flash.avrdude.program", lambda: None)
+    with empty(kind) as board:
+        done = run("flash", "--board", kind, "--port", board.port, "--json")
+        assert done.code == 0, done.err
+        answer = done.json
+        assert (answer["board"], answer["uploader"], answer["firmware"]) == (kind, uploader, "2.0")
+        assert 20_000 < answer["bytes"] < 32_000
+        if kind == "uno_cnc_shield":  # and a motor turns: its second command
+            assert run("send", "three_dof", 1, 90, -90, "--port", board.port, "--assume-home").code == 0
+            assert board.stats()["axes"]["X"]["net"] != 0
+
+
+@pytest.mark.usefixtures("without_avrdude")
+def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make) -> None:
+    command = ("flash", "--board", "uno_cnc_shield", "--port")
+    with empty("uno_cnc_shield") as board:
+        board.control("after 1s cut both")
+        done = run(*command, board.port)
+        assert done.code == 5
+        assert "bytes were written, so that the board has no whole program now" in done.err
+        assert "the same command writes it again" in done.err
+        board.control("restore")
+        assert run(*command, board.port).code == 0
+
+
+@pytest.mark.parametrize(("asked", "there"), [KINDS, KINDS[::-1]])
+def test_another_board_than_was_named_keeps_its_program(asked: str, there: str, empty: Make) -> None:
+    chip = BOARDS[there].chip
+    with empty(there) as board:
+        done = run("flash", "--board", asked, "--port", board.port)
+        assert done.code == 5
+        assert f"the chip on {board.port} is an {chip}" in done.err
+        assert "nothing was written" in done.err
+        assert board.stats()["uart"]["received"] < 200
+
+
+def test_a_port_that_another_program_holds_is_not_reset(empty: Make) -> None:
+    from armkin.board.ports import SerialPort
+
+    with empty("uno_cnc_shield") as board:
+        held = SerialPort(board.port)
+        resets = board.stats()["resets"]
+        done = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
+        assert (done.code, board.stats()["resets"]) == (5, resets)
+        assert "is in use" in done.err
+        held.close()
+
+
+def test_a_board_without_a_boot_loader_is_told() -> None:
+    with EmulatedBoard("uno_cnc_shield", speed="max") as board:
+        done = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
+        assert done.code == 5
+        assert "no boot loader answers" in done.err
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_session_opens_while_the_real_boot_loader_listens(kind: str, loaders: dict[str, Path]) -> None:
+    """A byte that comes meanwhile keeps the Mega's there until 5 s of silence: armkin never reached such a board."""
+    from armkin.board.firmware.session import Session
+    from armkin.board.ports import SerialPort
+
+    with EmulatedBoard(kind, elf=build_firmware(kind), loader=loaders[BOARDS[kind].chip], speed="max") as board:
+        port = SerialPort(board.port)
+        assert Session(port).open().board == BOARDS[kind].number
+        port.close()

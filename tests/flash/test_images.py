@@ -1,0 +1,105 @@
+"""Images of the firmware: installed whole, or said to be missing; and the files that they are."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from armkin.errors import LinkError, MissingExtraError
+from armkin.flash import boot_drive, images, intel_hex
+from armkin.flash.images import Image
+from armkin.flash.uploading import upload
+from command_line import run
+
+UF2 = b"UF2\n" * 30_000
+
+
+def test_a_clone_without_images_says_how_they_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(images.image, "__defaults__", (tmp_path,))
+    done = run("flash", "three_dof", "--port", "/dev/null")
+    assert done.code == 1
+    assert "scripts/release builds it" in done.err
+    assert "no firmware for uno_cnc_shield" in done.err
+
+
+@pytest.mark.parametrize("sums", ["", "00 uno_servos.hex\n", "uno_servos.hex\n", "\x00\xff"])
+def test_an_image_that_is_not_what_was_built_is_refused(sums: str, tmp_path: Path) -> None:
+    (tmp_path / "uno_servos.hex").write_text(":00000001FF\n")
+    (tmp_path / "SHA256SUMS").write_text(sums)
+    with pytest.raises(MissingExtraError):
+        images.image("uno_servos", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "which board?"),
+        (("puma560",), "puma560 names no board"),
+        (("--board", "uno"), "armkin has no firmware for 'uno'"),
+        (("--board", "grbl"), "armkin has no firmware for 'grbl'"),
+        (("three_dof", "--board", "pico6"), "three_dof's board is uno_cnc_shield, and --board says pico6"),
+    ],
+)
+def test_what_board_it_is_has_to_be_plain(words: tuple[str, ...], message: str) -> None:
+    done = run("flash", *words, "--port", "/dev/null")
+    assert done.code == 2
+    assert message in done.err
+
+
+def test_records_of_intel_hex_lie_where_they_say() -> None:
+    two = ":04001000DEADBEEFB4\n:020000021000EC\n:020002001234B6\n:00000001FF\n"
+    flash = intel_hex.read(two)
+    assert flash[0x10:0x14].hex() == "deadbeef"
+    assert flash[0x10002:].hex() == "1234"
+    assert set(flash[:0x10]) == {255}
+
+
+@pytest.mark.parametrize("text", ["", ":", "0400", ":04001000DEADBEEFB5\n:00000001FF", ":04001000DEADBEEFB4", "hello"])
+def test_what_is_no_intel_hex_is_refused(text: str) -> None:
+    with pytest.raises(ValueError):
+        intel_hex.read(text)
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    folder = tmp_path / "RPI-RP2"
+    folder.mkdir()
+    (folder / "INFO_UF2.TXT").write_text("UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: RPI-RP2\n")
+    return folder
+
+
+def test_a_picos_boot_drive_gets_the_image(drive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.flash.uploading._RESTART", 0.0)
+    done = upload(Image("pico6", Path("pico6.uf2"), UF2), str(drive))
+    assert (drive / "pico6.uf2").read_bytes() == UF2
+    assert (done.port, done.bytes, done.uploader) == (None, len(UF2), "UF2")
+
+
+def test_the_command_says_what_it_copied(drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "pico6.uf2").write_bytes(UF2)
+    (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
+    monkeypatch.setattr(images.image, "__defaults__", (tmp_path,))
+    monkeypatch.setattr("armkin.flash.uploading._RESTART", 0.0)
+    done = run("flash", "--board", "pico6", "--port", drive, "--json")
+    assert done.json == {"board": "pico6", "port": None, "bytes": len(UF2), "uploader": "UF2", "firmware": None}
+    assert "120000 bytes copied" in run("flash", "--board", "pico6", "--port", drive).out
+
+
+def test_another_folder_is_no_boot_drive(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="is no Pico's boot drive"):
+        upload(Image("pico6", Path("pico6.uf2"), UF2), str(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_boot_drive_that_does_not_come_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.flash.boot_drive.mounted", lambda: iter(()))
+    with pytest.raises(LinkError, match="no drive RPI-RP2 appeared"):
+        boot_drive.appearing(seconds=0.2)
+
+
+def test_an_installed_image_is_what_its_checksum_says(tmp_path: Path) -> None:
+    (tmp_path / "pico6.uf2").write_bytes(UF2)
+    (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
+    assert images.image("pico6", tmp_path).data == UF2
