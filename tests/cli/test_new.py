@@ -103,6 +103,7 @@ def test_what_is_wrong_is_told_and_nothing_is_written(words: list[str], says: st
 
 def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
     answers = ["standard", "2", "pi/2", "0", "a lot", "170", "", "-90,90", "0", "200", "0", "q2 + 45", "none"]
+    answers += ["5000", "-20"]  # the floor: one that swallows the arm is asked for again
     master, slave = pty.openpty()
     command = [sys.executable, "-m", "armkin", "new", "asked"]
     with subprocess.Popen(command, cwd=tmp_path, stdin=slave, stdout=slave, stderr=subprocess.PIPE) as process:
@@ -113,6 +114,8 @@ def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
         assert process.wait(30) == 0, said
     os.close(master)
     assert "d: 'a lot' is not a number" in said
+    assert "floor is hit in every posture" in said
+    assert [entry.floor for entry in robot_file.read(tmp_path / "asked.yaml").keep_out] == [-20]
     first, second = robot_file.read(tmp_path / "asked.yaml").joints
     assert first.dh is not None
     assert second.dh is not None

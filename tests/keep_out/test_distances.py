@@ -89,6 +89,16 @@ def test_depth_is_the_way_to_the_nearest_face() -> None:
     assert box.distance(*through).item() == -10.0
 
 
+def test_points_are_segments_without_length() -> None:
+    rng = np.random.default_rng(4)
+    p = rng.uniform(-150, 150, (3, MANY))
+    T = transform((30.0, -20.0, 10.0), (20.0, 30.0, 40.0))
+    line = rng.uniform(-100, 100, (2, 3))
+    for shape in (Box(T[:3, 3], T[:3, :3], np.array([60.0, 100.0, 30.0])), Floor(5.0), Capsule(line[0], line[1], 40.0)):
+        assert np.abs(shape.of_points(p) - shape.distance(p, p)).max() < 1e-9
+    assert Capsule(line[0], line[0], 1.0).of_points(line[0]).item() == -1.0
+
+
 def test_floor_and_capsule_keep_to_their_formulas() -> None:
     a, b = np.array([[0.0], [0.0], [30.0]]), np.array([[100.0], [0.0], [-5.0]])
     assert Floor(10.0).distance(a, b).item() == -15.0

@@ -93,6 +93,17 @@ def test_the_best_branch_is_free_and_stands_first(table: Path) -> None:
     assert "table" in run("ik", "three_dof", *target, *words).out
 
 
+@pytest.mark.parametrize("robot", ["three_dof", "ur5e", "cobra600"])
+def test_the_nearest_pair_is_the_least_of_all(robot: str, table: Path) -> None:
+    """Found by middles and half lengths first, as most segments are too far to matter."""
+    held = guard(armkin.load(robot, scene=table))
+    q = np.random.default_rng(4).uniform(-3, 3, (3000, held.arm.n)) * np.where(held.arm.prismatic, 100.0, 1.0)
+    mm, which = held.least(q)
+    every = held.clearances(q)
+    assert np.abs(mm - every.min(axis=1)).max() < 1e-9
+    assert np.abs(every[np.arange(len(q)), which] - mm).max() < 1e-9
+
+
 def test_no_free_branch_is_no_solution_and_names_the_hits() -> None:
     got = run("ik", "three_dof", "300", "0", "-100", "--scene", BENCH, "--json")
     answer = json.loads(got.out)

@@ -351,6 +351,31 @@ def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
         assert np.abs(again - R).max() < 1e-15 * 8
 
 
+def test_radii_come_from_round_collision_shapes_and_no_others() -> None:
+    def solid(shape: str, of: str = "collision") -> str:
+        return f"<{of}><geometry>{shape}</geometry></{of}>"
+
+    links = {
+        "base": solid('<cylinder radius="0.06" length="0.1"/>'),
+        "upper": solid('<cylinder radius="0.04" length="0.3"/>') + solid('<sphere radius="0.05"/>'),
+        "lower": solid('<cylinder radius="0.03" length="0.3"/>') + solid('<box size="1 1 1"/>'),
+        "hand": solid('<sphere radius="0.5"/>', "visual"),
+    }
+    raw = document(*((f'<link name="{name}"/>', f'<link name="{name}">{of}</link>') for name, of in links.items()))
+    data = urdf.parse(raw).data
+    assert data["base"] == {"body": {"radius": 60.0}}
+    assert [joint.get("body") for joint in data["joints"]] == [{"radius": 50.0}, None, None]
+    assert robot_file.parse(text(data)).joints[0].body is not None
+    fixed = '<link name="tcp"><collision><geometry><cylinder radius="0.02"/></geometry></collision></link>'
+    joint = '<joint name="to_tcp" type="fixed"><parent link="hand"/><child link="tcp"/></joint>'
+    assert urdf.parse(document(('<link name="hand"/>', f'<link name="hand"/>{fixed}{joint}'))).data["joints"][2][
+        "body"
+    ] == {"radius": 20.0}
+    for odd in ("-1", "nan", "", "1e9", "x"):
+        raw = document(('<link name="upper"/>', f'<link name="upper">{solid(f"""<sphere radius="{odd}"/>""")}</link>'))
+        assert "body" not in urdf.parse(raw).data["joints"][0]
+
+
 def test_shipped_file_is_data_of_this_project() -> None:
     assert len(CHAINS) >= 30
     assert all(chain["source"] for chain in CHAINS.values())

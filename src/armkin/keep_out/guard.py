@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
-CHUNK = 512  # postures at once: what stays in the cache
+CHUNK = 2048  # postures at once: few calls of numpy, and what they need stays in the cache
 POSTURES = 256  # in which a pair that always overlaps is looked for, home among them
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
@@ -79,11 +79,50 @@ class Guard:
         """Least clearance and its pair: q (N, n) -> (N,), (N,); nan where a joint value is, inf where none counts."""
         mm, which = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
         for k in range(0, len(q) if self.pairs else 0, CHUNK):
-            apart = self.clearances(q[k : k + CHUNK])
-            which[k : k + CHUNK] = apart.argmin(axis=1)
-            mm[k : k + CHUNK] = apart.min(axis=1)
+            mm[k : k + CHUNK], which[k : k + CHUNK] = self._least(q[k : k + CHUNK])
+        mm -= self.arm.clearance
         mm[np.isnan(q).any(axis=1)] = np.nan
         return mm, which
+
+    def _least(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least distance and its pair. A segment is as near as its middle, and nearer by half its length at most:
+        most are too far to be the nearest, and only the others are looked at.
+        """
+        a, b = ends(self.arm, q)
+        middle, way = (a + b) / 2, b - a
+        half = np.sqrt(np.einsum("ksn,ksn->sn", way, way)) / 2
+        radius, moving, i, j = self.bodies.radius[self.bodies.owner][:, None], self.moving, self.ours, self.theirs
+        most = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
+        nearer = [half[moving]] * len(most)
+        if len(i):
+            apart = middle[:, i] - middle[:, j]
+            most.append(np.sqrt(np.einsum("ksn,ksn->sn", apart, apart)) - radius[i] - radius[j])
+            nearer.append(half[i] + half[j])
+        found = np.full((sum(map(len, most)), len(q)), np.inf)
+        bound = np.min([part.min(axis=0) for part in most if len(part)], axis=0) + 1e-9 * self.arm.reach
+        row = 0
+        for k, (far, least) in enumerate(zip(most, nearer, strict=True)):
+            s, n = np.nonzero(far - least <= bound)
+            if k < len(self.obstacles):
+                one = moving[s]
+                exact = self.obstacles[k][1].distance(a[:, one, n], b[:, one, n]) - radius[one, 0]
+            else:
+                one, two = i[s], j[s]
+                exact = (
+                    between(a[:, one, n], b[:, one, n], a[:, two, n], b[:, two, n]) - radius[one, 0] - radius[two, 0]
+                )
+            found[row + s, n] = exact
+            row += len(far)
+        nearest = found.argmin(axis=0)
+        return found[nearest, np.arange(len(q))], self._pair_of_row[nearest]
+
+    @cached_property
+    def _pair_of_row(self) -> NDArray[np.intp]:
+        """The pair of every segment against every obstacle, and of every two segments held against each other."""
+        body = np.searchsorted(self.first, np.arange(len(self.moving)), side="right") - 1
+        of_obstacles = [body + k * len(self.first) for k in range(len(self.obstacles))]
+        crossing = np.searchsorted(self.starts, np.arange(len(self.ours)), side="right") - 1
+        return np.concatenate([*of_obstacles, crossing + len(self.obstacles) * len(self.first)]).astype(np.intp)
 
     def of(self, pair: int) -> tuple[str, str]:
         """The names of a pair: body, and what it is held against."""

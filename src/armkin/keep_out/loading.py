@@ -9,6 +9,8 @@ from armkin.model.build import build
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.robot_file.robot import RobotFile
+    from armkin.robot_file.scene import Scene
 
 
 def load(path: str | PathLike[str], scene: str | PathLike[str] | None = None) -> Arm:
@@ -27,6 +29,11 @@ def load(path: str | PathLike[str], scene: str | PathLike[str] | None = None) ->
         from armkin.robot_file.scene import read
 
         around = read(scene)
+    return checked(file, around)
+
+
+def checked(file: RobotFile, around: Scene | None = None) -> Arm:
+    """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
     arm = build(file, around)
     if arm.keep_out:
         from armkin.keep_out.guard import check

@@ -27,6 +27,10 @@ _HEAD = {
     "modified": "modified DH (Craig): each row is Rx(alpha) Tx(a) Rz(theta) Tz(d), alpha and a of the link before",
 }
 
+_KEEP_OUT = """# Where the arm must not go, in mm: self, floors, boxes, capsules; clearance: how far to keep away.
+# How thick the arm is: `body: {radius: 40}` at a joint, and `base: {body: {radius: 60}}`; absent: 2 % of its reach.
+# clearance: 5"""
+
 _AXES = ("X", "Y", "Z", "A", "E0", "E1")  # an example for each drive
 
 _TAIL = """
@@ -40,6 +44,8 @@ _TAIL = """
 # Joint values by name: `armkin fk FILE park`.
 # poses: {park: [%(home)s]}
 
+%(keep_out)s
+
 # For `armkin send`: the board. (`armkin schema` lists every key; examples/every_key.yaml in armkin's sources shows
 # them all: limit switches for `armkin home`, servos, motors that turn several joints.)
 # board: {kind: uno_cnc_shield, driver: A4988}
@@ -47,8 +53,11 @@ _TAIL = """
 """
 
 
-def text(name: str, convention: str, rows: Sequence[Row], source: str = "") -> str:
-    """The file of a table; name, source: as the file shall say; convention: standard or modified."""
+def text(name: str, convention: str, rows: Sequence[Row], source: str = "", floor: float | None = None) -> str:
+    """The file of a table.
+
+    name, source: as the file shall say; convention: standard or modified; floor: z that the arm may not go below.
+    """
     lines = [
         "# Millimetres and degrees throughout. `armkin info` prints the table as papers do: compare it line by line.",
         f"name: {scalar(name)}",
@@ -58,7 +67,9 @@ def text(name: str, convention: str, rows: Sequence[Row], source: str = "") -> s
     ]
     for i, row in enumerate(rows):
         lines += _joint(row, _AXES[i % len(_AXES)], with_comments=i == 0)
-    return "\n".join(lines) + "\n" + _TAIL % {"home": ", ".join(_number(row.home) for row in rows)}
+    entry = "# keep_out: [self, floor: 0]" if floor is None else f"keep_out: [floor: {_number(floor)}]"
+    fields = {"home": ", ".join(_number(row.home) for row in rows), "keep_out": f"{_KEEP_OUT}\n{entry}"}
+    return "\n".join(lines) + "\n" + _TAIL % fields
 
 
 def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
@@ -74,6 +85,7 @@ def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
         ("sign: -1", "if the joint counts against its row", False),
         ("max_speed: 60", f"{unit}/s, for send", False),
         ("max_accel: 120", f"{unit}/s2, for send", False),
+        ("body: {radius: 40}", "mm, for keep_out", False),
         (f"drive: {{axis: {axis}, full_steps: 200, microsteps: 16, gear: 1{lead}}}", "for pulses and send", False),
     ]
     lines = [f"  - name: {row.name}"]

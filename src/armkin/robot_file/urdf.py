@@ -1,8 +1,8 @@
 """URDF, the robot description of ROS, read as a robot file with screws.
 
-Of a URDF a chain needs the joints' types, origins, axes, limits and speeds, and which link hangs on which.
-All else (meshes, inertias, transmissions, dynamics, effort) is left out, no other file is opened, and XML's
-own dangers (entities, DTDs, deep nesting, size) are errors. The format: http://wiki.ros.org/urdf/XML.
+Of a URDF a chain needs the joints' types, origins, axes, limits and speeds, and which link hangs on which; keep-outs
+need the radii of round collision shapes. All else (meshes, inertias, transmissions, dynamics, effort) is left out, no
+other file is opened, and XML's own dangers (entities, DTDs, deep nesting, size) are errors. The format: http://wiki.ros.org/urdf/XML.
 
 A joint's origin and axis in the base frame, when all joints are 0, are its screw: nothing is fitted or rounded
 beyond 1e-12 mm.
@@ -35,6 +35,7 @@ TURNS = 25.0  # [rad] of a limit that make one ask: four turns
 ENDLESS = 1e6  # [deg | mm] of a limit that is none
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_ROUND = ("cylinder", "sphere", "capsule")  # collision shapes with a radius
 _MOVING = ("revolute", "continuous", "prismatic")
 
 Matrix = NDArray[np.float64]
@@ -79,11 +80,32 @@ def parse(
     """
     if len(raw) > MAX_BYTES:
         raise RobotFileError(f"{name}: larger than {MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
-    robot, links, joints = document(raw, name)
-    tree = Tree(name, links, joints)
+    robot, tree = document(raw, name)
     first = tree.base(base)
     chain = tree.chain(first, tree.tip(first, tip))
-    return _robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
+    found = _robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
+    _bodies(found.data, tree, first, [joint for joint in chain if joint.kind != "fixed"])
+    return found
+
+
+def _bodies(data: dict[str, Any], tree: Tree, base: str, joints: list[Joint]) -> None:
+    """Note the radius of every body whose collision shapes are all round: boxes and meshes tell none."""
+    moving = data.pop("joints")
+    if radius := _radius(tree.body(base)):
+        data["base"] = {"body": {"radius": radius}}
+    for joint, entry in zip(joints, moving, strict=True):
+        if radius := _radius(tree.body(str(joint.text("child", "link")))):
+            entry["body"] = {"radius": radius}
+    data["joints"] = moving
+
+
+def _radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
+    """The greatest radius of shapes [mm]; None where one has no radius, or one beyond a kilometre."""
+    radii = [of.get("radius", "").strip() if tag in _ROUND else "" for tag, of in solids]
+    if not radii or not all(_NUMBER.fullmatch(radius) for radius in radii):
+        return None
+    greatest = tidy(max(map(float, radii)) * METRE, 9)
+    return greatest if 0 < greatest <= 1e6 else None
 
 
 def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> Imported:

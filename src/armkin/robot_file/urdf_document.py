@@ -10,6 +10,8 @@ from armkin.errors import MissingExtraError, RobotFileError, UsageError
 MAX_DEPTH = 50
 MAX_LINKS = 2_000
 
+Solids = dict[str, list[tuple[str, dict[str, str]]]]  # link -> what its <collision> elements hold: tag, attributes
+
 _FORMATS = {"sdf": "an SDF file", "mujoco": "a MuJoCo file", "COLLADA": "a mesh", "gazebo": "a Gazebo file"}
 
 
@@ -34,6 +36,8 @@ class _Reader:
         self.links: dict[str, None] = {}
         self.joints: dict[str, Joint] = {}
         self.joint: Joint | None = None
+        self.solids: Solids = {}
+        self.within: list[str] = []
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         self.depth += 1
@@ -50,6 +54,9 @@ class _Reader:
             self._named(tag, attributes)
         elif self.depth == 3 and self.joint is not None:
             self.joint.parts.setdefault(tag, dict(attributes))
+        elif self.within[1:] == ["link", "collision", "geometry"]:
+            self.solids[next(reversed(self.links))].append((tag, dict(attributes)))
+        self.within.append(tag)
 
     def _named(self, tag: str, attributes: Mapping[str, str]) -> None:
         name = attributes.get("name")
@@ -62,6 +69,7 @@ class _Reader:
             raise RobotFileError(f"{self.name}: more than {MAX_LINKS} {tag}s")
         if tag == "link":
             self.links[name] = None
+            self.solids[name] = []
         else:
             self.joint = self.joints[name] = Joint(name, attributes.get("type", ""))
 
@@ -69,6 +77,7 @@ class _Reader:
         if self.depth == 2:
             self.joint = None
         self.depth -= 1
+        self.within.pop()
 
     def data(self, text: str) -> None:
         """Text between elements means nothing in a URDF."""
@@ -77,8 +86,8 @@ class _Reader:
         """The document has ended."""
 
 
-def document(raw: bytes, name: str) -> tuple[str, list[str], list[Joint]]:
-    """The robot's name, its links and its joints."""
+def document(raw: bytes, name: str) -> tuple[str, Tree]:
+    """The robot's name, and its links and joints."""
     try:
         from defusedxml.common import DefusedXmlException
         from defusedxml.ElementTree import DefusedXMLParser, ParseError
@@ -99,7 +108,7 @@ def document(raw: bytes, name: str) -> tuple[str, list[str], list[Joint]]:
         if b"xmlns:xacro" in raw[:10_000] or name.endswith(".xacro"):
             raise is_xacro(name) from None
         raise RobotFileError(f"{name}: is not XML: {error}") from None
-    return reader.robot, list(reader.links), list(reader.joints.values())
+    return reader.robot, Tree(name, list(reader.links), list(reader.joints.values()), reader.solids)
 
 
 def is_xacro(name: str) -> RobotFileError:
@@ -112,8 +121,8 @@ def is_xacro(name: str) -> RobotFileError:
 class Tree:
     """Which link hangs on which, checked: every link has one parent at most, and there is no circle."""
 
-    def __init__(self, name: str, links: list[str], joints: list[Joint]) -> None:
-        self.name, self.links = name, links
+    def __init__(self, name: str, links: list[str], joints: list[Joint], solids: Solids) -> None:
+        self.name, self.links, self.solids = name, links, solids
         self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
         self.children: dict[str, list[Joint]] = {link: [] for link in links}
         for joint in joints:
@@ -209,6 +218,15 @@ class Tree:
             joints.append(self.parent[tip])
             tip = str(joints[-1].text("parent", "link"))
         return joints[::-1]
+
+    def body(self, link: str) -> list[tuple[str, dict[str, str]]]:
+        """The collision shapes of a link and of all that is fixed to it."""
+        found, stack = [], [link]
+        while stack:
+            link = stack.pop()
+            found += self.solids[link]
+            stack += [str(joint.text("child", "link")) for joint in self.children[link] if joint.kind == "fixed"]
+        return found
 
     def _known(self, link: str, what: str) -> str:
         if link not in self.children:

@@ -15,7 +15,7 @@ import typer
 from armkin.cli import inputs, output
 from armkin.cli.numbers import number, of_pi, whole
 from armkin.cli.options import Out
-from armkin.errors import FileError, UsageError
+from armkin.errors import FileError, RobotFileError, UsageError
 
 if TYPE_CHECKING:
     from armkin.robot_file.new import Row
@@ -50,6 +50,10 @@ def new(
         ),
     ] = None,
     source: Annotated[str, typer.Option("--source", metavar="TEXT", help="Where the numbers come from.")] = "",
+    floor: Annotated[
+        float | None,
+        typer.Option("--floor", metavar="Z", help="A keep-out: nothing of the arm goes below this z, in mm."),
+    ] = None,
     out: Out = None,
 ) -> None:
     """A robot file from a DH table, commented.
@@ -57,28 +61,40 @@ def new(
     Without --dh or --batch it asks on the terminal. Entries may be written as papers do: pi/2 for an angle,
     q2 + 90 or d3 for the variable. What the table does not say stands in the file as comments.
     """
-    from armkin.robot_file import parse
     from armkin.robot_file.new import text
 
     path = _path(name, out)
     if dh and batch is not None:
         raise UsageError("--dh and --batch: give one of the two")
     table: list[dict[str, str]] | None = None
+    asks = False
     if not dh and batch is None and sys.stdin is not None and sys.stdin.isatty():
         convention, table = _asked(convention)
+        asks = floor is None
     if not (dh or batch is not None or table) or convention is None:
         raise _lacking(bool(dh or batch is not None), convention)
     table = table or (_options(dh) if dh else _csv(batch or "-"))
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
     rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
-    made = text(os.path.basename(name), convention, rows, source)
-    parse(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
+    title = os.path.basename(name)
+    if asks:
+        floor = _floor(lambda z: _check(text(title, convention, rows, source, z), path))
+    made = text(title, convention, rows, source, floor)
+    _check(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
     with output.destination(path) as write:
         write(made)
     if path != "-":
         word = shlex.quote(path)
         output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
+
+
+def _check(made: str, path: str) -> None:
+    """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
+    from armkin.keep_out.loading import checked
+    from armkin.robot_file import parse
+
+    checked(parse(made, path))
 
 
 def _lacking(table: bool, convention: str | None) -> UsageError:
@@ -139,17 +155,29 @@ def _csv(source: str) -> list[dict[str, str]]:
     return [dict(zip(heading, row, strict=False)) for row in rows]
 
 
-def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
-    """The table by questions on the terminal; an answer that does not do is asked for again."""
+def _ask(question: str, default: str, check: Callable[[str], object]) -> str:
+    """An answer on the terminal; one that does not do is asked for again."""
+    while True:
+        answer = str(typer.prompt(question, default=default, err=True)).strip()
+        try:
+            check(answer)
+            return answer
+        except (UsageError, RobotFileError) as error:
+            output.warn(str(error))
 
-    def ask(question: str, default: str, check: Callable[[str], object]) -> str:
-        while True:
-            answer = str(typer.prompt(question, default=default, err=True)).strip()
-            try:
-                check(answer)
-                return answer
-            except UsageError as error:
-                output.warn(str(error))
+
+def _floor(check: Callable[[float | None], object]) -> float | None:
+    """The height that the arm may not go below; a file that is wrong for other reasons is refused at once."""
+    check(None)
+
+    def height(answer: str) -> float | None:
+        return None if answer == "none" else number(answer, "floor")
+
+    return height(_ask("floor: z that nothing goes below [mm], or none", "none", lambda word: check(height(word))))
+
+
+def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
+    """The table by questions on the terminal."""
 
     def known(answer: str) -> None:
         if answer not in ("standard", "modified"):
@@ -159,17 +187,17 @@ def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
         if answer != "none":
             _limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
 
-    convention = convention or ask("convention, standard or modified", "standard", known)
-    count = whole(ask("how many joints", "3", lambda n: whole(n, "joints", 1, 12)), "joints", 1, 12)
+    convention = convention or _ask("convention, standard or modified", "standard", known)
+    count = whole(_ask("how many joints", "3", lambda n: whole(n, "joints", 1, 12)), "joints", 1, 12)
     table = []
     for i in range(1, count + 1):
         row = {
-            "alpha": ask(f"joint {i}: alpha [deg]", "0", lambda word: _entry(word, "alpha")),
-            "a": ask(f"joint {i}: a [mm]", "0", lambda word: _entry(word, "a")),
-            "d": ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _entry(word, "d")),
-            "theta": ask(f"joint {i}: theta offset [deg]", "0", lambda word: _entry(word, "theta")),
+            "alpha": _ask(f"joint {i}: alpha [deg]", "0", lambda word: _entry(word, "alpha")),
+            "a": _ask(f"joint {i}: a [mm]", "0", lambda word: _entry(word, "a")),
+            "d": _ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _entry(word, "d")),
+            "theta": _ask(f"joint {i}: theta offset [deg]", "0", lambda word: _entry(word, "theta")),
         }
-        span = ask(f"joint {i}: limits LOWER,UPPER, or none", "none", limits)
+        span = _ask(f"joint {i}: limits LOWER,UPPER, or none", "none", limits)
         if span != "none":
             row |= dict(zip(("lower", "upper"), span.split(","), strict=True))
         table.append(row)

@@ -26,6 +26,9 @@ class Shape(Protocol):
     def distance(self, a: Array, b: Array) -> Array:
         """Least signed distance over segments: a, b (3, ...) -> (...)."""
 
+    def of_points(self, p: Array) -> Array:
+        """Signed distance of points: (3, ...) -> (...)."""
+
     def triangles(self, size: float) -> Array:
         """Its surface for pictures: (T, 3, 3); size: how far one without end is drawn [mm]."""
 

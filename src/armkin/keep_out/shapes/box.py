@@ -39,6 +39,14 @@ class Box:
             out[inside] = _inside(start[:, inside], way[:, inside], self.half)
         return out.reshape(lead)
 
+    def of_points(self, p: Array) -> Array:
+        """Signed distance of points: (3, ...) -> (...)."""
+        flat = self._own(p.reshape(3, -1)) - (self.axes.T @ self.centre)[:, None]
+        beyond = np.abs(flat) - self.half[:, None]
+        inside = np.minimum(beyond.max(axis=0), 0.0)
+        np.maximum(beyond, 0.0, out=beyond)
+        return np.asarray(np.sqrt(np.einsum("km,km->m", beyond, beyond)) + inside).reshape(p.shape[1:])
+
     def _own(self, v: Array) -> Array:
         """Vectors (3, M) in its own axes."""
         turned: Array = v.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ v

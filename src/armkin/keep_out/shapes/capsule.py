@@ -29,6 +29,14 @@ class Capsule:
         ends = (end.reshape(3, *[1] * (a.ndim - 1)) for end in (self.begin, self.end))
         return between(a, b, *ends) - self.radius
 
+    def of_points(self, p: Array) -> Array:
+        """Distance of points to its segment, less its radius: (3, ...) -> (...)."""
+        begin, way = (x.reshape(3, *[1] * (p.ndim - 1)) for x in (self.begin, self.end - self.begin))
+        length = float(np.einsum("k...,k...", way, way).item())
+        share = np.einsum("k...,k...->...", p - begin, way) / length if length else 0.0
+        apart = p - begin - np.clip(share, 0.0, 1.0) * way
+        return np.asarray(np.sqrt(np.einsum("k...,k...->...", apart, apart)) - self.radius)
+
     def triangles(self, size: float) -> Array:
         """A tube with half balls."""
         return tube(self.begin, self.end, self.radius)

@@ -24,6 +24,10 @@ class Floor:
         lower: Array = np.minimum(a[2], b[2])
         return lower - self.height
 
+    def of_points(self, p: Array) -> Array:
+        """Height above it: (3, ...) -> (...)."""
+        return np.asarray(p[2] - self.height)
+
     def triangles(self, size: float) -> Array:
         """A square of twice the size."""
         corners = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
