@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,12 @@ if sys.platform == "win32":  # no pseudo-terminals there, and no emulator
     _FILES = Path(__file__).parent.rglob("test_*.py")
     collect_ignore = [str(path) for path in _FILES if any(word in path.read_text("utf-8") for word in _NEEDS)]
     collect_ignore.append("firmware")  # its conftest.py needs the emulator, too
+
+# A shell's background job and nohup ignore these, and what a test starts would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
