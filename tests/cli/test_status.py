@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import pytest
 
+from armkin.board.firmware.machine import Machine
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
 from command_line import ROOT, THREE_DOF, run
@@ -44,3 +47,23 @@ def test_status_of_a_board_that_knows_nothing() -> None:
     assert (answer["position"], answer["joints"], answer["configured"]) == ("lost", None, False)
     assert answer["state"] == "idle"
     assert "its position is lost" in run("status", THREE_DOF, "--port", "sim").out
+
+
+def test_watch_tells_each_change_once_and_ends_with_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    board = SimBoard(BOARDS["uno_cnc_shield"])
+    plug_in(board, monkeypatch)
+    assert run("send", THREE_DOF, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
+    monkeypatch.setattr("armkin.cli.commands.status._EVERY", 0.001)
+    asked = 0
+
+    def refresh(machine: Machine) -> None:
+        nonlocal asked
+        asked += 1
+        machine.status = machine.session.status()
+        if asked == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Machine, "refresh", refresh)
+    watched = run("status", THREE_DOF, "--port", "COM3", "--watch", "--json")
+    assert (watched.code, watched.err, asked) == (0, "", 5)
+    assert [line["position"] for line in watched.lines] == ["known"]

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any
+
+import typer
 
 from armkin.cli import board_link, inputs, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 
+_EVERY = 0.2  # [s]
+
 
 def status(
-    robot: Robot, port: PortName = None, baud: Baud = None, no_reset: NoReset = False, json: Json = False
+    robot: Robot,
+    port: PortName = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Five times a second, until Ctrl-C; with --json a line whenever it changes.")
+    ] = False,
+    baud: Baud = None,
+    no_reset: NoReset = False,
+    json: Json = False,
 ) -> None:
     """Where the board says that the arm stands.
 
@@ -24,16 +38,48 @@ def status(
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     with board_link.backend(board, port, baud, simulated=new, reset=not no_reset) as machine:
-        found = {
-            **render.head(arm),
-            "port": machine.port.name,
-            "board": board.kind,
-            **where(machine),
-            **machine.report(),
-        }
+
+        def found() -> dict[str, Any]:
+            head = {**render.head(arm), "port": machine.port.name, "board": board.kind}
+            return {**head, **where(machine), **machine.report()}
+
+        def text(found: dict[str, Any]) -> str:
+            words = _servos if "servos" in found else _grbl if "settings" in found else _text
+            return render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found)
+
+        if watch:
+            _watch(text(found()) for _ in _asked(machine.refresh, board.stop))
+            return
+        answer = text(found())
     with output.destination(None) as write:
-        words = _servos if "servos" in found else _grbl if "settings" in found else _text
-        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found))
+        write(answer)
+
+
+def _asked(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iterator[None]:
+    """Now and then, until a signal comes: nothing moves that would have to be stopped."""
+    while not stop():
+        yield
+        time.sleep(_EVERY)
+        refresh()
+
+
+def _watch(texts: Iterator[str]) -> None:
+    """On a terminal in place; else what differs from the text before."""
+    if not sys.stdout.isatty():
+        before = ""
+        with output.destination(None) as write:
+            for text in texts:
+                if text != before:
+                    write(text)
+                    sys.stdout.flush()
+                before = text
+        return
+    from rich.live import Live
+    from rich.text import Text
+
+    with Live(auto_refresh=False) as live:
+        for text in texts:
+            live.update(Text(text.rstrip()), refresh=True)
 
 
 def _servos(found: dict[str, Any]) -> str:
