@@ -16,6 +16,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "firmware/test_flash.py": (),
     "board/test_board_sim.py": ("test_mutated_frames_move_nothing_that_was_not_sent",),
     "board/test_conformance.py": (),
+    "firmware/test_conformance_on_chips.py": (),
     "board/test_curves.py": ("test_a_path_at_random_arrives_at_exact_counts",),
     "board/test_false_replies.py": ("test_90_lies_to_a_moving_command_end_it_in_bounded_time",),
     "board/test_feetech_machine.py": ("test_random_moves_arrive_and_stay_near_their_line",),

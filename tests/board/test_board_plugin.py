@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,12 @@ import yaml
 
 import armkin
 from armkin import installed_kinds
-from armkin.board import path_run
+from armkin.board import conformance, path_run
 from armkin.board.backend.board import Board
 from armkin.board.kinds import board_of
 from armkin.errors import NoSolutionError, RobotFileError
 from command_line import ROOT, process, run
+from emulated_kinds import sample
 
 WIDOW_X = {"waist": 1, "shoulder": 2, "elbow": 4, "forearm_roll": 6, "wrist_angle": 7, "wrist_rotate": 8}
 
@@ -136,6 +137,12 @@ def test_the_command_line_tells_of_it(tmp_path: Path) -> None:
     home = run("home", robot, "--port", "sim")
     assert (home.code, "there is nothing to home" in home.err) == (2, True)
     assert '"dynamixel"' in run("schema").out
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
+def test_it_conforms(case: Callable[..., None]) -> None:
+    sample(case, "dynamixel")
 
 
 def test_the_command_line_knows_the_kind(packages: Path, tmp_path: Path) -> None:

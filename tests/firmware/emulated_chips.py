@@ -1,0 +1,45 @@
+"""Our firmware on the emulated chips, as the suite that every kind of board passes starts it."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+
+from emulator import EmulatedBoard
+from stepped_port import SteppedPort
+
+from armkin.board.conformance import Emulated, Start
+from armkin.board.firmware.configuration import configure
+from armkin.board.kinds import board_of
+from armkin.model.build import build
+from armkin.robot_file import parse
+from other_programs import OURS
+from starting_elsewhere import KINDS
+
+
+def start(board: EmulatedBoard) -> Start:
+    """Every emulator is the same chip after a power-on."""
+
+    def begin() -> Emulated:
+        board.control("reset power")
+        board.run(0.05)
+        kind = board_of(build(parse(KINDS[board.board])))
+        port = SteppedPort(board)
+        base = list(board.net().values())
+        axes = configure(kind.arm).axes
+
+        def pins() -> Sequence[float]:
+            now = list(board.net().values())
+            return [now[axis] - base[axis] for axis in axes]
+
+        resets = random.Random(1)
+
+        def reset() -> None:
+            board.control(f"reset {resets.choice(['external', 'watchdog', 'power'])}")
+
+        def says(data: bytes) -> Callable[[], None]:
+            return lambda: port.write(data)
+
+        return Emulated(kind, port, pins, reset=reset, foreign=[says(data) for data in OURS])
+
+    return begin
