@@ -56,6 +56,11 @@ def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
         page.set_input_files("#load", str(file))
         until(page, "document.querySelector('#trouble').textContent.includes('3 joints')")
         assert page.locator("#moves li").count() == 2
+        # A program that starts elsewhere than the arm stands says, before it is sent, by which move it is reached.
+        file.write_text("start: {joints: [30, 60, -60]}\nmoves:\n  - joint: [0, 90, -90]\n")
+        page.set_input_files("#load", str(file))
+        said = "first a joint move to its start, 1.000 s; then 1.000 s"
+        until(page, f"document.querySelector('#planned').textContent.startsWith('{said}')")
 
 
 def test_a_long_list_keeps_the_rows_that_stay(browser: Browser, tmp_path: Path) -> None:

@@ -21,7 +21,10 @@ _INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
 
 
 def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
-    """Joint values over time, the tip's way, speeds as shares of the limits; `shown_mm`: what the tip shown is off."""
+    """Joint values over time, the tip's way, speeds as shares of the limits; `shown_mm`: what the tip shown is off.
+
+    `approach_s`: of the joint move that comes before it, from where the arm stands to its start.
+    """
     begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
     t, off = _times(arm, plan, begins)
     q = plan.q(t)
@@ -29,6 +32,7 @@ def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
         shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)
     return {
         "duration_s": plan.duration,
+        "approach_s": 0.0 if plan.approach is None else plan.approach.duration,
         "length_mm": plan.length,
         "shown_mm": off,
         "time": t.round(4).tolist(),

@@ -96,6 +96,7 @@ export class Program {
     this.player.load(plan);
     this.page.trail(plan.tips);
     let text = `${fixed(plan.duration_s, 3)} s`;
+    if (plan.approach_s) text = `first a joint move to its start, ${fixed(plan.approach_s, 3)} s; then ${text}`;
     if (plan.length_mm) text += `, ${fixed(plan.length_mm, 1)} mm on lines and arcs`;
     if (plan.shown_mm > 0.5) text += `; it is long: the tip shown is up to ${fixed(plan.shown_mm, 1)} mm off`;
     get("planned").textContent = text;

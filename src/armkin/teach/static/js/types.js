@@ -21,7 +21,7 @@
  * @typedef {{kind: string, name: string, said: string, blend: number|null}} ProgramMove
  * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,
  *   undo: number, redo: number}} ProgramState
- * @typedef {{duration_s: number, length_mm: number, shown_mm: number, time: number[], joints: number[][], tips: number[][],
+ * @typedef {{duration_s: number, approach_s: number, length_mm: number, shown_mm: number, time: number[], joints: number[][], tips: number[][],
  *   shares: number[][], stops: number[]}} Played
  */
 export {};
