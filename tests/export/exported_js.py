@@ -26,6 +26,7 @@ const ik = asked.targets.map((target, k) => arm.ik(target, asked.near[k]));
 const seconds = Number(process.hrtime.bigint() - began) / 1e9;
 const told = { ik, seconds };
 for (const name of ['fk', 'jacobian', 'target', 'pulses']) if (arm[name]) told[name] = asked.q.map(arm[name]);
+if (arm.clearance) told.clearance = asked.q.map(arm.clearance);
 if (arm.joints) told.joints = told.pulses.map(arm.joints);
 writeFileSync('told.json', JSON.stringify(told));
 """

@@ -120,6 +120,23 @@ def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: P
         assert abs(answer["closest"]["distance_mm"] - mine.distance) < 1e-6
 
 
+@pytest.mark.parametrize("name", ["three_dof", "ur5e"])
+def test_hits_are_those_of_python(name: str, tmp_path: Path) -> None:
+    arm = armkin.load(name, scene=str(Path(__file__).parents[2] / "examples" / "scenes" / f"{name}.yaml"))
+    q = np.random.default_rng(3).uniform(np.maximum(arm.lower, -3), np.minimum(arm.upper, 3), (60, arm.n))
+    told = ask(arm, tmp_path, q)
+    apart = armkin.clearance(arm, q)
+    assert np.abs(np.array([one["clearance_mm"] for one in told["clearance"]]) - apart.mm).max() < 1e-9
+    hit = [(one["hits"][0]["body"], one["hits"][0]["with"]) if one["hits"] else ("", "") for one in told["clearance"]]
+    told_by_python = zip(apart.body.tolist(), apart.other.tolist(), (apart.mm < 0).tolist(), strict=True)
+    assert hit == [(body, other) if deep else ("", "") for body, other, deep in told_by_python]
+    assert 3 < int((apart.mm < 0).sum()) < 60
+    s = armkin.ik(arm, goals_of(arm, q))
+    assert not differences(arm, told["ik"], s)
+    free = [[not row["hits"] for row in one["branches"]] for one in told["ik"]]
+    assert [sorted(row) for row in free] == [sorted(s.clear[k, s.valid[k]].tolist()) for k in range(len(q))]
+
+
 def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
     arm = armkin.load("three_dof")
     object.__setattr__(arm, "name", "</script><script>alert(1)//\u2028throw 1")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,29 +20,52 @@ _KINDS = {"floor": 0, "box": 1, "capsule": 2}
 _NUMBERS = 15  # of the largest shape
 
 
-def clearances(arm: Arm, single: bool = False) -> str:
-    """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
+class Tables(NamedTuple):
+    """What is held against what."""
+
+    thick: list[float]  # radius of each segment [mm]
+    solid: int  # bodies that are held against obstacles
+    moving: list[tuple[int, int]]  # a segment, and its body's place among those
+    shapes: list[tuple[int, list[float]]]  # of each obstacle its kind's number and its numbers
+    crossings: list[tuple[int, int, int]]  # a segment, another, and their pair
+    pairs: list[tuple[str, str]]  # names: a body, and what it is held against
+
+
+def tables(arm: Arm) -> Tables:
+    """The pairs of an arm with keep-outs: an obstacle with each body that moves, then bodies with each other."""
     held = guard(arm)
     form = held.bodies
+    solid = sorted({int(form.owner[k]) for k in held.moving})
+    shapes = [(_KINDS[kind], list(map(float, values))) for kind, values in (one.numbers() for _, one in held.obstacles)]
+    which = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
+    return Tables(
+        form.radius[form.owner].tolist(),
+        len(solid),
+        [(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
+        shapes,
+        list(zip(held.ours.tolist(), held.theirs.tolist(), which.tolist(), strict=True)),
+        [held.of(k) for k in range(len(held.pairs))],
+    )
+
+
+def clearances(arm: Arm, single: bool = False) -> str:
+    """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
+    held = tables(arm)
 
     def listed(values: Iterable[float]) -> str:
         return ", ".join(number(float(v), single) for v in values)
 
-    solid = sorted({int(form.owner[k]) for k in held.moving})
-    moving = [n for k in held.moving for n in (int(k), solid.index(int(form.owner[k])))]
-    shapes = [shape.numbers() for _, shape in held.obstacles]
-    rows = [listed([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in shapes]
-    which = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
-    crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in zip(held.ours, held.theirs, which, strict=True)]
+    rows = [listed([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in held.shapes]
+    crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in held.crossings]
     fields = {
-        "segments": str(len(form.owner)),
+        "segments": str(len(held.thick)),
         "moving_count": str(len(held.moving)),
-        "obstacle_count": str(len(shapes)),
+        "obstacle_count": str(len(held.shapes)),
         "crossing_count": str(len(crossings)),
-        "solid": str(len(solid)),
-        "thick": listed(form.radius[form.owner]),
-        "moving": ", ".join(map(str, moving)) or "0",
-        "kinds": ", ".join(str(_KINDS[kind]) for kind, _ in shapes) or "0",
+        "solid": str(held.solid),
+        "thick": listed(held.thick),
+        "moving": ", ".join(str(k) for pair in held.moving for k in pair) or "0",
+        "kinds": ", ".join(str(kind) for kind, _ in held.shapes) or "0",
         "obstacles": ",\n    ".join(f"{{{row}}}" for row in rows) or "{0}",
         "crossings": ", ".join(crossings) or "{0}",
         "clearance": number(arm.clearance, single),
@@ -55,8 +78,7 @@ def clearances(arm: Arm, single: bool = False) -> str:
 
 def free(arm: Arm) -> str:
     """`arm_free`, and the names of pairs."""
-    held = guard(arm)
-    names = [held.of(k) for k in range(len(held.pairs))] or [("", "")]
+    names = tables(arm).pairs or [("", "")]
     pairs = ",\n    ".join("{" + ", ".join(f'"{_quoted(name)}"' for name in pair) + "}" for pair in names)
     return part("free").replace("@pairs@", pairs)
 

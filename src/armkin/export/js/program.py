@@ -11,11 +11,13 @@ import numpy as np
 from armkin import __version__, forward, motors
 from armkin.errors import UsageError
 from armkin.export.c import formulas
+from armkin.export.c.keep_outs import tables
 from armkin.export.c.program import has_form, plain_form, why_no_form
 from armkin.export.js import elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.recognise import solver
+from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual
 from armkin.model.units import radian_or_reach
 
@@ -29,6 +31,8 @@ _ROUNDED = 5e-6  # how far a pose of six printed digits may be from orthonormal
 _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
  *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
+_KEEP_OUT_IS = """/** @type {{thick: number[], solid: number, moving: number[][], shapes: {kind: number,
+ *   numbers: number[]}[], crossings: number[][], pairs: string[][], clearance: number}} of segments [mm] */"""
 _SOLVER = ("numbers", "linear_algebra", "residual", "singular", "ik", "closest")
 
 
@@ -54,6 +58,7 @@ def module(arm: Arm, task_name: str | None = None) -> str:
         _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
         _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
         _of_joints("targetOf", formulas.target(turned, task)),
+        *_keep_outs(arm, turned),
         *map(part, _SOLVER),
         *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
         solve,
@@ -153,6 +158,27 @@ def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int) 
         }
         data += ["const MOTORS = {", *(f"  {name}: {_text(value)}," for name, value in values.items()), "};"]
     return [*data, ""]
+
+
+def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
+    """What the arm must not touch, and how far it is from that; a robot file may have none."""
+    if not arm.keep_out:
+        return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => {}} */", "const hitsOf = () => ({});"]
+    held = tables(turned)
+    values = {
+        **held._asdict(),
+        "shapes": [{"kind": kind, "numbers": numbers} for kind, numbers in held.shapes],
+        "clearance": arm.clearance,
+    }
+    return [
+        "const KEEPS_OUT = true;",
+        _KEEP_OUT_IS,
+        "const KEEP_OUT = {",
+        *(f"  {name}: {_text(value)}," for name, value in values.items()),
+        "};",
+        _of_joints("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
+        part("keep_out"),
+    ]
 
 
 def _driven(arm: Arm) -> bool:

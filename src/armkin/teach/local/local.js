@@ -61,6 +61,18 @@ const outside = (q) =>
     return [`${joint.name} = ${Number(q[j].toPrecision(10))} ${joint.unit} is outside ${from} to ${to} ${joint.unit}`];
   });
 
+/** Hits in words. @param {{body: string, with: string, depth_mm: number}[]} [hits] */
+const hitsIn = (hits = []) => {
+  const words = hits.map((hit) => `${hit.with} by ${hit.depth_mm >= 0.05 ? `${hit.depth_mm.toFixed(1)} mm` : "less than 0.1 mm"} (${hit.body})`);
+  return words.length ? `hits ${words.join(", ")}` : "";
+};
+
+/** What a posture hits, where there are keep-outs. @param {number[]} q [deg | mm] */
+function hitsAt(q) {
+  const words = arm.clearance ? hitsIn(arm.clearance(inwards(q)).hits) : "";
+  return words ? [`it ${words}`] : [];
+}
+
 /** Pulses of a posture and what rounding costs at the tip. @param {number[]} q [rad | mm] */
 function motors(q) {
   if (!scene.motors) return null;
@@ -89,14 +101,14 @@ function look({ q, target: wanted, branch = "", nearest = true }) {
   const branches = found.branches.map((/** @type {any} */ row) => {
     const joints = outwards(row.joints);
     const motion = joints.reduce((/** @type {number} */ sum, /** @type {number} */ x, /** @type {number} */ j) => sum + Math.abs(x - q[j]), 0);
-    return { name: row.name, joints, within_limits: row.within_limits, outside: outside(joints), motion };
+    return { name: row.name, joints, within_limits: row.within_limits, outside: outside(joints), hits: hitsIn(row.hits), motion };
   });
   let chosen = null;
   let shown = q;
   if (!wanted) {
     const same = branches.findIndex(({ joints }) => joints.every((x, j) => Math.abs(x - q[j]) < 1e-4));
     chosen = same < 0 ? null : same;
-  } else if (found.best !== null) {
+  } else if (branches[0]?.within_limits) {
     chosen = branches.findIndex((one) => one.within_limits && one.name === branch);
     if (chosen < 0) chosen = 0;
     shown = branches[chosen].joints;
@@ -106,7 +118,7 @@ function look({ q, target: wanted, branch = "", nearest = true }) {
   share(shown, goal);
   return {
     q: shown,
-    outside: outside(shown),
+    outside: [...outside(shown), ...hitsAt(shown)],
     tip: { position_mm: [T[0][3], T[1][3], T[2][3]], rpy_deg: rpy(T) },
     motors: motors(inwards(shown)),
     task: solver.task, labels: solver.labels, units: solver.units, names: arm.branch_names,

@@ -3,35 +3,39 @@ const NEARBY = 1e-12; // and of one that is worth correcting
 const LARGEST = 1e15; // mm, rad: of a target; its powers in polynomials stay finite
 const DEGREES = 180 / Math.PI;
 
+const givenNumbers = new Float64Array(ARM.orientation === 'full' ? 16 : ARM.labels.length);
+
 /**
  * A target's numbers as the formulas take them: the columns x, y, z of a pose and its position; an axis of length one.
  * @param {Target} target @returns {{goal: Float64Array, rounding: number}}
  */
 function read(target) {
   const wanted = ARM.orientation === 'full' ? 16 : ARM.labels.length;
-  /** @type {number[]} */
-  const flat = [];
+  let count = 0;
+  const flat = givenNumbers;
   for (let i = 0; i < target.length; i++) {
     const row = target[i];
-    if (typeof row === 'number') flat.push(row);
-    else for (let j = 0; j < row.length; j++) flat.push(row[j]);
+    if (typeof row === 'number') flat[count++ % wanted] = row;
+    else for (let j = 0; j < row.length; j++) flat[count++ % wanted] = row[j];
   }
-  if (flat.length !== wanted)
-    throw new RangeError(`a target is ${wanted === 16 ? 'a pose, four rows of four' : ARM.labels.join(' ')}: ${wanted} numbers, got ${flat.length}`);
-  for (const x of flat)
-    if (!(Math.abs(x) <= LARGEST)) throw new RangeError('a target holds a number that is not finite, or beyond 1e15');
+  if (count !== wanted)
+    throw new RangeError(`a target is ${wanted === 16 ? 'a pose, four rows of four' : ARM.labels.join(' ')}: ${wanted} numbers, got ${count}`);
+  for (let k = 0; k < wanted; k++)
+    if (!(Math.abs(flat[k]) <= LARGEST)) throw new RangeError('a target holds a number that is not finite, or beyond 1e15');
   if (ARM.orientation === 'axis') {
     const length = Math.hypot(flat[3], flat[4], flat[5]);
     if (!(length > 1e-12)) throw new RangeError("a target's axis ax ay az has no length; give the direction of the tool's z axis");
     for (let k = 3; k < 6; k++) flat[k] /= length;
   }
-  if (ARM.orientation !== 'full') return { goal: Float64Array.from(flat), rounding: 0 };
+  if (ARM.orientation !== 'full') return { goal: flat.slice(), rounding: 0 };
   const goal = new Float64Array(12);
   for (let k = 0; k < 12; k++) goal[k] = flat[4 * (k % 3) + ((k / 3) | 0)];
   let rounding = orthonormalised(goal);
   const given = rounding;
   for (let round = 0; round < 2 && rounding > 1e-15 && rounding <= ROTATION; round++) rounding = orthonormalised(goal);
-  const [x, y, z] = [0, 1, 2].map((i) => goal[3 + ((i + 1) % 3)] * goal[6 + ((i + 2) % 3)] - goal[3 + ((i + 2) % 3)] * goal[6 + ((i + 1) % 3)]);
+  const x = goal[4] * goal[8] - goal[5] * goal[7];
+  const y = goal[5] * goal[6] - goal[3] * goal[8];
+  const z = goal[3] * goal[7] - goal[4] * goal[6];
   if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
     throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
   return { goal, rounding: given };
@@ -48,7 +52,9 @@ function orthonormalised(R) {
   const off = Math.max(Math.abs(xx), Math.abs(yy), Math.abs(zz), Math.abs(xy), Math.abs(yz), Math.abs(zx));
   if (off <= 1e-15) return off;
   for (let k = 0; k < 3; k++) {
-    const [x, y, z] = [R[k], R[3 + k], R[6 + k]];
+    const x = R[k];
+    const y = R[3 + k];
+    const z = R[6 + k];
     R[k] = x - 0.5 * (x * xx + y * xy + z * zx);
     R[3 + k] = y - 0.5 * (x * xy + y * yy + z * yz);
     R[6 + k] = z - 0.5 * (x * zx + y * yz + z * zz);
@@ -64,24 +70,25 @@ const allMisses = new Float64Array(ARM.branches);
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
  */
 
+/** Joint values of a candidate. @param {number} b @returns {number[]} */
+function candidate(b) {
+  const q = new Array(ARM.joints);
+  for (let j = 0; j < ARM.joints; j++) q[j] = allJoints[b * ARM.joints + j];
+  return q;
+}
+
 /**
  * One row for each solution of a target.
  * @param {Float64Array} goal @param {Numbers} near actual joint values
  */
 function solutions(goal, near) {
-  const n = ARM.joints;
-  const row = (/** @type {number} */ b) => {
-    const q = [];
-    for (let j = 0; j < n; j++) q.push(allJoints[b * n + j]);
-    return q;
-  };
   let edge = candidates(goal, near, allJoints, allMisses);
   /** @type {Row[]} */
   const rows = [];
   for (let b = 0; b < ARM.branches; b++) {
     const miss = allMisses[b];
     edge = edge || (!(miss <= ACCEPTED) && !(miss > NEARBY));
-    if (miss <= SOLUTION * SOLUTION) rows.push({ q: row(b), branch: b, path: undefined });
+    if (miss <= SOLUTION * SOLUTION) rows.push({ q: candidate(b), branch: b, path: undefined });
   }
   const status = /** @type {Status} */ (rows.length ? 'exact' : 'unreachable');
   if (!edge) return { rows, status, complete: true, free: /** @type {number[]} */ ([]) };
@@ -90,8 +97,8 @@ function solutions(goal, near) {
   const seed = (/** @type {Numbers} */ at, /** @type {Numbers} */ prefer, /** @type {number} */ most) => {
     const doubt = candidates(at, prefer, allJoints, allMisses);
     for (let b = 0; b < ARM.branches; b++) {
-      if (!(allMisses[b] <= most) || seeds.some((one) => apart(one.q, row(b)) < 1e-7)) continue;
-      const found = newton(row(b), goal, 40);
+      if (!(allMisses[b] <= most) || seeds.some((one) => apart(one.q, candidate(b)) < 1e-7)) continue;
+      const found = newton(candidate(b), goal, 40);
       const known = seeds.some((one) => apart(one.q, found.q) < 1e-7);
       if (found.missed <= SOLUTION && !known) seeds.push({ q: found.q, branch: b, path: undefined });
     }
@@ -180,11 +187,14 @@ function legal(q, near) {
 
 /** Of a self-motion the posture within limits that is nearest. @param {Row} row @param {Numbers} near @param {Float64Array} goal */
 function nearest(row, near, goal) {
-  let best = { q: row.q, inside: false, motion: Infinity };
+  let best = { q: row.q, rank: -1, motion: Infinity };
   const take = (/** @type {number[]} */ posture) => {
     const q = legal(posture.slice(), near);
-    const better = copyInside !== best.inside ? copyInside : copyMotion < best.motion - 1 / EQUAL;
-    if (better) best = { q, inside: copyInside, motion: copyMotion };
+    const { inside, motion } = { inside: copyInside, motion: copyMotion };
+    const free = !KEEPS_OUT || hitsOf(q).hits.length === 0;
+    const rank = (inside ? 2 : 0) + (free ? 1 : 0);
+    const better = rank !== best.rank ? rank > best.rank : motion < best.motion - 1 / EQUAL;
+    if (better) best = { q, rank, motion };
     return better;
   };
   take(row.q);
@@ -234,6 +244,7 @@ function placed(solution, near, goal) {
   let motion = 0;
   if (CALIBRATED) joints = q.map((x, j) => x / ARM.ratio[j]);
   for (let j = 0; j < ARM.joints; j++) motion += Math.abs(q[j] - near[j]) / ARM.ratio[j];
+  /** @type {Branch} */
   const row = {
     joints,
     name: ARM.names[solution.branch],
@@ -243,14 +254,18 @@ function placed(solution, near, goal) {
     residual_deg: missedAngle * DEGREES,
     motion,
   };
+  if (KEEPS_OUT) Object.assign(row, hitsOf(q));
   return { q, branch: solution.branch, path: solution.path, rank: copyMotion, row };
 }
 
 /** The joints outside their limits. @param {Numbers} q @returns {Violation[]} */
 function violations(q) {
-  return names.flatMap((joint, j) =>
-    q[j] < ARM.lower[j] - SLACK || q[j] > ARM.upper[j] + SLACK
-      ? [{ joint, value: q[j] / ARM.ratio[j], lower: limits[j]?.[0] ?? null, upper: limits[j]?.[1] ?? null }]
-      : [],
-  );
+  /** @type {Violation[]} */
+  const out = [];
+  for (let j = 0; j < ARM.joints; j++) {
+    if (!(q[j] < ARM.lower[j] - SLACK || q[j] > ARM.upper[j] + SLACK)) continue;
+    const pair = limits[j];
+    out.push({ joint: names[j], value: q[j] / ARM.ratio[j], lower: pair ? pair[0] : null, upper: pair ? pair[1] : null });
+  }
+  return out;
 }

@@ -46,14 +46,25 @@ let missedAngle = 0; // [rad]
 
 /** What joint values miss: `missedLength`, `missedAngle`. @param {Numbers} q @param {Numbers} goal */
 function misses(q, goal) {
-  if (ARM.orientation !== 'full') {
-    const r = residual(q, goal);
-    missedLength = Math.hypot(...r.slice(0, ARM.position));
-    missedAngle = Math.hypot(...r.slice(ARM.position));
-    return;
-  }
   const T = pose16;
   poseOf(q, T);
+  if (ARM.orientation !== 'full') {
+    let [length, angle] = [0, 0];
+    for (let i = 0; i < ARM.position; i++) length += (goal[i] - T[4 * i + 3]) ** 2;
+    for (let k = 0; k < ARM.sums.length; k++) {
+      const off = goal[ARM.position + k] - dot(ARM.sums[k], q) - ARM.offsets[k];
+      angle += (off - TURN * rint(off / TURN)) ** 2;
+    }
+    if (ARM.orientation === 'axis') {
+      const a = T[6] * goal[5] - T[10] * goal[4];
+      const b = T[10] * goal[3] - T[2] * goal[5];
+      const c = T[2] * goal[4] - T[6] * goal[3];
+      angle += Math.atan2(Math.sqrt(a * a + b * b + c * c), T[2] * goal[3] + T[6] * goal[4] + T[10] * goal[5]) ** 2;
+    }
+    missedLength = Math.sqrt(length) / ARM.reach;
+    missedAngle = Math.sqrt(angle);
+    return;
+  }
   const x = T[3] - goal[9];
   const y = T[7] - goal[10];
   const z = T[11] - goal[11];
