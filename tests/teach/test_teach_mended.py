@@ -128,6 +128,26 @@ def test_the_branch_that_is_pointed_at_is_solid_and_f_fits_the_arm_in(browser: B
         until(page, "document.querySelector('#canvas').dataset.solid === '1'")
         page.mouse.move(10, 300)
         until(page, "document.querySelector('#canvas').dataset.solid === '0'")
+        # in the picture, too: the line under the pointer is solid and named, and a click chooses it
+        page.click("#names")
+        names = page.locator("#labels span").all_inner_texts()
+        assert sorted(names) == sorted(page.locator("#branches button[aria-checked=false] .name").all_inner_texts())
+        places = [span.get_attribute("data-at") for span in page.locator("#labels span").all()]
+        frame = page.locator("#canvas").bounding_box()
+        page.click("#names")
+        assert page.locator("#labels span").count() == 0
+        assert frame is not None
+        for place in places:  # under one of them stands no handle
+            x, y = (float(number) for number in (place or "").split())
+            x, y = x + frame["x"], y + frame["y"]
+            page.mouse.move(x, y)
+            if page.get_attribute("#canvas", "data-solid") == "1":
+                break
+        [name] = page.locator("#labels span").all_inner_texts()
+        assert name in names
+        page.mouse.click(x, y)
+        until(page, "document.querySelector('#branches [aria-checked=true] .name').textContent === argument", name)
+        settled(page)
         assert page.get_attribute("#target label:nth-child(4)", "title") is not None
         page.mouse.wheel(0, -3000)  # closer
         handle = "document.querySelector('#canvas').dataset.handle.split(' ').map(Number)"

@@ -60,7 +60,7 @@ export class Shapes {
     const centre = new Vector3(0, 0, joint.at);
     const z = new Vector3(0, 0, 1);
     if (!joint.prismatic) {
-      if (i === 0) centre.z += this.above(joint, 1.45 * r);
+      centre.z += i === 0 ? this.above(joint, 1.45 * r) : this.beyond(i, 1.45 * r);
       const drum = new CylinderGeometry(1.45 * r, 1.45 * r, 2.9 * r, 24);
       this.bodies[i + 1].push({ geometry: along(drum, centre, z), drum: true });
       return;
@@ -71,6 +71,16 @@ export class Shapes {
     this.rails[i] = { geometry: along(rail, new Vector3(0, 0, joint.at + (low + high) / 2), z), drum: false };
     const box = new BoxGeometry(2.4 * r, 2.6 * r, 2.4 * r);
     this.bodies[i + 1].push({ geometry: along(box, centre, z), drum: true });
+  }
+
+  /** How far a drum is moved along its axis that a slide's box before it would hide: to the box's end. @param {number} i @param {number} half */
+  beyond(i, half) {
+    const slide = this.arm.joints[i - 1];
+    const link = this.arm.links[i];
+    const level = link[2][2] * this.arm.joints[i].at + link[2][3] - slide.at;
+    const box = 1.3 * this.radius(i - 1);
+    const hidden = slide.prismatic && Math.abs(link[2][2]) > 0.9 && Math.abs(level) < box && Math.hypot(link[0][3], link[1][3]) < box;
+    return hidden ? Math.sign(link[2][2]) * (box + half - level) : 0;
   }
 
   /** The base: a post that ends flat on what it stands on. @param {number[][]} corners @returns {Part[]} */

@@ -42,13 +42,3 @@ function motion(slides, value) {
   const s = Math.sin((value * Math.PI) / 180);
   return [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 }
-
-/**
- * Whether two frames are the same for the eye.
- * @param {Matrix} a
- * @param {Matrix} b
- * @param {number} reach
- */
-export function same(a, b, reach) {
-  return a.every((value, i) => Math.abs(value - b[i]) < (i % 4 === 3 ? 1e-4 * reach : 1e-4));
-}

@@ -4,7 +4,7 @@ import { Color, Group, InstancedMesh, Matrix4, MeshLambertMaterial } from "three
 import { merged } from "./bodies.js";
 import { frames } from "./chain.js";
 
-/** @typedef {{joints: number[], colour: string, faint: boolean, solid: boolean}} Ghost */
+/** @typedef {{joints: number[], colour: string, faint: boolean, solid: boolean, name?: string}} Ghost name: of a branch */
 
 const ROOM = 8; // ghosts of a body that are provided for; more are, when they come
 

@@ -194,6 +194,11 @@ class Page {
     }
     const view = this.view;
     get("legend").textContent = `a square is ${view.step} mm`;
+    view.pointing.pointed = (name) => this.tip.point(name);
+    view.pointing.chose = (name) => {
+      const row = this.tip.rows.findIndex(({ branch, chosen }) => branch.name === name && !chosen);
+      this.tip.choose(row);
+    };
     view.gizmo.moved = (position, rpy) => {
       const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);
       const flat = isFlat(this.look.task);

@@ -132,7 +132,7 @@ export class Tip {
       dot.style.background = colour;
       name.textContent = branch.name || "branch";
       const joints = branch.outside.map((words) => words.split(" ")[0]);
-      note.textContent = joints.length ? `outside: ${joints.join(", ")}` : "";
+      note.textContent = joints.length ? `outside: ${joints.join(", ")}` : branch.hits ?? "";
     });
   }
 
@@ -143,14 +143,16 @@ export class Tip {
     if (k < 8) button.append(make("kbd", { "aria-hidden": "true" }, String(k + 1)));
     button.addEventListener("click", () => this.choose(k));
     button.addEventListener("keydown", (event) => this.step(event, k));
-    const hover = (/** @type {boolean} */ on) => {
-      this.hovered = on ? this.rows[k]?.branch.name ?? "" : "";
-      this.pointed();
-    };
-    for (const [name, on] of /** @type {[string, boolean][]} */ ([["pointerenter", true], ["pointerleave", false]])) {
-      button.addEventListener(name, () => hover(on));
-    }
+    button.addEventListener("pointerenter", () => this.point(this.rows[k]?.branch.name ?? ""));
+    button.addEventListener("pointerleave", () => this.point(""));
     return button;
+  }
+
+  /** A branch is pointed at, by its button or in the picture. @param {string} name or none */
+  point(name) {
+    this.hovered = name;
+    this.rows.forEach(({ branch }, k) => get(`branch-${k}`).classList.toggle("pointed", name !== "" && branch.name === name));
+    this.pointed();
   }
 
   /** Arrow keys go through the radio group. @param {KeyboardEvent} event @param {number} k */
@@ -171,10 +173,11 @@ export class Tip {
 
   /** What is drawn besides the solid arm. */
   ghosts() {
+    /** @type {import("./ghosts.js").Ghost[]} */
     const found = this.rows
       .filter((row) => !row.chosen)
       .map(({ branch, colour }) => ({
-        joints: branch.joints, colour, faint: !branch.within_limits, solid: branch.name === this.hovered,
+        joints: branch.joints, colour, faint: !branch.within_limits, solid: branch.name === this.hovered, name: branch.name,
       }));
     if (this.nearest.length) found.push({ joints: this.nearest, colour: "#808890", faint: false, solid: false });
     return found;

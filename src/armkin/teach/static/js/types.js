@@ -9,7 +9,7 @@
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
  *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
  *   lock: string|null, locks: boolean}} Arm
- * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], motion: number}} Branch
+ * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], hits?: string, motion: number}} Branch
  * @typedef {{pulses: number[], moves: number[], from: string, error_mm: number, best: boolean,
  *   outside_travel: string[]}} Motors
  * @typedef {{q: number[], outside: string[], tip: {position_mm: number[], rpy_deg: number[]},

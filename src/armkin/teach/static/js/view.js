@@ -9,6 +9,7 @@ import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
 import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
+import { Pointing } from "./pointing.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
@@ -18,6 +19,7 @@ const SUN = [1.2, -1.6, 3]; // where the light comes from
 // browser's own smoothing would cost as much in every picture of a moving arm.
 const FINE = Math.max(devicePixelRatio, 2);
 const COARSE = 1;
+const HANDLE = 0.85; // of the picture: where the handle's arrows are whole
 const SLOW = 50; // [ms] between two pictures of something that moves
 const REST = 300; // [ms] without a new picture until it is drawn finely
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // drawing without a graphics card
@@ -63,6 +65,9 @@ export class View {
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.addEventListener("change", () => this.draw());
     this.gizmo = new Gizmo(this);
+    this.pointing = new Pointing(this);
+    /** Joint values of the solid arm. */
+    this.q = arm.joints.map((joint) => joint.home);
     this.middle = new Vector3();
     this.inside = false; // whether the whole arm was in the picture when it last rested
     this.theme();
@@ -148,16 +153,19 @@ export class View {
   /** Fit the arm in when it has just left the picture; who looks closer on purpose is left alone. */
   keep() {
     const frames = this.solid.tool ? [...this.solid.at, this.solid.tool] : this.solid.at;
-    const seen = frames.every((T) => {
-      const at = new Vector3(T[3], T[7], T[11]).project(this.camera);
-      return Math.max(Math.abs(at.x), Math.abs(at.y)) < 1;
-    });
+    const points = frames.map((T) => new Vector3(T[3], T[7], T[11]));
+    const inside = (/** @type {Vector3} */ point, /** @type {number} */ most) => {
+      const at = point.project(this.camera);
+      return Math.max(Math.abs(at.x), Math.abs(at.y)) < most;
+    };
+    const seen = points.every((point) => inside(point, 1)) && (!this.gizmo.there || inside(this.gizmo.handle.position.clone(), HANDLE));
     if (this.inside && !seen && !this.gizmo.dragging) this.look("fit");
     else this.inside = seen;
   }
 
   /** @param {number[]} q */
   pose(q) {
+    this.q = q;
     this.solid.pose(q);
     this.shadow?.pose(q);
     if (this.solid.tool) this.tool.matrix.fromArray(this.solid.tool).transpose();
@@ -168,6 +176,7 @@ export class View {
   /** Show ghosts instead of those shown. @param {import("./ghosts.js").Ghost[]} wanted */
   showGhosts(wanted) {
     this.ghosts.show(wanted);
+    this.pointing.show(wanted, this.q);
     this.canvas.dataset.solid = String(wanted.filter((ghost) => ghost.solid).length); // for tests
     this.draw();
   }
@@ -235,6 +244,7 @@ export class View {
     this.waiting = false;
     this.pace();
     this.renderer.render(this.scene, this.camera);
+    this.pointing.labels();
     const at = this.gizmo.handle.getWorldPosition(new Vector3()).project(this.camera);
     const { width, height } = this.canvas.getBoundingClientRect();
     // For tests and other programs that drag the handle: where it is in the picture [px].
