@@ -20,6 +20,13 @@ def test_the_core_keeps_its_promises_under_sanitizers() -> None:
     make("-C", str(FIRMWARE), "check")
 
 
+def test_random_lives_take_the_branches_of_what_guards_a_motion() -> None:
+    command = ["make", "-s", "-C", str(FIRMWARE), "coverage", "LIVES=400"]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    taken = {m[1]: float(m[2]) for line in lines if (m := re.search(r"core/(\w+)\.c ([\d.]+)%", line))}
+    assert min(taken[name] for name in ("config", "home", "inputs")) > 85, taken
+
+
 @pytest.mark.parametrize("board", MCU)
 def test_every_board_builds_without_warnings_and_fits(board: str) -> None:
     elf = build_firmware(board)  # -Wall -Wextra -Werror
