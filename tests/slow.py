@@ -117,6 +117,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "export/test_c.py": (),
     "export/test_js.py": (),
     "export/test_words.py": ("test_a_table_is_the_same_arm",),
+    "firmware/test_handshake.py": (),
     "firmware/test_latencies.py": (),
     "formula/test_recorder.py": (
         "test_exact_operations_are_numpys_to_the_last_bit",
