@@ -72,6 +72,8 @@ static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     s->back = p[8] & 0x80 ? QUICK : 0;
 }
 
+static const int32_t ADD_MOST = 1L << 23;  // the tick has 24 bits for it
+
 // An interval one tick past the end must fit as well, as the interrupt has it ready; and it must not turn within the segment.
 static bool times_valid(const struct segment *s, int32_t *last) {
     const bool quick = s->back & QUICK;
@@ -84,11 +86,14 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     }
     const int32_t grown = quick ? s->bend * (int32_t)(s->ticks - 1) >> 1 : s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6;
     const int32_t add = s->add + grown;
-    if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || (s->add == 0 && s->bend)) {
+    if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || (s->add == 0 && s->bend) || add < -ADD_MOST || add >= ADD_MOST) {
         return false;
     }
     *last = motion_interval(s, s->ticks - 1);
-    return *last >= least && *last <= 0xFFFF && motion_interval(s, s->ticks) <= 0xFFFF;
+    if (*last < least || *last > 0xFFFF) {
+        return false;
+    }
+    return motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
 static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {

@@ -45,5 +45,6 @@ __attribute__((noinline)) void dda_bend(void) {
     if (!bend) {  // at the highest rates there is none, and no time
         return;
     }
-    dda.add += dda.back & QUICK ? (int32_t)bend * 128 : (int32_t)bend * 4;
+    const int32_t more = dda.back & QUICK ? (int32_t)bend * 128 : (int32_t)bend * 4;
+    dda.add = (int32_t)((uint32_t)dda.add + (uint32_t)more);  // behind the last tick it may turn round: nobody looks
 }

@@ -242,6 +242,10 @@ static void a_hold_is_obeyed_in_every_phase_of_a_segment(void) {
     const struct host_segment beyond = {.ticks = 200, .interval = 40000, .add = 32767, .steps = {100}};
     fresh(301);
     CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 1, &beyond).error == E_INTERVAL);
+    // so is an `add` that would leave its 24 bits on the way, though all intervals fit
+    const struct host_segment steep = {.ticks = 64, .interval = 1000, .add = 32767, .bend = 32767};
+    fresh(302);
+    CHECK(host_motion(1, HOST_END | HOST_WIDE, home_counts, 1, &steep).error == E_INTERVAL);
 }
 
 void test_holds(void) {

@@ -16,7 +16,12 @@ def times_valid(s: Segment, least: int) -> bool:
     if s.ticks == 0 or s.interval < least or (s.bend and s.ticks > 1 << (10 if s.quick else 14)):
         return False
     turns = s.last_add < 0 if s.add > 0 else s.last_add > 0 if s.add < 0 else s.bend != 0
-    return not turns and least <= s.last_interval <= 65535 and s.interval_after(s.ticks) <= 65535
+    return (
+        not turns
+        and abs(s.last_add + 0.5) < 1 << 23
+        and least <= s.last_interval <= 65535
+        and s.interval_after(s.ticks) <= 65535
+    )
 
 
 class Velocity:

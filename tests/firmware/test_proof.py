@@ -1,0 +1,26 @@
+"""What is proved of the core: Frama-C's EVA on a segment and a line of unknown bytes, and a count beside it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+
+from emulator import FIRMWARE
+
+# The lines that EVA leaves open, each discharged by test/proof/count.c, which takes every number of ticks through them.
+COUNTED = {
+    "change += (s->bend * (int32_t)(bends >> 8) + (s->bend * (int32_t)(bends & 0xFF) >> 8)) >> 9;",
+    "change += s->bend * (int32_t)(bends >> 8) >> 14;",
+}
+
+
+def test_no_bytes_of_a_segment_overflow_or_read_beside_it() -> None:
+    command = ["make", "-s", "-C", str(FIRMWARE), "proof", "BOARD=uno_cnc_shield"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    assert "100% of the logical properties reached have been proven" in done.stdout
+    assert re.search(r"^\d{6,} calls, no overflow$", done.stdout, re.M)
+    alarms = re.findall(r"\[eva:alarm\] (\S+):(\d+): Warning: *\n? *(.*)", done.stdout)
+    lines = {(FIRMWARE / name).read_text().splitlines()[int(line) - 1].strip() for name, line, _ in alarms}
+    assert lines == COUNTED
+    assert all("signed overflow" in what for *_, what in alarms)
