@@ -32,9 +32,10 @@ MAY_IMPORT: dict[str, str] = {
     "inverse/closed": "errors formula model forward inverse/tasks inverse/numeric",
     "inverse/elimination": "errors formula model inverse/numeric",
     "inverse/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/closed",
+    "inverse/singular": "formula model inverse/tasks inverse/numeric",
     "inverse": "keep_out keep_out/shapes"
     " errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
-    " inverse/branches",
+    " inverse/branches inverse/singular",
     "engines": "errors",
     "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse motors",
     "motors": "errors formula model forward",

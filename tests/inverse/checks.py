@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import oracle
+import truth
 from numpy.typing import NDArray
 from oracle import Goal, Screws
 
@@ -52,10 +53,13 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
     nearest = oracle.distance(screw, s.q, q[:, None]).min(axis=1, initial=np.inf)
     # the square root of rounding is all that a double root can be known to
     lost = nearest > 1e-6 + np.minimum(1e-13 / np.maximum(weak, 1e-300), 1e-3)
-    for k in np.flatnonzero(lost & (nearest < 1e-2)):  # the branch of two whose middle solves the target, too
+    # two roots are one branch if what is between them solves the target: half way, moved onto the curve that joins them
+    for k in np.flatnonzero(lost & (nearest < 0.1)):
         d = s.q[k, int(oracle.distance(screw, s.q[k], q[k]).argmin())] - q[k]
         middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
-        off, turned = oracle.missing(screw, goals.take([k]), middle[None])
+        across = truth.across(screw, goals.take([k]), middle[None], weak=1e-4)
+        assert oracle.distance(screw, across[0], middle) < 0.1 * nearest[k]  # not onto one of the two
+        off, turned = oracle.missing(screw, goals.take([k]), across)
         # of a rotation's three columns two are at right angles to its axis, and each moves by the angle
         angle = turned[0] / (np.sqrt(2.0) if goals.orientation == "full" else 1.0)
         lost[k] = np.hypot(off[0] / arm.reach, angle) > 1e-9

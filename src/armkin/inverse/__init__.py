@@ -10,6 +10,7 @@ batch.py            arrays of all targets, as the solvers fill them
 chunks.py           closed forms: chunks of a batch that stay in the cache; workers.py: threads that share it
 near_itself.py      `near` where it solves its target itself
 target_rounding.py  how far a target's numbers may be off, which `near` may miss
+singular/           what a solution is: the residual along the lost direction
 singularities.py    boundaries and singular postures
 doubtful.py         targets that may be singular: regular_targets.py decides most at once, singularities.py the rest
 fold_singularities.py  postures at which two roots meet, told from self-motions

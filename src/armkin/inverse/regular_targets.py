@@ -14,10 +14,11 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import fold_singularities, self_motions
 from armkin.inverse.batch import Goals
-from armkin.inverse.fold_singularities import BENT, CLEAR, Linear
+from armkin.inverse.fold_singularities import BENT, Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CLUSTER, DOUBLE, HAIR, MOVING, NEARBY, SAME, SEED, SOLUTION
+from armkin.inverse.numeric.tolerances import CLUSTER, FOLDED, HAIR, NEARBY, SAME, SEED, SOLUTION, WEAK
+from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -54,13 +55,16 @@ class _Slopes(NamedTuple):
 class _Weak(NamedTuple):
     """What the weak ones of K targets' candidates are.
 
-    open: (K,) one may lie on a self-motion that others share, or may yet become a branch. moving: (K, B) it can move
-    without moving the tool, joints: (K, B, n) these joints.
+    open: (K,) one may lie on a self-motion that others share, or may yet become a branch. moving, edge: (K, B) it lies
+    on a self-motion manifold, or is a boundary. joints: (K, B, n) those that the manifold moves.
+    same: (K, B, B) candidates on one's component.
     """
 
     open: Bool
     moving: Bool
+    edge: Bool
     joints: Bool
+    same: Bool
 
 
 def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
@@ -82,17 +86,13 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
     near_by = away < CLUSTER
     clusters = (near_by.sum(axis=2) > 2) & (at.size < SEED)
     close = np.triu(valid[:, :, None] & valid[:, None] & (away < HAIR) & known[:, None, None], 1)
-    # roots of third or fourth order: their mean is right to rounding; and between every two the posture half way
-    (kc, ic), (k, i, j) = np.nonzero(clusters), np.nonzero(close)
-    one = np.zeros((K, B, B), bool)
-    if len(kc) + len(k):
-        ways = np.where(near_by[kc, ic][:, :, None], newton.difference(arm, q[kc], q[kc, ic][:, None]), 0.0)
-        mean = ways.sum(axis=1) / near_by[kc, ic].sum(axis=1, keepdims=True)
-        shift = np.concatenate([mean, 0.5 * newton.difference(arm, q[k, j], q[k, i])])
-        between = np.concatenate([q[kc, ic], q[k, i]]) + shift * radian_or_reach(arm)
-        missing = newton.missing(arm, task, between, target[np.concatenate([kc, k])])
-        clusters[kc, ic] = missing[: len(kc)] < at.size[kc, ic]
-        one[k, i, j] = missing[len(kc) :] <= SOLUTION
+    # roots of third or fourth order: their mean is right to rounding
+    k, i = np.nonzero(clusters)
+    if len(k):
+        ways = np.where(near_by[k, i][:, :, None], newton.difference(arm, q[k], q[k, i][:, None]), 0.0)
+        mean = ways.sum(axis=1) / near_by[k, i].sum(axis=1, keepdims=True)
+        clusters[k, i] = newton.missing(arm, task, q[k, i] + mean * radian_or_reach(arm), target[k]) < at.size[k, i]
+    one = np.triu((weak.same | weak.same.swapaxes(1, 2)) & valid[:, :, None] & valid[:, None], 1)
     same = 2 * SAME + np.minimum(2e-13 / np.maximum(sigma, 1e-300), 4e-4)
     known &= ~clusters.any(axis=1) & ~(close & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
     one &= known[:, None, None]
@@ -102,7 +102,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
     for row in np.flatnonzero(known & weak.moving.any(axis=1)):
         known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])
     branch = valid & ~one.any(axis=1)  # the first of two stays
-    double, free = either.any(axis=(1, 2)) | (branch & (sigma < DOUBLE)).any(axis=1), weak.joints.any(axis=1)
+    double, free = either.any(axis=(1, 2)) | (branch & weak.edge).any(axis=1), weak.joints.any(axis=1)
     return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed)
 
 
@@ -130,22 +130,15 @@ def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target:
 def _bounds(J: Array) -> tuple[Array, Bool]:
     """Lower bounds of the smallest singular values of Jacobians (M, n, n), and of which more must be known (M,).
 
-    The Frobenius norm of the inverse is no smaller than its largest singular value, and next to equal where the sum of
-    the fourth powers of all is that of their squares, squared.
+    The Frobenius norm of the inverse is no smaller than its largest singular value.
     """
     inverse = nudged(np.linalg.inv, J)
-    squares = (inverse * inverse).sum(axis=(1, 2))
-    bound = 1.0 / np.sqrt(squares)
-    asked = bound < 1.1 * DOUBLE
-    some = np.flatnonzero(asked & (bound > 1.1 * MOVING))
-    if len(some):
-        both = inverse[some].swapaxes(1, 2) @ inverse[some]
-        asked[some] = (both * both).sum(axis=(1, 2)) < 0.999 * squares[some] ** 2
-    return bound, asked
+    bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+    return bound, bound < FOLDED
 
 
 def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, _Weak]:
-    """Smallest singular values (K, B) of accepted candidates, or bounds above `DOUBLE`; and what weak ones are."""
+    """Smallest singular values (K, B) of accepted candidates, or bounds above `FOLDED`; and what weak ones are."""
     K, B, n = q.shape
     sigma = np.ones((K, B))
     plain = fold_singularities.square(arm, task)
@@ -154,31 +147,37 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
         bound, asked[valid] = _bounds(at.J[valid])
         sigma[valid] = bound
     k, b = np.nonzero(asked | (~valid & (at.size < SEED)))
-    found = _Weak(np.zeros(K, bool), np.zeros((K, B), bool), np.zeros((K, B, n), bool))
+    found = _Weak(
+        np.zeros(K, bool),
+        np.zeros((K, B), bool),
+        np.zeros((K, B), bool),
+        np.zeros((K, B, n), bool),
+        np.zeros((K, B, B), bool),
+    )
     if not len(k):
         return sigma, found
     U, S, V = np.linalg.svd(at.J[k, b])
     own = valid[k, b]
     sigma[k[own], b[own]] = S[own, min(task.constraints, n) - 1]
-    some = np.flatnonzero(~own | (sigma[k, b] < 1.1 * MOVING))
+    some = np.flatnonzero(~own | (sigma[k, b] < FOLDED))
     k, b, U, S, V, own = k[some], b[some], U[some], S[some], V[some], own[some]
     if not len(k):
         return sigma, found
     fold = fold_singularities.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
-    bent = np.abs(fold.bend) > BENT
     # beyond a fold, and what else is missing is so little that putting it right does not lead back
-    beyond = bent & (fold.weakest < 1e-6) & (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
+    beyond = (np.abs(fold.bend) > BENT) & (fold.weakest < 1e-6)
+    beyond &= (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
     beyond &= (fold.rest < 1e-3) & (100 * fold.rest**2 < np.abs(fold.lost))
-    exact = np.abs(fold.lost) <= SAME * fold.weakest  # a correction would not move it
-    decided = np.where(own, bent | (exact & self_motions.isolated(fold)), beyond)
-    one = own & exact & (S[:, -1] < 0.9 * MOVING) & (S[:, -2] > CLEAR)  # one direction is lost
-    found.open[k[~decided & ~one]] = True
-    rest = np.flatnonzero(~decided & ~found.open[k])
-    if len(rest) and plain:
-        k, b, at_rest = k[rest], b[rest], fold_singularities.some(fold, rest)
-        moving, found.joints[k, b] = self_motions.self_motion(
-            arm, task, q[k, b], V[rest], np.ones(len(k), np.int64), target[k], at_rest
-        )
-        found.moving[k, b] = moving
-        found.open[k[moving & (at_rest.weakest < 2 * SOLUTION)]] = True  # others of its postures may be listed
+    found.open[k[~own & ~beyond]] = True
+    own &= ~found.open[k]
+    several = own & (S[:, -2] < WEAK)
+    found.open[k[several]] = True
+    rest = np.flatnonzero(own & ~several)
+    if len(rest):
+        k, b, S = k[rest], b[rest], S[rest]
+        one = local_structure(arm, task, q[k, b], target[k])
+        found.moving[k, b], found.joints[k, b], found.edge[k, b] = one.manifold, one.joints, one.boundary
+        found.same[k, b] = members(one, np.arange(len(k)), newton.difference(arm, q[k], q[k, b][:, None]))
+        # others of its postures may be listed
+        found.open[k[~one.known | (one.manifold & (S[:, -1] < 2 * SOLUTION))]] = True
     return sigma, found

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, fold_singularities, valleys
-from armkin.inverse.fold_singularities import BENT, CLEAR, Folds
+from armkin.inverse import circuits, valleys
 from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import BESIDE, DRIFT, HAIR, HIGH, SAME, SOLUTION, TURNED, WEAK
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -31,8 +29,6 @@ NO_GROWTH = 1e-12  # residual that stays as it is
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
-CORRECTIONS, CLOSE = 6, 1e-6  # Newton steps that bring a posture onto a curve, and their size where it is there
-STEEP = 0.01  # second smallest singular value from which on the way of a long step is about straight
 STALLED = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 
 Int = NDArray[np.int64]
@@ -189,17 +185,6 @@ def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool
     return bool((newton.missing(arm, task, between, np.repeat(target[None], len(between), axis=0)) > 0.01).all())
 
 
-def isolated(at: Folds) -> Bool:
-    """Postures (M,) of which the curvature, or the residual's growth, tells without a step that they do not move.
-
-    Along v the residual grows by weakest * s + bend * s^2 / 2. A self-motion's may not exceed `GROWTH` a radian at
-    0.6 and 1.0 of a short step and of a long one, both ways: terms of third and fourth order cannot hide more than
-    1.1 times the one and 5 times the other at all four. Measured, no self-motion has more than 1.0 and 1.1 times.
-    """
-    grows = (at.weakest > 1.1 * GROWTH) | (np.abs(at.bend) > 5 * 2 * GROWTH / (10 * STEP))
-    return np.asarray((np.abs(at.bend) > BENT) | (grows & (at.second > STEEP)))
-
-
 def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
@@ -213,69 +198,6 @@ def _stays(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Arr
     far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
     some = np.flatnonzero(far & (size <= GROWTH * step))
     return some, size[some]
-
-
-def self_motion(
-    arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array, fold: Folds
-) -> tuple[Bool, Bool]:
-    """Whether the joints can move while the target is kept, and which do: (M,) and (M, n).
-
-    Steps along each null direction, both ways, brought back onto the target: on a self-motion they stay about as far
-    from q as they went, and apart; from a double root they fall back, and from a branch of weak Jacobian they may
-    arrive at its neighbour. The residual may grow by `GROWTH`: a target that close to a singular one is singular.
-    V: (M, n, n) right singular vectors, nullity: (M,), fold: of the same postures.
-    """
-    moving, joints, known = np.zeros(len(q), bool), np.zeros(q.shape, bool), np.zeros(len(q), bool)
-    one = np.flatnonzero((nullity == 1) & (fold.second > CLEAR))
-    if len(one):
-        known[one], moving[one], joints[one] = _one_way(
-            arm, task, q[one], fold_singularities.some(fold, one), target[one]
-        )
-    rest = np.flatnonzero(~known)
-    if len(rest):
-        moving[rest], joints[rest] = _all_ways(arm, task, q[rest], V[rest], nullity[rest], target[rest])
-    return moving, joints
-
-
-def _one_way(arm: Arm, task: Task, q: Array, fold: Folds, target: Array) -> tuple[Bool, Bool, Bool]:
-    """Of postures (M, n) that lose one direction: whether it is known, whether they move (M,), which joints (M, n).
-
-    Followed is the curve that leaves q along v and on which nothing is missing but what no motion takes away (Newton's
-    method, bordered by u and v: Keller 1977). Of a curve that turns away within a long step nothing is known.
-    """
-    M, n = q.shape
-    unit, v = radian_or_reach(arm), fold.V[:, -1]
-    # a short step and a long one, both ways, to all of it and to a part: (2, 2, 2, M)
-    ways = np.multiply.outer([STEP, 10 * STEP], [[1.0, 0.6], [-1.0, -0.6]])
-    s, who = np.repeat(ways.ravel(), M), np.tile(np.arange(M), 8)
-    size = np.abs(s)
-    bordered = np.zeros((8 * M, n + 1, n + 1))
-    bordered[:, :n, n], bordered[:, n, :n] = fold.u[who], v[who]
-    bow = 0.5 * s[:, None] ** 2 * fold.bow[who]
-    away = s[:, None] * v[who] + np.where(np.abs(bow).max(axis=1) < size, 1.0, 0.0)[:, None] * bow
-    left = np.full(8 * M, np.inf)
-    active = np.arange(8 * M)
-    for _ in range(CORRECTIONS):
-        r, bordered[active, :n, :n] = newton.scaled(
-            arm, task, q[who[active]] + away[active] * unit, target[who[active]]
-        )
-        ahead = s[active] - (v[who[active]] * away[active]).sum(axis=1)
-        inverse = nudged(np.linalg.inv, bordered[active])
-        step = (inverse @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
-        away[active] += step[:, :n]
-        # the last row is the direction that the Jacobian there cannot reach: u has turned on the way
-        left[active] = np.abs(step[:, n]) / np.linalg.norm(inverse[:, n, :n], axis=1)
-        active = active[~(np.abs(step[:, :n]).max(axis=1) < CLOSE)]
-        if not len(active):
-            break
-    there = np.abs(away).max(axis=1) < 3 * size
-    there[active] = False
-    left, there = left.reshape(2, 4, M), there.reshape(2, 4, M).all(axis=1)
-    whole = away.reshape(2, 2, 2, M, n)[:, :, 0]
-    short, long = _slow(left.max(axis=1) - fold.miss) & _apart(whole, v)
-    known = there[0] & (~short | there[1])
-    moving = short & ((left[0].max(axis=0) - fold.miss <= NO_GROWTH) | long)
-    return known, known & moving, (known & moving)[:, None] & _moved(whole, long)
 
 
 def _slow(grown: Array) -> Bool:
@@ -300,7 +222,7 @@ def _moved(away: Array, long: Bool) -> Bool:
     return np.asarray(np.where(long[:, None], most[1] > 1e-3 * 10 * STEP, most[0] > 10 * TURNED))
 
 
-def _all_ways(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
+def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether postures (M, n) can move along any direction that they lose, pulled back by steps of least norm."""
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, clusters, corners, fold_singularities, self_motions, valleys
+from armkin.inverse import circuits, clusters, corners, self_motions, valleys
 from armkin.inverse.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
+    FOLDED,
     HAIR,
     HOPELESS,
     MOVING,
@@ -29,6 +30,7 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     TURNED,
 )
+from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
 
@@ -142,20 +144,32 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     rank[:, 0] = 0.0
     group = np.where(valid, -1, M)  # which candidate stands for each one
     free, singular, double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
-    moves, which, asked = np.zeros((K, M), bool), np.zeros((K, M, n), bool), ~(valid & (sigma < MOVING))
+    moves, which, asked = np.zeros((K, M), bool), np.zeros((K, M, n), bool), ~(valid & (sigma < FOLDED))
+
+    known, edge = np.zeros((K, M), bool), np.zeros((K, M), bool)
+    place, component = np.zeros((K, M), np.int64), np.zeros((0, M), bool)
 
     def ask(k: Int, b: Int) -> None:
-        """Whether these candidates lie on self-motions, if that is not known."""
+        """What components these candidates lie on, if that is not known."""
+        nonlocal component
         some = np.flatnonzero(~asked[k, b])
-        if len(some):
-            k, b = k[some], b[some]
-            asked[k, b] = True
-            fold = fold_singularities.folds(arm, task, q[k, b], target[k])
-            some = np.flatnonzero(~self_motions.isolated(fold))
-            if len(some):
-                k, b, fold = k[some], b[some], fold_singularities.some(fold, some)
-                lost = np.maximum(nullity[k, b], 1)
-                moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k], fold)
+        if not len(some):
+            return
+        k, b = k[some], b[some]
+        asked[k, b] = True
+        one = np.flatnonzero(nullity[k, b] < 2)
+        if len(one):
+            i, c = k[one], b[one]
+            at = local_structure(arm, task, q[i, c], target[i])
+            known[i, c], moves[i, c], which[i, c], edge[i, c] = at.known, at.manifold, at.joints, at.boundary
+            place[i, c] = len(component) + np.arange(len(i))
+            ways = newton.difference(arm, q[i], q[i, c][:, None])
+            component = np.concatenate([component, members(at, np.arange(len(i)), ways)])
+        rest = np.flatnonzero(~known[k, b] & (sigma[k, b] < MOVING))
+        if len(rest):
+            k, b = k[rest], b[rest]
+            lost = np.maximum(nullity[k, b], 1)
+            moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
 
     if (~asked).sum() <= AT_ONCE:
         ask(*np.nonzero(~asked))
@@ -172,7 +186,12 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
         mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < SOLUTION)
-        one = rest & _joined(arm, task, q, k, b, away.max(axis=2), sigma, size, target)
+        sure = known[k, b]
+        one, some = component[place[k, b]] if len(component) else np.zeros((len(k), M), bool), np.flatnonzero(~sure)
+        if len(some):
+            one[some] = _joined(arm, task, q, k[some], b[some], away[some].max(axis=2), sigma, size, target)
+        one &= rest
+        mine |= one & (sure & moving)[:, None]
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         if (some := np.flatnonzero(far.any(axis=1))).size:
             at, goal = q[k[some], b[some]], target[k[some]]
@@ -185,7 +204,8 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
         on = mine  # but not what is one with it in a valley beside the self-motion
         mine = on | one
         group[k] = np.where(mine, b[:, None], group[k])
-        double[k] |= (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
+        other = (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
+        double[k] |= np.where(sure, edge[k, b], other)
         singular[k] |= moving
         free[k] |= joints & moving[:, None]
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others

@@ -140,7 +140,8 @@ def linear(
     ci, ri = c * inverse, root * inverse
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
-    return _prefer(Pair(cos, sin), h2 < least, prefer), Doubt(edge | free, free)
+    nearly = h2 < close.nearly_free * scale * scale
+    return _prefer(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
 
 
 def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
@@ -175,17 +176,17 @@ def rotation_between(
     close = precision()
     least = close.free * scale * scale
     if length2 is not None:
-        free = length2 < least
+        free, nearly = length2 < least, length2 < close.nearly_free * scale * scale
         inverse = 1.0 / np.maximum(length2, least)
         vx, vy = arrays.mul(inverse, vx), arrays.mul(inverse, vy)
     c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
     s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
     if length2 is None:
         h2 = arrays.add(arrays.mul(c, c), arrays.mul(s, s))
-        free = h2 < least * least
+        free, nearly = h2 < least * least, h2 < (close.nearly_free * scale * scale) ** 2
         inverse = 1.0 / np.sqrt(np.maximum(h2, least * least))
         c, s = c * inverse, s * inverse
-    return _prefer(Pair(c, s), free, prefer), Doubt(free, free)
+    return _prefer(Pair(c, s), free, prefer), Doubt(nearly, free)
 
 
 def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:

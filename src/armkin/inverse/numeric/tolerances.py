@@ -5,6 +5,7 @@ Lengths are in units of the arm's reach, angles in rad, unless a line says other
 
 # ---- what a solution is
 SOLUTION = 1e-9  # residual up to which joint values solve a target
+REACH = 0.1  # [rad, reaches] a component along which a joint moves by this or more is a self-motion manifold
 ACCEPTED = 2.5e-13  # residual of a closed form's candidate that needs no correction
 NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
 SEED = 1e-3  # residual up to which a candidate of a doubtful target is
@@ -22,15 +23,17 @@ EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose
 # ---- how singular
 HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
+FOLDED = 4.5e-4  # and from which on no component holds a turning point: s^2 = 2 SOLUTION times a curvature of 100
 MOVING = 3e-8  # and below which it is asked whether it is
 DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
 CLUSTER = 0.02  # candidates this close may be one root of third or fourth order
 
 # ---- closed forms, relative to the equation's own size
 TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
-SHARP = 1e-15  # the same of a wrist of right angles, whose two roots differ by half a turn of its neighbours
+SHARP = 1e-11  # the same of a wrist of right angles, whose two roots differ by half a turn of its neighbours
 ONE_ROOT = 1e-14  # discriminant below which the middle of two roots misses by less than rounding does
 FREE = 1e-18  # squared amplitude below which an equation says nothing about its angle
+NEARLY_FREE = 1e-11  # and below which 0.1 rad of it may miss by less than `SOLUTION`, at a lever of 3 mm a metre
 TOUCHING = 1e-4  # complex roots this close to the real line may be a double root seen through rounding
 
 # ---- classes of arms

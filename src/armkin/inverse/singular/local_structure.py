@@ -1,0 +1,216 @@
+"""The residual along the lost direction: whether a posture is isolated, a boundary or on a self-motion manifold.
+
+At a posture J = U S V'. Where one singular value is small, the joints move along the last right singular vector v; all
+that the other directions can take away of the residual they take away (Lyapunov-Schmidt reduction; Golubitsky and
+Schaeffer, Singularities and Groups in Bifurcation Theory, 1985, ch. VII). What is left is a number g(t), t being the
+way along v, and a curve x(t). The component of the solution set is the interval of |g| <= SOLUTION around t = 0
+(docs/solution.md).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.tolerances import REACH, SOLUTION
+from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+NODES = 10  # values of t at which g and x are computed: polynomials of degree 9 are exact to rounding on `span`
+NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, of spans
+ITERATIONS = 8  # Newton steps onto the curve
+ARRIVED = 1e-9  # [rad, reaches] a step that ends them: its square is below rounding
+SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
+SHRINKS = 3  # as often as this
+POINTS = np.concatenate([[0.0], np.geomspace(3e-6, 0.9, 40), [1.0]])  # of a span, where |g| is compared
+HALVINGS = 30
+FINE = 33  # points of a component at which its slope is compared
+SMOOTH = 1e-5  # of a span: how far polynomials may be off their curve
+MOVED = 1e-3  # of the way: a joint that moves less along a component does not move
+
+
+class Structure(NamedTuple):
+    """What is known of M postures.
+
+    known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
+    neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
+    along v, at most `span` (M,) away, as far as the polynomials hold. v: (M, n). second: (M,) the second smallest
+    singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span,
+    g: (NODES, M, k) of the residual.
+    """
+
+    known: Bool
+    manifold: Bool
+    boundary: Bool
+    joints: Bool
+    low: Array
+    high: Array
+    span: Array
+    v: Array
+    second: Array
+    x: Array
+    g: Array
+
+
+def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
+    """The structure at postures (M, n) that solve their targets (M, m) or (M, 4, 4); at least n numbers a target."""
+    M, n = q.shape
+    _, J = newton.scaled(arm, task, q, target)
+    U, S, V = np.linalg.svd(J)
+    rows, lost = J.shape[1], J.shape[1] - n + 1  # with fewer joints than numbers more directions are out of reach
+    out = Structure(
+        known=np.zeros(M, bool),
+        manifold=np.zeros(M, bool),
+        boundary=np.zeros(M, bool),
+        joints=np.zeros((M, n), bool),
+        low=np.zeros(M),
+        high=np.zeros(M),
+        span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
+        v=V[:, -1],
+        second=S[:, n - 2] if n > 1 else np.ones(M),
+        x=np.zeros((NODES, M, n)),
+        g=np.zeros((NODES, M, max(lost, 1))),
+    )
+    if rows < n:
+        return out
+    left = np.arange(M)
+    for _ in range(SHRINKS + 1):
+        start = _Curve(q[left], target[left], U[left, :, n - 1 :], V[left, -1], out.span[left])
+        on, x, g = _polynomials(arm, task, start)
+        some = left[on]
+        out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
+        _decide(out, some)
+        left = left[~out.known[left]]
+        if not len(left):
+            break
+        out.span[left] /= SHRINK
+    return out
+
+
+class _Curve(NamedTuple):
+    """Where M curves begin: q (M, n), target, directions out of reach u (M, rows, k), v (M, n), and span (M,)."""
+
+    q: Array
+    target: Array
+    u: Array
+    v: Array
+    span: Array
+
+
+def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Array]:
+    """Which curves (M,) stay at hand as far as their spans, and coefficients of x (NODES, M, n) and g (NODES, M, k).
+
+    Each node is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation
+    problems, 1977).
+    """
+    M, n = start.q.shape
+    rows, k = start.u.shape[1:]
+    t, who = np.multiply.outer(NODE, start.span).ravel(), np.tile(np.arange(M), NODES)
+    unit = radian_or_reach(arm)
+    bordered = np.zeros((len(t), rows + 1, rows + 1))
+    bordered[:, :rows, n:], bordered[:, rows, :n] = start.u[who], start.v[who]
+    away, g, active = t[:, None] * start.v[who], np.full((len(t), k), np.nan), np.arange(len(t))
+    for _ in range(ITERATIONS):
+        one = who[active]
+        r, bordered[active, :rows, :n] = newton.scaled(arm, task, start.q[one] + away[active] * unit, start.target[one])
+        ahead = t[active] - (start.v[one] * away[active]).sum(axis=1)
+        inverse = nudged(np.linalg.inv, bordered[active])
+        step = (inverse @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
+        away[active] += step[:, :n]
+        # the last rows span what no motion across v reaches: u has turned on the way
+        across = inverse[:, n:, :rows]
+        g[active] = _least(across, step[:, n:])
+        size = np.abs(step[:, :n]).max(axis=1)
+        active = active[~(size < ARRIVED) & (np.abs(away[active]).max(axis=1) < 3.0 * np.abs(t[active]))]
+        if not len(active):
+            break
+    good = np.abs(away).max(axis=1) < 3.0 * np.abs(t)
+    good[active] = False
+    on = good.reshape(NODES, M).all(axis=0)
+    chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=1).reshape(NODES, M, n + k), axes=1)
+    # the polynomials are exact on the span if their last coefficients are small
+    last = np.abs(chebyshev[-2:]).max(axis=0)
+    with np.errstate(invalid="ignore"):
+        on &= last[:, :n].max(axis=1) < SMOOTH * start.span
+        on &= last[:, n:].max(axis=1) < 0.01 * SOLUTION
+    power = np.tensordot(_POWERS, chebyshev, axes=1)
+    return np.asarray(on), power[:, :, :n], power[:, :, n:]
+
+
+def _least(across: Array, left: Array) -> Array:
+    """Vectors (M, k) as long as the least residual on the hyperplanes across v: its part along across (M, k, rows)."""
+    if left.shape[1] == 1:
+        return np.asarray(left / np.linalg.norm(across, axis=2))
+    L: Array = np.linalg.cholesky(across @ across.swapaxes(1, 2))
+    return np.asarray(nudged(np.linalg.solve, L, left[:, :, None])[:, :, 0])
+
+
+_FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
+_POWERS = np.array([
+    np.pad(np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0]), (0, NODES))[:NODES] for k in range(NODES)
+]).T  # fmt: skip
+
+
+def _values(coefficients: Array, s: Array) -> Array:
+    """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
+    out = np.zeros((*s.shape, coefficients.shape[2]))
+    for c in coefficients[::-1]:
+        out = out * s[..., None] + c
+    return out
+
+
+def _size(g: Array, s: Array) -> Array:
+    return np.asarray(np.linalg.norm(_values(g, s), axis=-1))
+
+
+def _end(g: Array, sign: float) -> tuple[Array, Bool]:
+    """Where |g| (NODES, M, k) first exceeds `SOLUTION` on one side, as a share of the span, and whether it does."""
+    over: Bool = _size(g, sign * np.repeat(POINTS[:, None], g.shape[1], axis=1)) > SOLUTION
+    ends, first = over.any(axis=0), over.argmax(axis=0)
+    low, high = np.where(ends, POINTS[np.maximum(first - 1, 0)], 1.0), np.where(ends, POINTS[first], 1.0)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        beyond = _size(g, sign * middle) > SOLUTION
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return sign * low, np.asarray(ends)
+
+
+def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
+    """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
+    g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
+    (low, below), (high, above) = _end(g, -1.0), _end(g, 1.0)
+    s = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)  # (FINE, M)
+    way = _values(x, s)
+    extent = way.max(axis=0) - way.min(axis=0)
+    long = extent.max(axis=1) >= REACH
+    slope = _values(g[1:] * np.arange(1, NODES)[:, None, None], s) / span[:, None]  # (FINE, M, k)
+    steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
+    up = slope[steepest, np.arange(len(rows))]
+    along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), 1e-300)
+    out.known[rows] = long | (below & above)
+    out.manifold[rows], out.boundary[rows] = long, ~long & (along.min(axis=0) <= SOLUTION)
+    out.joints[rows] = long[:, None] & (extent > MOVED * extent.max(axis=1)[:, None])
+    out.low[rows], out.high[rows] = low * span, high * span
+
+
+def members(at: Structure, rows: NDArray[np.intp], way: Array) -> Bool:
+    """Which postures, way (m, M, n) [rad, reaches] from those of rows (m,), lie on their components: (m, M).
+
+    As far as the curve is known; one that solves its target lies as close to it as the directions that are not lost
+    let it.
+    """
+    t = (way * at.v[rows, None]).sum(axis=2)  # (m, M)
+    span, slack = at.span[rows], 4.0 * SOLUTION / at.second[rows]
+    x = _values(at.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
+    with np.errstate(invalid="ignore"):
+        off = np.abs(way - x).max(axis=2)
+        inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
+        return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
