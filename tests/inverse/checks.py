@@ -54,7 +54,7 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
     # the square root of rounding is all that a double root can be known to
     lost = nearest > 1e-6 + np.minimum(1e-13 / np.maximum(weak, 1e-300), 1e-3)
     # two roots are one branch if what is between them solves the target: half way, moved onto the curve that joins them
-    for k in np.flatnonzero(lost & (nearest < 0.1)):
+    for k in np.flatnonzero(lost & (nearest < 0.3)):
         d = s.q[k, int(oracle.distance(screw, s.q[k], q[k]).argmin())] - q[k]
         middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
         across = truth.across(screw, goals.take([k]), middle[None], weak=1e-4)
