@@ -58,11 +58,11 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
         d = s.q[k, int(oracle.distance(screw, s.q[k], q[k]).argmin())] - q[k]
         middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
         across = truth.across(screw, goals.take([k]), middle[None], weak=1e-4)
-        assert oracle.distance(screw, across[0], middle) < 0.1 * nearest[k]  # not onto one of the two
+        onto = bool(oracle.distance(screw, across[0], middle) > 0.1 * nearest[k])  # one of the two
         off, turned = oracle.missing(screw, goals.take([k]), across)
         # of a rotation's three columns two are at right angles to its axis, and each moves by the angle
         angle = turned[0] / (np.sqrt(2.0) if goals.orientation == "full" else 1.0)
-        lost[k] = np.hypot(off[0] / arm.reach, angle) > 1e-9
+        lost[k] = onto or np.hypot(off[0] / arm.reach, angle) > 1e-9
     B = s.q.shape[1]
     rows, columns = np.nonzero(s.valid)
     mm, rad = oracle.missing(screw, goals.take(rows), s.q[rows, columns])
