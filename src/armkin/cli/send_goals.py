@@ -93,7 +93,7 @@ class Goals:
         if answer.best is None and answer.within_limits and answer.refused is None:
             raise choose.blocked(request, answer)
         if answer.best is None:
-            nearest = choose.closest(request, self.target[0])  # type: ignore[index]
+            [nearest] = choose.closest(request, self.target)  # type: ignore[arg-type]
             raise choose.refusal(request, answer, nearest.distance)
         return answer.branches[answer.best].q[None]
 

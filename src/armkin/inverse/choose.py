@@ -21,7 +21,7 @@ from armkin.inverse.branches.names import find
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
 from armkin.inverse.closest import Closest
-from armkin.inverse.closest import closest as nearest_pose
+from armkin.inverse.closest import closest_each as nearest_poses
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.solve import ik
@@ -175,14 +175,14 @@ def _nearer(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branc
     return branch._replace(q=q, joints=units.joints_out(arm, q).tolist(), motion=motion)
 
 
-def closest(request: Request, target: Array) -> Closest:
-    """The pose within limits nearest to one target [mm, rad], with swept joints free."""
+def closest(request: Request, targets: Array) -> list[Closest]:
+    """The poses within limits nearest to targets (N, ...) [mm, rad], with swept joints free."""
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     held = _in(arm, request.held)
     one = _locked(arm, tuple(held.items()))
-    nearest = nearest_pose(one, target, request.task, near=near[_kept(arm, held)])
-    return replace(nearest, q=unlock(arm, held, nearest.q)) if held else nearest
+    found = nearest_poses(one, targets, request.task, near=near[_kept(arm, held)])
+    return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in found] if held else found
 
 
 def turns(request: Request, branch: Branch) -> list[list[float]]:

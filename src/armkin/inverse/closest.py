@@ -23,9 +23,13 @@ if TYPE_CHECKING:
 
 POOL = 4000  # postures within limits of which each target starts from the nearest
 STARTS = 14  # of them
-STEPS = 10
-FINALISTS = 4
+STEPS = 10  # of `thorough`
+Rounds = tuple[tuple[int, int], ...]  # steps, and how many starts go on after them
+ROUNDS: Rounds = (3, 6), (7, 3)
 AT_ONCE = 256  # targets worked on together
+WAY = 1e-5  # [rad, reaches] of the gradient's differences
+LEVEL = 1e-5  # least curvature that a step is divided by
+UPHILL = 1e-6  # curvature that rounding may hide
 FLAT = 1e-8  # largest component of the gradient at a minimum; cost in squared reaches
 
 
@@ -78,7 +82,12 @@ def closest_each(
     return [one for part in parts for one in _of_chunk(arm, definition, goal[part], close[part])]
 
 
-def _of_chunk(arm: Arm, task: Task, target: Array, near: Array) -> list[Closest]:
+def thorough(arm: Arm, task: Task, target: Array, near: Array) -> Closest:
+    """The nearest pose of one target, (1, m) or (1, 4, 4), from every start; near: (1, n)."""
+    return _of_chunk(arm, task, target, near, ((STEPS, STARTS // 3),))[0]
+
+
+def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds = ROUNDS) -> list[Closest]:
     """The nearest poses of targets (N, m) or (N, 4, 4); near: (N, n)."""
     N, n = near.shape
     pool, features = _pool(arm, task)
@@ -88,17 +97,18 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array) -> list[Closest]
     nearest.sort(axis=1)
     home = np.broadcast_to(np.clip(arm.home, arm.lower, arm.upper), (N, 1, n))
     starts = np.concatenate([np.clip(near, arm.lower, arm.upper)[:, None], home, pool[nearest]], axis=1)
-    every = starts.shape[1]
-    q = _descend(arm, task, starts.reshape(-1, n).copy(), np.repeat(target, every, axis=0))
-    cost = _cost(arm, task, q, np.repeat(target, every, axis=0)).reshape(N, every)
-    order = np.argsort(cost, axis=1, kind="stable")[:, :FINALISTS]
-    q = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1).reshape(-1, n)
-    each = np.repeat(target, FINALISTS, axis=0)
-    q, converged = _finish(arm, task, q, each)
-    cost = _cost(arm, task, q, each).reshape(N, FINALISTS)
-    moved = np.abs((q.reshape(N, FINALISTS, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
+    for steps, kept in rounds:
+        every = starts.shape[1]
+        each = np.repeat(target, every, axis=0)
+        q = _descend(arm, task, starts.reshape(-1, n).copy(), each, steps)
+        order = np.argsort(_cost(arm, task, q, each).reshape(N, every), axis=1, kind="stable")[:, :kept]
+        starts = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1)
+    each = np.repeat(target, kept, axis=0)
+    q, converged = _finish(arm, task, starts.reshape(-1, n), each)
+    cost = _cost(arm, task, q, each).reshape(N, kept)
+    moved = np.abs((q.reshape(N, kept, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
     equal = cost <= cost.min(axis=1, keepdims=True) * (1 + 1e-9) + 1e-18
-    best = np.arange(N) * FINALISTS + np.where(equal, moved, np.inf).argmin(axis=1)
+    best = np.arange(N) * kept + np.where(equal, moved, np.inf).argmin(axis=1)
     T = fk(arm, q[best])
     missing, p = residual(task, T, q[best], target), task.position
     return [
@@ -162,47 +172,52 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
 
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
     """
-    n, h = arm.n, 1e-5
-    unit = radian_or_reach(arm)
-    converged = np.zeros(len(q), bool)
-    cost = _cost(arm, task, q, target)
+    n, unit = arm.n, radian_or_reach(arm)
+    shifts = np.concatenate([np.eye(n), -np.eye(n)]) * WAY * unit
+    q, converged, cost = q.copy(), np.zeros(len(q), bool), _cost(arm, task, q, target)
+    active = np.arange(len(q))
     for _ in range(40):
-        downhill = _downhill(arm, task, q, target)
-        free = ~_stopped(arm, q, downhill)
-        shifts = np.concatenate([np.eye(n), -np.eye(n)]) * h
-        around = (q[:, None, :] + shifts * unit).reshape(-1, n)
-        slopes = _downhill(arm, task, around, np.repeat(target, 2 * n, axis=0)).reshape(len(q), 2, n, n)
-        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * h)
+        at, goal = q[active], target[active]
+        downhill = _downhill(arm, task, at, goal)
+        free = ~_stopped(arm, at, downhill)
+        around = (at[:, None, :] + shifts).reshape(-1, n)
+        slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(at), 2, n, n)
+        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         both = free[:, :, None] & free[:, None, :]
-        H = np.where(both, H, np.eye(n))
-        values, vectors = np.linalg.eigh(H)
+        values, vectors = np.linalg.eigh(np.where(both, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        converged = (slope <= FLAT * (1.0 + cost)) & (values[:, 0] > -1e-6)
-        if converged.all():
+        there = (slope <= FLAT * (1.0 + cost[active])) & (values[:, 0] > -UPHILL)
+        converged[active] = there
+        active, left = active[~there], np.flatnonzero(~there)
+        if not len(active):
             break
         # a step downhill along every eigenvector, whatever its curvature; flat ones gently
-        along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0))
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), 1e-5))
+        values, vectors = values[left], vectors[left]
+        along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
+        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        rest = np.arange(len(active))
         for shrink in (1.0, 0.25, 0.05, 0.005):
-            trial = np.clip(q + shrink * step * unit, arm.lower, arm.upper)
-            now = _cost(arm, task, trial, target)
+            rows = active[rest]
+            trial = np.clip(q[rows] + shrink * step[rest] * unit, arm.lower, arm.upper)
+            now = _cost(arm, task, trial, target[rows])
             # equal but for rounding is still a step towards a vanishing gradient
-            better = (now <= cost * (1.0 + 1e-14)) & ~converged
-            q = np.where(better[:, None], trial, q)
-            cost = np.where(better, now, cost)
-            step[better] = 0.0
+            better = now <= cost[rows] * (1.0 + 1e-14)
+            q[rows[better]], cost[rows[better]] = trial[better], now[better]
+            rest = rest[~better]
+            if not len(rest):
+                break
     return q, converged
 
 
-def _descend(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array:
     """Projected Levenberg-Marquardt on all starts at once."""
     unit = radian_or_reach(arm)
     damping = np.full(len(q), 1e-2)
     cost = _cost(arm, task, q, target)
     active = np.arange(len(q))
-    for _ in range(STEPS):
+    for _ in range(steps):
         r, J = _weighted(arm, task, q[active], target[active])
         downhill = (r[:, None] @ J)[:, 0]
         held = _stopped(arm, q[active], downhill)

@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse import singularities
 from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.branches.turns import nearest_row
-from armkin.inverse.closest import closest
+from armkin.inverse.closest import thorough
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
 from armkin.inverse.solutions import Status
@@ -44,7 +44,7 @@ def listed(goals: Goals, out: Batch) -> Batch:
         # a joint that is held is outside; or it is a valley, whose points are not as exact as the branches
         if not (hair | ((beyond < OFF) | out.free[k]).all(axis=1) & (sigma < MOVES)).any():
             continue
-        legal = closest(arm, target[k], task.name, near=near[k]).q
+        legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
         # the correction may take a double root beyond its limit
         if ((exact[0] >= arm.lower) & (exact[0] <= arm.upper)).all():

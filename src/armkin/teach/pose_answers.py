@@ -128,7 +128,7 @@ def _solved(arm: Arm, question: Question) -> dict[str, Any]:
         answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
         answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:
-        nearest = choose.closest(request, goal)
+        [nearest] = choose.closest(request, goal[None])
         answer["closest"] = {
             "joints": units.joints_out(arm, nearest.q).tolist(),
             "distance_mm": nearest.distance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from armkin.columns.table import Table
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
+    from armkin.inverse.closest import Closest as NearestPose
     from armkin.inverse.solutions import Solutions
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
@@ -215,10 +216,13 @@ class Questions:
             targets = units.targets_in(self.task.labels, part)
             found = choose.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
             each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
-            for values, goal, (request, one) in zip(part.tolist(), targets, each, strict=True):
+            alone = self.continuous or not with_closest  # each row's `near` is another one
+            nearest = {} if alone else _nearest_to(self.request, targets, found)
+            for k, (values, goal, (request, one)) in enumerate(zip(part.tolist(), targets, each, strict=True)):
                 yield _answer(
-                    request, self.task, values, goal, one, self.all_branches, self.turns, with_closest=with_closest
-                )
+                    request, self.task, values, goal, one, self.all_branches, self.turns,
+                    with_closest=with_closest, nearest=nearest.get(k),
+                )  # fmt: skip
                 if self.continuous and one.best is not None:
                     self.request = replace(request, near=one.branches[one.best].joints)
 
@@ -233,6 +237,7 @@ def _answer(
     turns: bool,
     *,
     with_closest: bool,
+    nearest: NearestPose | None = None,
 ) -> Ik:
     arm = request.arm
     listed, best = found.branches, found.best
@@ -256,7 +261,7 @@ def _answer(
         "branches_within_limits": found.within_limits,
         "branches": [_branch(request, branch, turns) for branch in listed],
         "best": best,
-        "closest": _closest(request, goal, found) if best is None and with_closest else None,
+        "closest": _closest(request, goal, found, nearest) if best is None and with_closest else None,
         "free_joints": found.free,
     }
     if arm.keep_out:
@@ -265,10 +270,18 @@ def _answer(
     return answer
 
 
-def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Closest | None:
+def _nearest_to(request: choose.Request, targets: Array, found: Sequence[choose.Answer]) -> dict[int, NearestPose]:
+    """The nearest poses of those targets that no legal branch reaches, all at once."""
+    from armkin.inverse import choose
+
+    rows = [k for k, one in enumerate(found) if one.best is None and not one.within_limits]
+    return dict(zip(rows, choose.closest(request, targets[rows]), strict=True)) if rows else {}
+
+
+def _closest(request: choose.Request, goal: Array, found: choose.Answer, nearest: NearestPose | None) -> Closest | None:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
 
-    None where every branch within limits hits something.
+    None where every branch within limits hits something. nearest: if it is known.
     """
     import armkin
     from armkin.inverse import choose
@@ -288,7 +301,8 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer) -> Clos
         }
         answer.update(_near_to(arm, legal))
         return answer
-    nearest = choose.closest(request, goal)
+    if nearest is None:
+        [nearest] = choose.closest(request, goal[None])
     answer = {
         "joints": units.joints_out(arm, nearest.q).tolist(),
         "position_mm": nearest.position.tolist(),

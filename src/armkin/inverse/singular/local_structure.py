@@ -149,7 +149,7 @@ def _least(across: Array, left: Array) -> Array:
     """Vectors (M, k) as long as the least residual on the hyperplanes across v: its part along across (M, k, rows)."""
     if left.shape[1] == 1:
         return np.asarray(left / np.linalg.norm(across, axis=2))
-    L: Array = np.linalg.cholesky(across @ across.swapaxes(1, 2))
+    L = np.asarray(np.linalg.cholesky(across @ across.swapaxes(1, 2)), float)
     return np.asarray(nudged(np.linalg.solve, L, left[:, :, None])[:, :, 0])
 
 
@@ -163,7 +163,8 @@ def _values(coefficients: Array, s: Array) -> Array:
     """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
     out = np.zeros((*s.shape, coefficients.shape[2]))
     for c in coefficients[::-1]:
-        out = out * s[..., None] + c
+        out *= s[..., None]
+        out += c
     return out
 
 

@@ -22,7 +22,7 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         w = 0.5 * np.stack([C[:, 1, 2] - C[:, 2, 1], C[:, 2, 0] - C[:, 0, 2], C[:, 0, 1] - C[:, 1, 0]], axis=1)
         far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - 1e-8
         if far.any():
-            w[far] = _rotation_vector(Rt[far] @ np.swapaxes(R[far], 1, 2))
+            w[far] = _rotation_vector(np.swapaxes(C[far], 1, 2))
         parts.append(w)
     else:
         parts.append(target[:, : task.position] - T[:, : task.position, 3])
