@@ -31,7 +31,9 @@ ARRIVED = 1e-9  # [rad, reaches] a step that ends them: its square is below roun
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
 POINTS = np.concatenate([[0.0], np.geomspace(3e-6, 0.9, 40), [1.0]])  # of a span, where |g| is compared
-HALVINGS = 30
+EXPONENTS = np.arange(NODES)
+POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
+HALVINGS = 20  # of an interval between two points: to a millionth of it
 FINE = 33  # points of a component at which its slope is compared
 SMOOTH = 1e-5  # of a span: how far polynomials may be off their curve
 MOVED = 1e-3  # of the way: a joint that moves less along a component does not move
@@ -174,14 +176,21 @@ def _size(g: Array, s: Array) -> Array:
 
 def _end(g: Array, sign: float) -> tuple[Array, Bool]:
     """Where |g| (NODES, M, k) first exceeds `SOLUTION` on one side, as a share of the span, and whether it does."""
-    over: Bool = _size(g, sign * np.repeat(POINTS[:, None], g.shape[1], axis=1)) > SOLUTION
-    ends, first = over.any(axis=0), over.argmax(axis=0)
-    low, high = np.where(ends, POINTS[np.maximum(first - 1, 0)], 1.0), np.where(ends, POINTS[first], 1.0)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        beyond = _size(g, sign * middle) > SOLUTION
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return sign * low, np.asarray(ends)
+    out, ends = np.ones(g.shape[1]), np.zeros(g.shape[1], bool)
+    # the sum of the coefficients' sizes bounds the polynomial on all of the span
+    some = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > SOLUTION)
+    if len(some):
+        g = g[:, some]
+        over: Bool = np.linalg.norm(np.tensordot(sign**EXPONENTS * POWERS_OF_POINTS, g, axes=1), axis=2) > SOLUTION
+        ends[some], first = over.any(axis=0), over.argmax(axis=0)
+        stop = ends[some]
+        low, high = np.where(stop, POINTS[np.maximum(first - 1, 0)], 1.0), np.where(stop, POINTS[first], 1.0)
+        for _ in range(HALVINGS if stop.any() else 0):
+            middle = 0.5 * (low + high)
+            beyond = _size(g, sign * middle) > SOLUTION
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        out[some] = low
+    return sign * out, ends
 
 
 def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
