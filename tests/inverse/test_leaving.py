@@ -17,16 +17,9 @@ OFFSETS = np.array([0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3,
 RANK = {Status.SINGULAR: 2, Status.BOUNDARY: 1, Status.EXACT: 0}
 COUNT = 1  # postures a family
 NAMES = [
-    "yaw_two_link",
-    "three_dof",
-    "ra02",
-    "labvolt_5150",
-    "cobra600",
-    "stanford",
-    "irb120",
-    "puma560",
-    "ur5e",
-    "xarm6",
+    *("yaw_two_link", "three_dof", "ra02", "labvolt_5150", "cobra600", "stanford", "irb120", "irb2400", "puma560"),
+    *("ur3e", "ur5e", "xarm6", "jaco_j2n6s300", "fanuc_crx10ia", "ar4", "kuka_kr6_r700", "mycobot_280", "parol6"),
+    *("thor", "wx250s"),
 ]
 
 

@@ -1,0 +1,312 @@
+"""What typed postures are, by exact arithmetic: rank, multiplicity, and joints that move. Writes exact_postures.txt.
+
+    python tests/inverse/exact_postures.py
+
+Angles are multiples of 15 degrees and those of right triangles of whole sides (and their doubles), lengths are whole
+numbers, so that every entry of a chain is in the rationals with sqrt(2) and sqrt(3). They are computed in the field of
+integers modulo a prime of 31 bits in which 2 and 3 are squares: no number is rounded, none compared with a threshold. A
+rank can only come out too small, where a prime divides a minor; singular postures are computed by two primes.
+
+With t = tan of half of each joint's motion the equations are polynomials. Those of full rank are solved for as many
+joints as power series in the others (implicit function theorem); what is left of the equations has the Hilbert
+function of the root's local ring (Dayton and Zeng, Computing the multiplicity structure in solving polynomial systems,
+2005): its sum is the multiplicity, and where it does not end, the posture lies on a curve: of one lost direction a real
+one, a self-motion manifold; of several, curves that cross may be complex.
+"""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FILE = Path(__file__).with_suffix(".txt")
+PRIMES = 2147483543, 2147483423  # 23 modulo 24: 2, 3 are squares and their roots a power
+COUNT = 260  # postures an arm
+DEGREE = {0: 1, 1: 12, 2: 6, 3: 4}  # of the power series, by the directions that are lost
+DEGREE |= dict.fromkeys((4, 5, 6), 3)
+
+Ints = NDArray[np.int64]
+
+# tables of standard Denavit-Hartenberg rows (d, a, alpha in quarter turns); "P": a slide, its d the value added
+ARMS: dict[str, tuple[str, str, list[tuple[int, int, int]]]] = {
+    "elbow arm, spherical wrist": (
+        "pose", "RRRRRR", [(0, 0, -1), (150, 430, 0), (0, 20, 1), (430, 0, -1), (0, 0, 1), (60, 0, 0)],
+    ),
+    "no offsets, spherical wrist": (
+        "pose", "RRRRRR", [(300, 0, -1), (0, 400, 0), (0, 0, 1), (400, 0, -1), (0, 0, 1), (100, 0, 0)],
+    ),
+    "three parallel axes": (
+        "pose", "RRRRRR", [(160, 0, 1), (0, -425, 0), (0, -390, 0), (130, 0, 1), (100, 0, -1), (100, 0, 0)],
+    ),
+    "offset wrist": (
+        "pose", "RRRRRR", [(245, 0, -1), (0, 540, 2), (0, 0, -1), (540, 0, 1), (150, 0, -1), (160, 0, 0)],
+    ),
+    "slide and spherical wrist": (
+        "pose", "RRPRRR", [(412, 0, -1), (154, 0, 1), (0, 0, 0), (0, 0, -1), (0, 0, 1), (263, 0, 0)],
+    ),
+    "point, elbow": ("xyz", "RRR", [(300, 0, -1), (0, 400, 0), (0, 300, 0)]),
+    "point, shoulder offset": ("xyz", "RRR", [(300, 50, -1), (40, 400, 0), (0, 300, 0)]),
+    "point, right angles": ("xyz", "RRR", [(0, 100, 1), (0, 200, 1), (0, 100, 0)]),
+    "point, slide": ("xyz", "RRP", [(300, 0, 1), (50, 0, 1), (0, 0, 0)]),
+}  # fmt: skip
+TRIANGLES = (3, 4, 5), (5, 12, 13), (24, 7, 25)
+# letters of the file: 24 multiples of 15 degrees, then triangles' angles in all quadrants
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXabcdefghijkl"
+KINDS = [
+    [k for k in range(24) if k % 6 == 0],
+    [k for k in range(24) if k % 3 == 0],
+    [k for k in range(24) if k % 2 == 0],
+    list(range(24)),
+    [0, 6, 12, 18, *range(24, 36)],
+    list(range(36)),
+]
+SLIDES = (0, 100, 154, 200, 250, 300)  # [mm] a slide's values, by letter
+
+
+class Posture(NamedTuple):
+    """lost: directions; multiplicity: of the root, 0 on a curve; moving: joints that a curve through it moves."""
+
+    arm: str
+    angles: str
+    lost: int
+    multiplicity: int
+    moving: str
+
+
+def radians(letter: str) -> float:
+    """The angle of a letter."""
+    k = LETTERS.index(letter)
+    if k < 24:
+        return float(np.radians(15.0 * (k - 24 if k > 12 else k)))
+    (a, b, _), quadrant = TRIANGLES[(k - 24) // 4], (k - 24) % 4
+    angle = np.arctan2(a, b) + quadrant * np.pi / 2
+    return float(angle - 2 * np.pi if angle > np.pi else angle)
+
+
+def joints(kinds: str, letters: str) -> NDArray[np.float64]:
+    """Joint values [rad | mm] of a row's letters."""
+    return np.array([
+        SLIDES[LETTERS.index(x)] if kind == "P" else radians(x) for kind, x in zip(kinds, letters, strict=True)
+    ])  # fmt: skip
+
+
+def read() -> list[Posture]:
+    """The rows of the file."""
+    names = list(ARMS)
+    rows = (line.split() for line in FILE.read_text().splitlines() if not line.startswith("#"))
+    return [Posture(names[int(a)], q, int(lost), int(m), moving.strip("-")) for a, q, lost, m, moving in rows]
+
+
+# ---- the field
+
+
+class Field:
+    """Integers modulo a prime p, with the roots of 2 and 3."""
+
+    def __init__(self, p: int) -> None:
+        self.p = p
+        self.root = {2: pow(2, (p + 1) // 4, p), 3: pow(3, (p + 1) // 4, p)}
+        assert all(r * r % p == k for k, r in self.root.items())
+
+    def over(self, a: int, b: int) -> int:
+        return a * pow(b, -1, self.p) % self.p
+
+    def angle(self, k: int) -> tuple[int, int]:
+        """Cosine and sine of the k-th letter."""
+        p = self.p
+        if k >= 24:
+            (a, b, c), quadrant = TRIANGLES[(k - 24) // 4], (k - 24) % 4
+            start = self.over(b, c), self.over(a, c)
+        else:
+            two, three = self.root[2], self.root[3]
+            quadrant, rest = k // 6, k % 6
+            # 0, 15, .. 75 degrees
+            cos = [
+                1, self.over(two * (three + 1), 4), self.over(three, 2), self.over(two, 2), self.over(1, 2),
+                self.over(two * (three - 1), 4),
+            ]  # fmt: skip
+            start = cos[rest] % p, (cos[6 - rest] if rest else 0) % p
+        c, s = start
+        for _ in range(quadrant):
+            c, s = -s % p, c
+        return c, s
+
+    def reduced(self, A: Ints) -> tuple[Ints, list[int], list[int]]:
+        """The reduced row echelon form of A, its pivots' columns and the rows that they came from."""
+        A, p = A.copy() % self.p, self.p
+        order = list(range(len(A)))
+        columns: list[int] = []
+        for j in range(A.shape[1]):
+            k = len(columns)
+            rows = np.flatnonzero(A[k:, j])
+            if not len(rows):
+                continue
+            i = k + int(rows[0])
+            A[[k, i]] = A[[i, k]]
+            order[k], order[i] = order[i], order[k]
+            A[k] = A[k] * pow(int(A[k, j]), -1, p) % p
+            other = np.flatnonzero(A[:, j])
+            other = other[other != k]
+            A[other] = (A[other] - A[other, j, None] * A[k] % p) % p
+            columns.append(j)
+            if len(columns) == len(A):
+                break
+        return A, columns, order[: len(columns)]
+
+    def rank(self, A: Ints) -> int:
+        return len(self.reduced(A)[1]) if A.size else 0
+
+    def inverse(self, A: Ints) -> Ints:
+        n = len(A)
+        return self.reduced(np.concatenate([A, np.eye(n, dtype=np.int64)], axis=1))[0][:, n:]
+
+
+class Series:
+    """Polynomials in r unknowns modulo p up to a degree: arrays (..., P) of coefficients."""
+
+    def __init__(self, field: Field, r: int, degree: int) -> None:
+        powers = [e for e in itertools.product(range(degree + 1), repeat=r) if sum(e) <= degree]
+        self.powers = sorted(powers, key=lambda e: (sum(e), e))
+        self.p, self.place = field.p, {e: i for i, e in enumerate(self.powers)}
+        self.degrees = np.array([sum(e) for e in self.powers])
+        self.products = []  # of each monomial: with which others, and where the product stands
+        for e in self.powers:
+            with_, to = [], []
+            for i, f in enumerate(self.powers):
+                target = self.place.get(tuple(a + b for a, b in zip(e, f, strict=True)))
+                if target is not None:
+                    with_.append(i)
+                    to.append(target)
+            self.products.append((np.array(with_), np.array(to)))
+
+    def zeros(self, *shape: int) -> Ints:
+        return np.zeros((*shape, len(self.powers)), np.int64)
+
+    def times(self, a: Ints, b: Ints) -> Ints:
+        """Products of polynomials (..., P)."""
+        a, b = np.broadcast_arrays(a, b)
+        out = np.zeros(a.shape, np.int64)
+        for i, (with_, to) in enumerate(self.products):
+            if a[..., i].any():
+                out[..., to] = (out[..., to] + a[..., i, None] * b[..., with_]) % self.p
+        return out
+
+
+# ---- the arm
+
+
+def equations(field: Field, series: Series, arm: str, letters: str, t: Ints) -> Ints:
+    """Polynomials (rows, P) that vanish where the target is kept; t: (n, P) half tangents of the joints' motions.
+
+    Every entry of the chain is multiplied by the denominators 1 + t^2.
+    """
+    task, kinds, table = ARMS[arm]
+    p = field.p
+    M = series.zeros(3, 4)
+    M[[0, 1, 2], [0, 1, 2], 0] = 1
+    below = series.zeros()
+    below[0] = 1  # the last row's only entry
+    for i, (kind, (d, a, alpha)) in enumerate(zip(kinds, table, strict=True)):
+        letter = LETTERS.index(letters[i])
+        if kind == "P":
+            slide = t[i].copy()
+            slide[0] = (slide[0] + SLIDES[letter]) % p
+            M[:, 3] = (M[:, 3] + series.times(M[:, 2], slide)) % p
+        else:
+            c, s = field.angle(letter)
+            square = series.times(t[i], t[i])
+            minus, plus = -square % p, square
+            minus[0], plus[0] = (minus[0] + 1) % p, (plus[0] + 1) % p
+            C, S = (c * minus - s * (2 * t[i] % p)) % p, (s * minus + c * (2 * t[i] % p)) % p
+            x, y = M[:, 0], M[:, 1]
+            M = np.stack(
+                [
+                    (series.times(x, C) + series.times(y, S)) % p,
+                    (series.times(y, C) - series.times(x, S)) % p,
+                    series.times(M[:, 2], plus),
+                    series.times(M[:, 3], plus),
+                ],
+                axis=1,
+            )
+            below = series.times(below, plus)
+        M[:, 3] = (M[:, 3] + d * M[:, 2] + a * M[:, 0]) % p
+        for _ in range(alpha % 4):
+            M[:, 1], M[:, 2] = M[:, 2].copy(), -M[:, 1] % p
+    start = M[:, :, 0].copy()
+    M = (M - start[:, :, None] * below) % p
+    return M[:, 3] if task == "xyz" else M.reshape(12, -1)
+
+
+def structure(field: Field, arm: str, letters: str) -> Posture:
+    """What a posture is."""
+    p, n = field.p, len(letters)
+    linear = Series(field, n, 1)
+    at = linear.zeros(n)
+    at[np.arange(n), [linear.place[tuple(row)] for row in np.eye(n, dtype=int).tolist()]] = 1
+    place = at.argmax(axis=1)
+    J = equations(field, linear, arm, letters, at)[:, place]
+    _, solved, rows = field.reduced(J)
+    lost = n - len(solved)
+    if not lost:
+        return Posture(arm, letters, 0, 1, "")
+    series = Series(field, lost, DEGREE[lost])
+    kept = [j for j in range(n) if j not in solved]
+    t = series.zeros(n)
+    for k, j in enumerate(kept):
+        t[j, series.place[tuple(int(i == k) for i in range(lost))]] = 1
+    back = field.inverse(J[np.ix_(rows, solved)])
+    for _ in range(int(series.degrees.max())):  # each makes the series right by one degree more
+        left = equations(field, series, arm, letters, t)[rows]
+        for k, j in enumerate(solved):
+            for i in range(len(rows)):
+                t[j] = (t[j] - back[k, i] * left[i]) % p
+    g = equations(field, series, arm, letters, t)
+    multiplicity = _multiplicity(field, series, np.delete(g, rows, axis=0))
+    curve = lost == 1 and not multiplicity
+    moving = "".join(str(j + 1) for j in range(n) if curve and t[j].any())
+    return Posture(arm, letters, lost, multiplicity, moving)
+
+
+def _multiplicity(field: Field, series: Series, g: Ints) -> int:
+    """The sum of the Hilbert function of the ideal of g (m, P); 0 if it does not end within the series' degree."""
+    multiples = []
+    for e in series.powers:
+        one = series.zeros()
+        one[series.place[e]] = 1
+        multiples.append(series.times(g, one))
+    every, before = np.concatenate(multiples), 0
+    for degree in range(int(series.degrees.max()) + 1):
+        some = series.degrees <= degree
+        dimension = int(some.sum()) - field.rank(every[:, some])
+        if dimension == before:
+            return dimension
+        before = dimension
+    return 0
+
+
+def main() -> None:
+    rng = np.random.default_rng(1)
+    first, second = map(Field, PRIMES)
+    lines = ["# arm, joints' letters, lost directions, multiplicity (0: a curve), joints that move: exact_postures.py"]
+    for number, (arm, (_, kinds, _)) in enumerate(ARMS.items()):
+        seen: set[str] = set()
+        while len(seen) < COUNT:
+            choice = KINDS[int(rng.integers(len(KINDS)))]
+            letters = "".join(
+                LETTERS[int(rng.integers(len(SLIDES)) if kind == "P" else rng.choice(choice))] for kind in kinds
+            )
+            if letters in seen:
+                continue
+            seen.add(letters)
+            found = structure(first, arm, letters)
+            assert not found.lost or found == structure(second, arm, letters)
+            lines.append(f"{number} {letters} {found.lost} {found.multiplicity} {found.moving or '-'}")
+    FILE.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
