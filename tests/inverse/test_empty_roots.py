@@ -10,6 +10,7 @@ from oracle import goal
 
 import armkin
 from armkin.inverse.elimination import method, roots
+from armkin.inverse.numeric.tolerances import ALONE
 from armkin.inverse.recognise import solver
 from armkin.model.rotation import inverse
 
@@ -49,7 +50,7 @@ def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytes
         unit = closed.length if arm.prismatic[joint] else 1.0
         away = np.abs(known[seed.pose, :, joint] / unit - seed.q[:, None, joint])
         away = np.where(np.isnan(away), np.inf, away if arm.prismatic[joint] else np.abs(np.angle(np.exp(1j * away))))
-        stands = (seed.tilt == 0) & (seed.gap > method.ALONE) & (away.min(axis=1) < 1e-6)
+        stands = (seed.tilt == 0) & (seed.gap > ALONE) & (away.min(axis=1) < 1e-6)
         seen += int(stands.sum())
         assert seed.defect[stands].max() < 1e-6
     assert seen > 300

@@ -22,7 +22,7 @@ from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
 from armkin.inverse.closest import Closest
 from armkin.inverse.closest import closest_each as nearest_poses
-from armkin.inverse.numeric.tolerances import EQUAL
+from armkin.inverse.numeric.tolerances import EQUAL, HELD
 from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
@@ -190,7 +190,7 @@ def turns(request: Request, branch: Branch) -> list[list[float]]:
     arm = request.arm
     copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
-    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < 1e-9
+    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < HELD
     return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
 
 

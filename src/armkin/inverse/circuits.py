@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -23,11 +24,8 @@ if TYPE_CHECKING:
 STEP = 0.2  # [rad, reaches] along the curve
 MOST = 250  # steps
 PASSED = 0.15  # of a step: joint values this close to its chord are on the way; a curve is half as far off it
-SHORTEST = 1e-4  # of them
 BEND = 4.0  # steps are at most so many times the second smallest singular value: a curve bends where another is near
 STRAIGHT = 0.8  # cosine between the directions of two steps
-OFF = 1e-6  # residual above which the joints move no farther
-CROSSING = 2e-4  # second smallest singular value below which another curve may cross
 
 
 def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: Bool, target: Array) -> Bool:
@@ -66,14 +64,14 @@ def _walk(
         turned = (ahead * last[active]).sum(axis=1)
         if not step:
             turned = way * ahead[np.arange(len(active)), np.abs(ahead).argmax(axis=1)]
-        good = (size < OFF) & ((np.abs(turned) > STRAIGHT) | (step == 0))
+        good = (size < OFF_CURVE) & ((np.abs(turned) > STRAIGHT) | (step == 0))
         before, at[active[good]] = at[active], there[good]
         last[active[good]] = (ahead * np.sign(turned)[:, None])[good]
         longest = np.minimum(STEP, BEND * second)
         pace[active] = np.minimum(longest, np.where(good, 2.0 * pace[active] if step else STEP, 0.5 * pace[active]))
-        stuck = ~good & (pace[active] < SHORTEST)
+        stuck = ~good & (pace[active] < SHORTEST_STEP)
         unsure = np.zeros(len(q), bool)  # nobody knows where it goes on
-        unsure[active] = (second < CROSSING) | (stuck & (size < OFF)) | (step == MOST - 1)
+        unsure[active] = (second < CROSSING) | (stuck & (size < OFF_CURVE)) | (step == MOST - 1)
         open_ = np.flatnonzero(~met & going[who])
         place = np.searchsorted(active, who[open_])
         chord = newton.difference(arm, at[active], before)
@@ -89,7 +87,7 @@ def _walk(
 def _on_chord(arm: Arm, posture: Array, start: Array, chord: Array) -> Bool:
     """Which postures (M, n) a step along chord (M, n) from start (M, n) passes."""
     way, size = newton.difference(arm, posture, start), (chord * chord).sum(axis=1)
-    part = np.clip((way * chord).sum(axis=1) / np.maximum(size, 1e-300), 0.0, 1.0)
+    part = np.clip((way * chord).sum(axis=1) / np.maximum(size, TINY), 0.0, 1.0)
     return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))
 
 
@@ -101,7 +99,7 @@ def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tupl
     r, J = newton.scaled(arm, task, q, target)
     J = J * joints[:, None]
     L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
-    gain = np.where(L > 1e-10, 1.0 / np.maximum(L, 1e-10), 0.0)
+    gain = np.where(L > ACROSS, 1.0 / np.maximum(L, ACROSS), 0.0)
     gain[:, 0] = 0.0
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):

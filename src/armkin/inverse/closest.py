@@ -13,6 +13,21 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import (
+    EQUAL_BUT_ROUNDING,
+    EQUAL_COST,
+    FLAT_GRADIENT,
+    GAINS_NOTHING,
+    GRADIENT_WAY,
+    LAST_STEP,
+    LEAST_COST,
+    LEAST_DAMPING,
+    LEVEL_VALUE,
+    NO_COST,
+    SHORTENED,
+    TINY,
+    UPHILL,
+)
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets, targets_of
@@ -27,10 +42,6 @@ STEPS = 10  # of `thorough`
 Rounds = tuple[tuple[int, int], ...]  # steps, and how many starts go on after them
 ROUNDS: Rounds = (3, 6), (7, 3)
 AT_ONCE = 256  # targets worked on together
-WAY = 1e-5  # [rad, reaches] of the gradient's differences
-LEVEL = 1e-5  # least curvature that a step is divided by
-UPHILL = 1e-6  # curvature that rounding may hide
-FLAT = 1e-8  # largest component of the gradient at a minimum; cost in squared reaches
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +118,7 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     q, converged = _finish(arm, task, starts.reshape(-1, n), each)
     cost = _cost(arm, task, q, each).reshape(N, kept)
     moved = np.abs((q.reshape(N, kept, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
-    equal = cost <= cost.min(axis=1, keepdims=True) * (1 + 1e-9) + 1e-18
+    equal = cost <= cost.min(axis=1, keepdims=True) * (1 + EQUAL_COST) + NO_COST
     best = np.arange(N) * kept + np.where(equal, moved, np.inf).argmin(axis=1)
     T = fk(arm, q[best])
     missing, p = residual(task, T, q[best], target), task.position
@@ -173,7 +184,7 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
     """
     n, unit = arm.n, radian_or_reach(arm)
-    shifts = np.concatenate([np.eye(n), -np.eye(n)]) * WAY * unit
+    shifts = np.concatenate([np.eye(n), -np.eye(n)]) * GRADIENT_WAY * unit
     q, converged, cost = q.copy(), np.zeros(len(q), bool), _cost(arm, task, q, target)
     active = np.arange(len(q))
     for _ in range(40):
@@ -182,12 +193,12 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
         free = ~_stopped(arm, at, downhill)
         around = (at[:, None, :] + shifts).reshape(-1, n)
         slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(at), 2, n, n)
-        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * WAY)
+        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         both = free[:, :, None] & free[:, None, :]
         values, vectors = np.linalg.eigh(np.where(both, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        there = (slope <= FLAT * (1.0 + cost[active])) & (values[:, 0] > -UPHILL)
+        there = (slope <= FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -UPHILL)
         converged[active] = there
         active, left = active[~there], np.flatnonzero(~there)
         if not len(active):
@@ -195,15 +206,15 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArr
         # a step downhill along every eigenvector, whatever its curvature; flat ones gently
         values, vectors = values[left], vectors[left]
         along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL))
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL_VALUE))
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
         rest = np.arange(len(active))
-        for shrink in (1.0, 0.25, 0.05, 0.005):
+        for shrink in (1.0, 0.25, 0.05, SHORTENED):
             rows = active[rest]
             trial = np.clip(q[rows] + shrink * step[rest] * unit, arm.lower, arm.upper)
             now = _cost(arm, task, trial, target[rows])
             # equal but for rounding is still a step towards a vanishing gradient
-            better = now <= cost[rows] * (1.0 + 1e-14)
+            better = now <= cost[rows] * (1.0 + EQUAL_BUT_ROUNDING)
             q[rows[better]], cost[rows[better]] = trial[better], now[better]
             rest = rest[~better]
             if not len(rest):
@@ -224,7 +235,7 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array
         J = np.where(held[:, None, :], 0.0, J)
         H = J.swapaxes(1, 2) @ J + damping[active][:, None, None] * np.eye(arm.n)
         step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
         trial = np.clip(q[active] + step * unit, arm.lower, arm.upper)
         now = _cost(arm, task, trial, target[active])
         better = now < cost[active]
@@ -232,8 +243,9 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array
         size = np.abs(trial - q[active]).max(axis=1)
         q[active[better]] = trial[better]
         cost[active[better]] = now[better]
-        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, 1e-12), damping[active] * 6.0)
-        done = (better & (gained <= 1e-17 * np.maximum(cost[active], 1e-30)) & (size < 1e-9)) | (damping[active] > 1e8)
+        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, LEAST_DAMPING), damping[active] * 6.0)
+        idle = better & (gained <= GAINS_NOTHING * np.maximum(cost[active], LEAST_COST)) & (size < LAST_STEP)
+        done = idle | (damping[active] > 1e8)
         active = active[~done]
         if not len(active):
             break

@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.batch import Goals
 from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, ONE_CROSSING, SOLUTION
 from armkin.inverse.self_motions import STEP, follow, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -23,7 +23,6 @@ from armkin.model.units import radian_or_reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-ALIKE = 1e-4  # [rad, reaches] roots in one corner are no further apart
 BOW = 0.1  # of its length: a curve is no farther off its chord
 
 Int = NDArray[np.int64]
@@ -43,7 +42,7 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
     if not len(some):
         return q, label, size
     k, b = k[some], b[some]
-    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ALIKE)
+    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ONE_CROSSING)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     at, row = q[k[first], b[first]], k[first]
     most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])

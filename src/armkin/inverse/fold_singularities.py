@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import CLEAR, FOLD_WAY, TINY
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-
-WAY = 1e-3  # [rad, reaches] of the second difference: its rounding is 1e-10
-CLEAR = 1e-4  # singular value that the second smallest must have for v to be the only direction
-BENT = 1e-3  # curvature of a fold; along a self-motion it is zero, and below 1e-5 where the residual hardly grows
 
 
 class Folds(NamedTuple):
@@ -69,12 +66,12 @@ def folds(arm: Arm, task: Task, q: Array, target: Array, linear: Linear | None =
         r, J = newton.scaled(arm, task, q, target)
         linear = Linear(r, *np.linalg.svd(J))
     r, U, S, V = linear
-    u, way = U[:, :, -1], WAY * V[:, -1] * radian_or_reach(arm)
+    u, way = U[:, :, -1], FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
     ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
-    turn = (ahead + behind - 2.0 * r) / WAY**2
+    turn = (ahead + behind - 2.0 * r) / FOLD_WAY**2
     bend = (u * turn).sum(axis=1)
-    lost, clear = (u * r).sum(axis=1), np.maximum(S[:, :-1], 1e-300)
+    lost, clear = (u * r).sum(axis=1), np.maximum(S[:, :-1], TINY)
     rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / clear[:, -1]
     bow = ((turn[:, None] @ U[:, :, :-1] / clear[:, None]) @ V[:, :-1])[:, 0]
     return Folds(

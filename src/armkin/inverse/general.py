@@ -22,7 +22,7 @@ from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance
 from armkin.inverse.closed.wrist import foot
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import AT_ZERO, EXACT
+from armkin.inverse.numeric.tolerances import ANSWERED, AT_ZERO, EXACT, PARALLEL
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import from_links
 from armkin.model.chain import Chain, is_parallel, reverse
@@ -64,7 +64,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         own = np.full((*q.shape[:2], n), np.nan)
         if len(k):
             better, size = newton.correct(arm, task, q[k, b, :n], T[k])
-            own[k, b] = np.where((size < 1e-12)[:, None], better, np.nan)
+            own[k, b] = np.where((size < ANSWERED)[:, None], better, np.nan)
         missing = np.isnan(own[:, :, 0])
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
@@ -137,7 +137,7 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     the wrist is not singular in the postures that people ask for.
     """
     L = chain.link[4]
-    if chain.prismatic[3:].any() or is_parallel(L, 1e-6):
+    if chain.prismatic[3:].any() or is_parallel(L, PARALLEL):
         return None
     there = (inverse(L) @ [*foot(L), 1.0])[:3]
     if np.hypot(*there[:2]) > tolerance:

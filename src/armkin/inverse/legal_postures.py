@@ -15,12 +15,9 @@ from armkin.inverse.batch import Batch, Goals, named, wider, write
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closest import thorough
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, OFF_LIMITS, ON_MANIFOLD, SOLUTION
 from armkin.inverse.solutions import Status
 from armkin.model.units import radian_or_reach
-
-OFF = 1e-7  # [rad, reaches] how far outside limits a double root may be that stands for one on them
-MOVES = 1e-12  # smallest singular value of a posture on a self-motion, not in a valley
 
 
 def listed(goals: Goals, out: Batch) -> Batch:
@@ -39,10 +36,10 @@ def listed(goals: Goals, out: Batch) -> Batch:
     for k in edge[~out.within[edge].any(axis=1)]:
         q = out.q[k, out.valid[k]]
         beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-        hair = (beyond < OFF).all(axis=1)
+        hair = (beyond < OFF_LIMITS).all(axis=1)
         sigma, *_ = newton.null_space(arm, task, q, np.repeat(target[k : k + 1], len(q), axis=0))
         # a joint that is held is outside; or it is a valley, whose points are not as exact as the branches
-        if not (hair | ((beyond < OFF) | out.free[k]).all(axis=1) & (sigma < MOVES)).any():
+        if not (hair | ((beyond < OFF_LIMITS) | out.free[k]).all(axis=1) & (sigma < ON_MANIFOLD)).any():
             continue
         legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])

@@ -26,8 +26,18 @@ from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import HOPELESS, NEAR, STEADY
-from armkin.inverse.tasks.fitting import PARALLEL
+from armkin.inverse.numeric.tolerances import (
+    ALIKE,
+    ANSWERED,
+    AT_LEAST,
+    BLURRED,
+    HOPELESS,
+    NEAR,
+    NEARLY_PARALLEL,
+    ROUNDED_ANSWER,
+    SOLUTION,
+    STEADY,
+)
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
 
@@ -37,7 +47,6 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
-BLURRED = 1e-9  # distance from a class that rounding alone explains
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
@@ -52,10 +61,11 @@ class _Corrected(NamedTuple):
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes moved by up to `NEAR`; by `PARALLEL` where nothing else fits."""
+    """Arms that a closed form would fit if their axes moved by `NEAR`, or `NEARLY_PARALLEL` if nothing else fits."""
     if task.orientation == "axis":
         return None  # see `armkin.inverse.tool_axis`
-    classes = ((planar, PARALLEL), (elbow, PARALLEL), (three_joints, NEAR), (spherical, NEAR), (three_parallel, NEAR))
+    wide, narrow = (planar, elbow), (three_joints, spherical, three_parallel)
+    classes = [*((module, NEARLY_PARALLEL) for module in wide), *((module, NEAR) for module in narrow)]
     found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
     if not found:
         return None
@@ -147,7 +157,7 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     seed, _, _ = recorded(arm, task, alike).rows(target)
     B = seed.shape[1]
     rough = newton.missing(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
-    return float(np.quantile(rough.min(axis=1), 0.8)) + 1e-14
+    return float(np.quantile(rough.min(axis=1), 0.8)) + ROUNDED_ANSWER
 
 
 def _around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
@@ -202,11 +212,11 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     some = np.flatnonzero(newton.missing(arm, task, flat, goals) < HOPELESS)
     size = np.full(len(flat), np.inf)
     flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20)
-    flat[size > 1e-9] = np.nan
+    flat[size > SOLUTION] = np.nan
     q = _packed(flat.reshape(N, B, n), own)
     with np.errstate(invalid="ignore"):
         for i in range(1, q.shape[1]):
-            again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < 1e-6
+            again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < ALIKE
             q[again.any(axis=1), i] = np.nan
     return _packed(q, own)
 
@@ -227,7 +237,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     """
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(STEADY, 1.5 * np.sqrt(off)) + 1e-6
+    weak = min(STEADY, 1.5 * np.sqrt(off)) + AT_LEAST
     limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
     for there in _around(arm, task, target, AROUND * off_here):
@@ -241,12 +251,12 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     some = np.flatnonzero(rough < HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
     q[some], size[some] = newton.newton(arm, task, flat[some], goals[some], steps=6)
-    branch, good = q.reshape(N, B, n), (size <= 1e-12).reshape(N, B)
+    branch, good = q.reshape(N, B, n), (size <= ANSWERED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
         for j in range(i):
             with np.errstate(invalid="ignore"):
-                same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < 1e-6
+                same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < ALIKE
             doubt |= same & good[:, i] & good[:, j]
     return _Corrected(branch, good, doubt)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.inverse.numeric.tolerances import NO_BLOCK, NO_JOINT
 
 Int = NDArray[np.int64]
 
@@ -51,7 +52,7 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     for i, j in itertools.combinations(range(n) if len(many) else (), 2):
         # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
         a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
-        some = (a * b - c * c < 1e-10) & (a + b > 1e-3) & (np.abs(c) > 1e-3)
+        some = (a * b - c * c < NO_BLOCK) & (a + b > NO_JOINT) & (np.abs(c) > NO_JOINT)
         if some.any():
             push = np.zeros((int(some.sum()), n))
             push[:, i], push[:, j] = b[some], -c[some]

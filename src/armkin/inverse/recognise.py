@@ -14,6 +14,7 @@ from armkin.errors import UsageError
 from armkin.inverse import general, nearly_special, tool_axis
 from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.numeric.tolerances import RANK
 from armkin.inverse.tasks.fitting import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import actual
@@ -37,7 +38,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
             f"{surplus} degree{'s' if surplus > 1 else ''} of freedom",
         )
-    effective = rank(arm, task, 1e-9)
+    effective = rank(arm, task, RANK)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         usual = default_task(arm)
         problem = (

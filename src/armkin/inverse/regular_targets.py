@@ -14,19 +14,32 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse import fold_singularities, self_motions
 from armkin.inverse.batch import Goals
-from armkin.inverse.fold_singularities import BENT, Linear
+from armkin.inverse.fold_singularities import Linear
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CLUSTER, FOLDED, HAIR, NEARBY, SAME, SEED, SOLUTION, WEAK
+from armkin.inverse.numeric.tolerances import (
+    BENT,
+    CLOSED,
+    CLUSTER,
+    FOLDED,
+    HAIR,
+    MERGED_ROOTS,
+    MERGED_ROUNDING,
+    NEARBY,
+    NEARBY_STEP,
+    SAME,
+    SEED,
+    SHORT_STEP,
+    SOLUTION,
+    TINY,
+    WEAK,
+)
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-
-CLOSED = 1e-12  # residual of a branch that needs no correction
-SHORT = 1e-6  # [rad, reaches] a step whose square is below rounding
 
 
 class Regular(NamedTuple):
@@ -93,7 +106,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
         mean = ways.sum(axis=1) / near_by[k, i].sum(axis=1, keepdims=True)
         clusters[k, i] = newton.missing(arm, task, q[k, i] + mean * radian_or_reach(arm), target[k]) < at.size[k, i]
     one = np.triu((weak.same | weak.same.swapaxes(1, 2)) & valid[:, :, None] & valid[:, None], 1)
-    same = 2 * SAME + np.minimum(2e-13 / np.maximum(sigma, 1e-300), 4e-4)
+    same = 2 * SAME + np.minimum(MERGED_ROUNDING / np.maximum(sigma, TINY), MERGED_ROOTS)
     known &= ~clusters.any(axis=1) & ~(close & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
     one &= known[:, None, None]
     either = one | one.swapaxes(1, 2)
@@ -119,7 +132,7 @@ def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target:
     better = q[k, b] + step * radian_or_reach(arm)
     r, J = newton.scaled(arm, task, better, target[k])
     size = np.sqrt((r * r).sum(axis=1))
-    good = (np.abs(step).max(axis=1) < SHORT) & (size < CLOSED)
+    good = (np.abs(step).max(axis=1) < SHORT_STEP) & (size < CLOSED)
     k, b = k[good], b[good]
     q, valid = q.copy(), valid.copy()
     q[k, b], valid[k, b], changed[k] = better[good], True, True
@@ -165,9 +178,9 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
         return sigma, found
     fold = fold_singularities.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
     # beyond a fold, and what else is missing is so little that putting it right does not lead back
-    beyond = (np.abs(fold.bend) > BENT) & (fold.weakest < 1e-6)
+    beyond = (np.abs(fold.bend) > BENT) & (fold.weakest < WEAK)
     beyond &= (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
-    beyond &= (fold.rest < 1e-3) & (100 * fold.rest**2 < np.abs(fold.lost))
+    beyond &= (fold.rest < NEARBY_STEP) & (100 * fold.rest**2 < np.abs(fold.lost))
     found.open[k[~own & ~beyond]] = True
     own &= ~found.open[k]
     several = own & (S[:, -2] < WEAK)

@@ -16,7 +16,21 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse import circuits, valleys
 from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import BESIDE, DRIFT, HAIR, HIGH, SAME, SOLUTION, TURNED, WEAK
+from armkin.inverse.numeric.tolerances import (
+    BESIDE,
+    DRIFT,
+    GROWTH,
+    HAIR,
+    HIGH,
+    MOVED,
+    NO_GROWTH,
+    SAME,
+    SOLUTION,
+    STALLED,
+    TINY,
+    TURNED,
+    WEAK,
+)
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -24,12 +38,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
-NO_GROWTH = 1e-12  # residual that stays as it is
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
-STALLED = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 
 Int = NDArray[np.int64]
 
@@ -74,7 +85,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     apart = np.where(curve, 0.0, newton.difference(arm, others, q))
     (sigma,), V, _ = newton.null_space(arm, task, q[None], target[None])
     held = np.where(curve, 0.0, V[0, -1])
-    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), 1e-300)
+    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), TINY)
     ahead = apart + np.where(curve, V[0, -1] * np.clip(far, -HAIR, HAIR)[:, None], 0.0)
     start = q + np.concatenate([apart, ahead]) * unit
     goal = np.repeat(target[None], len(start), axis=0)
@@ -219,7 +230,7 @@ def _moved(away: Array, long: Bool) -> Bool:
     nearby: neither is motion of a joint.
     """
     most = np.abs(away).max(axis=1)
-    return np.asarray(np.where(long[:, None], most[1] > 1e-3 * 10 * STEP, most[0] > 10 * TURNED))
+    return np.asarray(np.where(long[:, None], most[1] > MOVED * 10 * STEP, most[0] > 10 * TURNED))
 
 
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:

@@ -21,13 +21,18 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
     DOUBLE,
+    DOUBLE_ROOT,
+    EQUAL_RESIDUALS,
     FOLDED,
     HAIR,
     HOPELESS,
     MOVING,
+    RESTING,
+    ROOT_ROUNDING,
     SAME,
     SEED,
     SOLUTION,
+    TINY,
     TURNED,
 )
 from armkin.inverse.singular.local_structure import local_structure, members
@@ -40,8 +45,6 @@ if TYPE_CHECKING:
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
-SURE = 1e-14  # residuals below this are equal
-RESTING = 1e-9  # [rad, reaches] a radian: joints that move less do not move
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
@@ -140,7 +143,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
     resting = (nullity == 1)[:, :, None] & (np.abs(V[:, :, -1]) < RESTING)
     # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
-    rank = np.maximum(size, SURE)
+    rank = np.maximum(size, EQUAL_RESIDUALS)
     rank[:, 0] = 0.0
     group = np.where(valid, -1, M)  # which candidate stands for each one
     free, singular, double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
@@ -294,4 +297,4 @@ def _joined(
 
 def _radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return SAME + np.minimum(1e-13 / np.maximum(sigma, 1e-300), 3e-4)
+    return SAME + np.minimum(ROOT_ROUNDING / np.maximum(sigma, TINY), DOUBLE_ROOT)

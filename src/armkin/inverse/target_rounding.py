@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.numeric.tolerances import DECIMAL, SOLUTION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,7 +74,7 @@ def printed(units: Sequence[str], values: Array, reach: float) -> Array:
     left = np.ones(values.shape, bool)
     for decimals in range(MOST):
         scaled = values * 10.0**decimals
-        here = left & (np.abs(scaled - np.rint(scaled)) <= 4e-16 * np.maximum(np.abs(scaled), 1.0))
+        here = left & (np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0))
         if decimals >= FEWEST:
             off[here] = 0.5 * 10.0**-decimals
         left &= ~here

@@ -15,7 +15,8 @@ from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse import tool_axis
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
-from armkin.inverse.elimination.method import SHAKES, Elimination, _shaken
+from armkin.inverse.elimination.method import Elimination, _shaken
+from armkin.inverse.numeric.tolerances import SHAKES
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:

@@ -27,6 +27,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import NAMED, NO_LENGTH, SOLUTION
 from armkin.inverse.tasks.task import targets_of
 
 if TYPE_CHECKING:
@@ -126,7 +127,8 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]
     missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    valid = (missing < 1e-9).reshape(-1, B) & ~np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(B, -1).T
+    edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(B, -1).T
+    valid = (missing < SOLUTION).reshape(-1, B) & ~edge
     return postures, q, valid
 
 
@@ -134,7 +136,7 @@ def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
     """Index of the branch that is the posture itself: (M,), -1 where it is not found again."""
     distance = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
     index = distance.argmin(axis=1)
-    return np.where(distance.min(axis=1) < 1e-6, index, -1)
+    return np.where(distance.min(axis=1) < NAMED, index, -1)
 
 
 def _bent_wrist(arm: Arm, postures: Array) -> Array:
@@ -161,9 +163,9 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     shoulder, elbow, wrist = points[:, 1], points[:, 2], points[:, 3]
     way = wrist - shoulder
     length = np.linalg.norm(way, axis=1)
-    tilt = np.abs(way[:, 2]) / np.maximum(length, 1e-9)
+    tilt = np.abs(way[:, 2]) / np.maximum(length, NO_LENGTH)
     # far out, no offset of the shoulder can turn the way round
-    return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), 1e-9)).reshape(shape)
+    return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), NO_LENGTH)).reshape(shape)
 
 
 def _bends_upright(arm: Arm) -> bool:

@@ -43,7 +43,7 @@ from armkin.inverse.closed.subproblems import (
 )
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.closed.wrist import Wrist, meeting_point
-from armkin.inverse.numeric.tolerances import EXACT, NEAR
+from armkin.inverse.numeric.tolerances import BLURRED, EXACT, LOOSE, NEAR, NO_SIZE
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -53,7 +53,6 @@ if TYPE_CHECKING:
 
 # squared length across joint b [1 or reaches] below which the joint may be free: of a double root of joint c, and of
 # one of fourth order, rounding leaves the root and the fourth root
-LOOSE, BLURRED = 1e-12, 1e-9
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -95,7 +94,7 @@ class _Ends:
         self.rows = np.array([La[:3, :3] @ [0.0, 0.0, 1.0], La[:3, 3]])  # factors of f in (2)
         self.A = self.rows[:, :2]
         U, S, _ = np.linalg.svd(self.A)
-        off = float(S[1] / max(S[0], 1e-12))
+        off = float(S[1] / max(S[0], NO_SIZE))
         self.regular, self.close = off > tolerance, tolerance < off <= NEAR
         self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
 

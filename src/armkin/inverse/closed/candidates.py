@@ -17,7 +17,7 @@ from armkin.inverse.closed import crossings
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED
+from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FREED = 24  # values tried for joints that a target leaves free
 BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
-SHAKEN, SHAKE = 8, 1e-4  # moves of a target to where nothing is free, and their size [reaches, rad]
+SHAKEN = 8  # moves of a target to where nothing is free
 
 
 class Recorded:

@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SAME, SEED
+from armkin.inverse.numeric.tolerances import RATHER, SAME, SEED
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -50,7 +50,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         found |= changes
-        second[changes] *= 1e-3  # there, not at a step beside it
+        second[changes] *= RATHER  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         with np.errstate(invalid="ignore"):
             twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME

@@ -19,7 +19,7 @@ from armkin.inverse.closed.elbow import TwoLink
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.closed.three_joints import Position
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, NO_AREA
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, axes, reverse
 from armkin.model.rotation import FLIP, inverse
@@ -194,8 +194,8 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
         end = pose.times(P, link[3])
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
-        parallel = np.abs(det) < 1e-9
-        inverse_det = np.sign(det) / np.maximum(np.abs(det), 1e-9)
+        parallel = np.abs(det) < NO_AREA
+        inverse_det = np.sign(det) / np.maximum(np.abs(det), NO_AREA)
         d1 = (arrays.mul(x, b[1]) - arrays.mul(y, b[0])) * inverse_det
         d3 = (arrays.mul(a[0], y) - arrays.mul(a[1], x)) * inverse_det
         return [Pair(d1, None), second, Pair(d3, None)], Doubt(parallel, parallel)

@@ -27,7 +27,7 @@ from armkin.inverse.closed.subproblems import (
 )
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.closed.wrist import Wrist, meeting_point
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -98,7 +98,7 @@ class SphericalWrist:
             self.place = position.solve
             self.why = f"of the other three, {position.why}"
         self.links = [pose.constant(L) for L in chain.link[:4]]
-        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), NO_LENGTH)
         L3 = chain.link[3]
         self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
         end = inverse(chain.link[6])

@@ -20,7 +20,19 @@ import numpy as np
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.precision import precision
-from armkin.inverse.numeric.tolerances import TOUCHING
+from armkin.inverse.numeric.tolerances import (
+    AT_INFINITY,
+    LEVEL_ROOT,
+    MERGING,
+    NO_CUBIC_SLOPE,
+    NO_SIZE,
+    NO_SLOPE,
+    ROUNDING,
+    TINY,
+    TOUCHING,
+    UNDERFLOW,
+    UNDERFLOW_SQUARED,
+)
 
 
 class Pair(NamedTuple):
@@ -154,7 +166,7 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
 
 def normalised(pair: Pair) -> Pair:
     """The pair on the unit circle: the closest angle where `linear` found no real root."""
-    size = np.sqrt(np.maximum(pair.c * pair.c + pair.s * pair.s, 1e-300))
+    size = np.sqrt(np.maximum(pair.c * pair.c + pair.s * pair.s, TINY))
     return Pair(pair.c / size, pair.s / size)
 
 
@@ -223,7 +235,7 @@ def half_tangent(pair: Pair) -> Entry:
     ahead = pair.c > 0.0
     below = np.where(ahead, 1.0 + pair.c, pair.s)
     above = np.where(ahead, pair.s, 1.0 - pair.c)
-    far = np.abs(below) < 1e-9
+    far = np.abs(below) < AT_INFINITY
     return np.where(far, 1e9, above / np.where(far, 1.0, below))
 
 
@@ -244,7 +256,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     size = arrays.add(abs(ecc), abs(ess))
     for v in (e0, ec, es, ecs):
         size = arrays.add(size, abs(v))
-    inverse = 1.0 / np.maximum(size, 1e-12 * scale)
+    inverse = 1.0 / np.maximum(size, NO_SIZE * scale)
     # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
@@ -262,29 +274,29 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     ]
     squares = [columns[i][i] for i in range(3)]
     column = _longest(squares, columns)
-    down = 1.0 / np.sqrt(np.maximum(np.maximum(squares[0], np.maximum(squares[1], squares[2])), 1e-15))
+    down = 1.0 / np.sqrt(np.maximum(np.maximum(squares[0], np.maximum(squares[1], squares[2])), ROUNDING))
     px, py, pz = (down * value for value in column)
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
     flipped = [list(row) for row in zip(*rows, strict=True)]
     lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
     lx, ly, lz = (np.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
     # a line at infinity has no direction
-    lx = lx + 1e-100
+    lx = lx + UNDERFLOW
     h2 = lx * lx + ly * ly
     disc = h2 - lz * lz
-    pair, _ = linear(lx, ly, -lz, 1, 1e-140, None, disc)
+    pair, _ = linear(lx, ly, -lz, 1, UNDERFLOW_SQUARED, None, disc)
     real = disc > -(TOUCHING**2) * h2
     c, s = pair
     for _ in range(2):
         value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
         slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
-        step = np.where(real, value * slope / (slope * slope + 1e-18), 0.0)
+        step = np.where(real, value * slope / (slope * slope + NO_SLOPE), 0.0)
         step = np.minimum(np.maximum(step, -0.01), 0.01)
         c, s = c + s * step, s - c * step
         shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
-    merging = (real & (np.abs(slope) < 1e-4)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
-    free = rest * size < 1e-12 * scale
+    merging = (real & (np.abs(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
+    free = rest * size < NO_SIZE * scale
     return _prefer(Pair(c, s), free, prefer), Doubt(merging | triple | free, free)
 
 
@@ -306,13 +318,13 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     disc = q * q + p3 * p3 * p3
     # one real root (Cardano) or three (Viete): the largest and the smallest of them
     root = np.sqrt(np.abs(disc))
-    A = np.cbrt(np.abs(q) + root + 1e-300)
+    A = np.cbrt(np.abs(q) + root + TINY)
     alone = np.copysign(A - p3 / A, -q)
     size = 2.0 * np.sqrt(np.maximum(-p3, 0.0))
     c, s = arrays.cos_sin(np.arctan2(root, -q) / 3.0)
     most = size * c
     least = -0.5 * size * (c + np.sqrt(3.0) * s)
-    span = np.sqrt(h) + 1e-12  # at an end, where two roots are double, rounding must not choose the double one
+    span = np.sqrt(h) + NO_SIZE  # at an end, where two roots are double, rounding must not choose the double one
     above = np.maximum(most + third - span, 0.0)
     below = np.maximum(-span - least - third, 0.0)
     # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
@@ -321,8 +333,8 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     for _ in range(2):
         value = ((x - w) * x + linear_) * x + rest
         slope = (3.0 * x - 2.0 * w) * x + linear_
-        x = x - value * slope / (slope * slope + 1e-30)
-    return x, np.abs(slope) < 1e-6
+        x = x - value * slope / (slope * slope + NO_CUBIC_SLOPE)
+    return x, np.abs(slope) < LEVEL_ROOT
 
 
 def _longest(sizes: list[Entry], vectors: list[list[Entry]]) -> list[Entry]:

@@ -38,7 +38,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import EXACT, NEAR
+from armkin.inverse.numeric.tolerances import EXACT, NEAR, NO_COEFFICIENT, NO_LENGTH, NO_SIZE, TINY
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
@@ -60,7 +60,7 @@ class Position:
         Raises UsageError if the three joints cannot place a point in space.
         """
         self.prismatic = [bool(p) for p in chain.prismatic[:3]]
-        self.scale = max(float(np.abs(chain.link[1:3, :3, 3]).max()), float(np.abs(tip).max()), 1e-9)
+        self.scale = max(float(np.abs(chain.link[1:3, :3, 3]).max()), float(np.abs(tip).max()), NO_LENGTH)
         self.from_base = pose.constant(inverse(chain.link[0]))
         L1, L2 = chain.link[1], chain.link[2]
         self.L1 = pose.constant(L1)
@@ -95,11 +95,11 @@ class Position:
         if self.prismatic[1]:
             # one unknown d2 (its square cancels in no combination): eliminate it between the rows
             self.regular = not self.prismatic[0] and self._is_regular(abs(float(self.rows[0, 2])))
-            if self.prismatic[0] and np.abs(self.A).max() < 1e-9:
+            if self.prismatic[0] and np.abs(self.A).max() < NO_COEFFICIENT:
                 raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
             return "joint 2 slides, so its value is eliminated first"
         U, S, _ = np.linalg.svd(scaled)
-        if S[0] < 1e-9:
+        if S[0] < NO_COEFFICIENT:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
         self.regular = self._is_regular(float(S[1] / S[0]))
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
@@ -168,7 +168,7 @@ class Position:
                     for j in range(3):
                         k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
-                d, doubt = quadratic(k[2], k[1], k[0], 0, size, 1e-12 * size * size, prefer[2])
+                d, doubt = quadratic(k[2], k[1], k[0], 0, size, NO_SIZE * size * size, prefer[2])
                 third = Pair(d, None)
             else:
                 power: Entry = 1.0
@@ -191,7 +191,7 @@ class Position:
     def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
-            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, 1e-12 * size, prefer[2])
+            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, NO_SIZE * size, prefer[2])
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
@@ -236,7 +236,7 @@ class Position:
             if third.s is None:
                 rest = arrays.sub(rest, arrays.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, 1e-300, None)
+            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, TINY, None)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
@@ -246,7 +246,7 @@ class Position:
         factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
         six = quadratics.total([*constant, curved, 0.0, 0.0], quadratics.product(d2, factor))
         if self.prismatic[2]:
-            d, doubt = quadratic(six[3], six[1], six[0], 0, size, 1e-12 * size * size, prefer[2])
+            d, doubt = quadratic(six[3], six[1], six[0], 0, size, NO_SIZE * size * size, prefer[2])
             third = Pair(d, None)
         else:
             third, doubt = quadratics.turn(six, size, prefer[2])
@@ -256,7 +256,7 @@ class Position:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         known, slope, other = coefficients
         if self.prismatic[2]:
-            if abs(slope) < 1e-12:
+            if abs(slope) < NO_SIZE:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(arrays.mul(-1.0 / slope, known), None), Doubt(np.zeros(1, bool))
         third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])

@@ -20,7 +20,7 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between
 from armkin.inverse.closed.three_link import ThreeLink
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
@@ -54,7 +54,7 @@ def fits(chain: Chain, tolerance: float, reach: float) -> bool:
     L1, L2, L3, L4, L5 = chain.link[1:6]
     if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
         return False
-    if any(is_parallel(L, max(tolerance, 1e-6)) for L in (L1, L4, L5)):
+    if any(is_parallel(L, max(tolerance, PARALLEL)) for L in (L1, L4, L5)):
         return False
     return float(np.hypot(*_meeting(L5)[1])) <= tolerance * reach
 
@@ -77,7 +77,7 @@ class ThreeParallel:
         self.to_joint2 = pose.constant(inverse(L1))
         self.back5, self.back4 = pose.constant(inverse(L5)), pose.constant(inverse(L4))
         self.height6, _ = _meeting(L5)
-        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), 1e-9)
+        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), NO_LENGTH)
         # common direction of the parallel axes, along joint 2's, seen from joint 5
         self.three_link = ThreeLink(L2, L3)
         m = self.three_link.sense4 * L4[2, :3]
@@ -93,7 +93,7 @@ class ThreeParallel:
         past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
         R23 = L2[:3, :3] @ L3[:3, :3]
         self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
-        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), 1e-9)
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), NO_LENGTH)
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""

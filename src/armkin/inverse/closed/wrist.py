@@ -8,7 +8,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, PARALLEL
 from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse
 
@@ -22,7 +22,7 @@ def foot(L: Array) -> Array:
 
 def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
     """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
-    if is_parallel(L4, 1e-6) or is_parallel(L5, 1e-6):
+    if is_parallel(L4, PARALLEL) or is_parallel(L5, PARALLEL):
         return None
     at4 = foot(L4)
     at5 = (inverse(L4) @ [*at4, 1.0])[:3]

@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.tolerances import ALIKE_QUADRATICS, EQUAL_ROOTS
 
-EQUAL = 1e-7  # [rad] roots no further apart may be one that two solutions share
-APART = 1e-4  # sine between two vectors of such a root; those of one that has one vector are 1e-7 apart
-ALIKE = 1e-5  # of the quadratics' size: by how much they may differ from multiples of one
 # (cos 3f, sin 3f, cos f, sin f) to (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f
 _CUBIC: Array = 0.25 * np.array([[1, 0, 3, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, -1, 0, 3]], dtype=float)
 _TWISTED = ((0, 2, 1, 1), (1, 3, 2, 2), (0, 3, 1, 2))  # quadratics of these: y0 y2 = y1^2 and so on
@@ -27,7 +25,7 @@ def pairs(pose: Int, x: Array) -> tuple[Int, Int]:
     angle = 2 * np.arctan(x)
     order = np.lexsort((angle, pose))
     close = np.zeros(len(pose) + 1, dtype=np.bool_)
-    close[1:-1] = (np.diff(pose[order]) == 0) & (np.diff(angle[order]) < EQUAL)
+    close[1:-1] = (np.diff(pose[order]) == 0) & (np.diff(angle[order]) < EQUAL_ROOTS)
     alone = close[1:-1] & ~close[:-2] & ~close[2:]
     first = np.flatnonzero(alone)
     return order[first], order[first + 1]
@@ -48,7 +46,7 @@ def products(a: Array, b: Array) -> tuple[Array, Bool]:
     _, size, V = np.linalg.svd(rows)
     q = V[:, 0]
     disc = q[:, 1] ** 2 - 4.0 * q[:, 0] * q[:, 2]
-    good = (size[:, 1] < ALIKE * size[:, 0]) & (disc > ALIKE)
+    good = (size[:, 1] < ALIKE_QUADRATICS * size[:, 0]) & (disc > ALIKE_QUADRATICS)
     # q0 s^2 + q1 s t + q2 t^2 = 0 without cancellation
     large = -0.5 * (q[:, 1] + np.copysign(np.sqrt(np.maximum(disc, 0.0)), q[:, 1]))
     weights = np.stack([np.stack([large, q[:, 0]], axis=1), np.stack([q[:, 2], large], axis=1)], axis=1)

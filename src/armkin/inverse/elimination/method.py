@@ -47,8 +47,25 @@ from armkin.inverse.elimination.joint_order import Role, roles
 from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
-from armkin.inverse.elimination.roots import NO_PRODUCT
-from armkin.inverse.numeric.tolerances import ELIMINATED, EXAMINED, GRAZING, SEED
+from armkin.inverse.numeric.tolerances import (
+    ALONE,
+    BLURRED_ROOT,
+    CLOSE_RESIDUAL,
+    ELIMINATED,
+    ERROR_FLOOR,
+    EXAMINED,
+    GRAZING,
+    NO_PRODUCT,
+    OWN_ROOT,
+    PAIRED,
+    RANK,
+    SAME_KEY,
+    SAME_ROOT,
+    SEED,
+    SHAKES,
+    STRAY,
+    UPRIGHT,
+)
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
@@ -57,10 +74,7 @@ CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13
 BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
-SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass moves the pose: see (v)
-OWN = 1e-6  # [rad, scaled length] how far a root may be off the answer that it stands for
 REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
-ALONE = 1e-3  # distance from which on a root is no half of a double one
 GUESSES = 8  # postures close to answers that are kept of a pose
 SAMPLES = 11  # random poses on which roles are compared
 # log10 of a role's raw error: nothing better needed, good enough, unfit
@@ -103,7 +117,7 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     goal[:, :3] = np.moveaxis(frame, -1, 0)
     size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
     # Collinear axes, say: no solution is isolated and no role can do better.
-    redundant = bool(np.all(size[:, -1] < 1e-9))
+    redundant = bool(np.all(size[:, -1] < RANK))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
     for slot, hidden in _SEARCH:
@@ -174,7 +188,7 @@ def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     nearest, spurious = _raw_error(pencil, closed, q, goal)
     if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, pencil)
-    error = float(np.quantile(np.log10(nearest + 1e-16), 0.9))
+    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
     # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
     cost = 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
     return _Rating(max(error, -11.0) + cost, error, pencil)
@@ -192,7 +206,7 @@ def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Arr
     target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
     frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
     spurious = found.rough.copy()
-    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > 1e-3)]] = True
+    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > STRAY)]] = True
     return nearest, spurious
 
 
@@ -292,23 +306,23 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.
     # A move of the pose may turn two close real roots into such a pair.
-    pair = 1e-4 + 10 * np.sqrt(shake)
+    pair = PAIRED + 10 * np.sqrt(shake)
     maybe = seed.tilt < pair
-    near = (done.residual < 1e-5) & (seed.tilt < max(pair, 1e-3)) if careful else done.residual < 1e-3
-    missed = ~good & ((seed.tilt < 1e-4) | near)
+    near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
+    missed = ~good & ((seed.tilt < UPRIGHT) | near)
     # A simple root, or a double one with one vector, whose vector is no product stands for nothing: a solution's vector
     # is a product, and such a root has no other vector.
-    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > 1e-3) & (shake == 0)
-    touch = good & ~empty & (seed.tilt > 0) & (seed.tilt < 1e-4)
+    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > STRAY) & (shake == 0)
+    touch = good & ~empty & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe & ~empty
     # A real root that was far from the answer it led to may have stood for another one.
-    strayed = good & (seed.tilt == 0) & (done.guess > 1e-3 + 30 * shake)
+    strayed = good & (seed.tilt == 0) & (done.guess > STRAY + 30 * shake)
     # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
     # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
     weakest = np.zeros(goal.shape[0])
     np.maximum.at(weakest, seed.pose[good], done.weakness[good])
     away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
-    own = (np.abs(away) < OWN) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    own = (np.abs(away) < OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
     # unless several solutions share the middle joints: these are one root
     some = np.flatnonzero(strayed & own)
     own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
@@ -321,9 +335,9 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     answers = _answers(closed, seed.pose, done, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
     stands = good & maybe & ~empty
-    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > 1e-5 + 10 * shake
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > BLURRED_ROOT + 10 * shake
     order = np.lexsort((hidden, pose))
-    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < 1e-4)
+    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < SAME_ROOT)
     close &= blurred[order][1:] | blurred[order][:-1]
     close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
@@ -331,7 +345,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     real = answers.take((seed.tilt[good] == 0) & ~empty[good])
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
-    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < 1e-5)
+    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
     if twice.any():  # different answers may have the same key: about one pose in 10,000
         pairs = np.flatnonzero(twice)
         step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])

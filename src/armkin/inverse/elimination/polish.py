@@ -10,11 +10,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import ELIMINATED
+from armkin.inverse.numeric.tolerances import CONVERGED, ELIMINATED, SLOWLY, STALE
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
-CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower
-SLOW, MORE = 1e-3, 3  # candidates this close that are no answers yet take so many steps more
+MORE = 3  # steps more for candidates this close that are no answers yet
 
 
 class Polished(NamedTuple):
@@ -121,7 +120,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         index = active[better]
         best[:, index], residual[index] = value[:, better], size[better]
         # While the residual falls steeply the last inverse Jacobian is good for one more step.
-        stale = np.flatnonzero((size > 1e-3 * last) & (size > CONVERGED)) if step else active
+        stale = np.flatnonzero((size > STALE * last) & (size > CONVERGED)) if step else active
         last = size
         if stale.size:
             chosen = slice(None) if stale.size == active.size else stale
@@ -135,7 +134,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        going = np.flatnonzero(size > CONVERGED if step < steps else (size > ELIMINATED) & (size < SLOW))
+        going = np.flatnonzero(size > CONVERGED if step < steps else (size > ELIMINATED) & (size < SLOWLY))
         if step == most or going.size == 0:
             break
         if going.size < active.size:

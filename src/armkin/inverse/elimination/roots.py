@@ -14,16 +14,22 @@ from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import INFINITE
+from armkin.inverse.numeric.tolerances import (
+    APART_VECTORS,
+    EQUAL_ROOTS,
+    FOLLOWS,
+    INFINITE,
+    NO_PRODUCT,
+    REAL_PAIR,
+    TINY,
+    TWIN_ROOTS,
+    UNDERFLOW,
+)
 from armkin.model.rotation import inverse
 
 Int = NDArray[np.int64]
-NO_PRODUCT = 1e-5  # defect from which a vector is surely that of no solution; those of some 36 arms had 1.3e-7 at most
 STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors are known far better than that
-TWINS = 1e-4  # distance of two roots that may be one double root: rounding parts them by its own root
 ONE = 1e3  # sine of the angle between their vectors over that distance, up to which they have one vector
-PAIR = 1e-10  # that sine times the distance: above it the two are not real, below rounding may have parted them
-FOLLOWS = 1e-3  # [rad, scaled length] end joints that follow from the middle ones are not farther off than that
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
 
 
@@ -84,7 +90,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.zeros(pose.size)
-    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWINS) & steady[pose])
+    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWIN_ROOTS) & steady[pose])
     gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
@@ -118,14 +124,14 @@ def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) 
     """The same, a double root that two solutions share with the vectors of these: see `equal_roots`."""
     count = len(seen.pose)
     # rounding made a complex pair of some
-    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < equal_roots.EQUAL))
+    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < EQUAL_ROOTS))
     pose, which, x, tilt, u = (np.concatenate([part, part[twin]]) for part in seen)
     u[count:] = vectors.imag[seen.pose[twin], :, seen.which[twin]]
     a, b = equal_roots.pairs(pose, x)
     first = u[a] / np.linalg.norm(u[a], axis=1, keepdims=True)
     second = u[b] - first * (first * u[b]).sum(axis=1, keepdims=True)
     size = np.linalg.norm(second, axis=1)
-    some = np.flatnonzero(size > equal_roots.APART * np.linalg.norm(u[b], axis=1))
+    some = np.flatnonzero(size > APART_VECTORS * np.linalg.norm(u[b], axis=1))
     a, b, first, second = a[some], b[some], first[some], second[some] / size[some, None]
     good = np.zeros(len(a), dtype=np.bool_)
     if len(a):
@@ -157,8 +163,8 @@ def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which:
     apart = away[row, twin]
     other = vectors[row, :, twin]
     sine = np.linalg.norm(other - v * (v.conj() * other).sum(axis=1, keepdims=True), axis=1)
-    double = (apart < TWINS) & (sine < ONE * apart)
-    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > PAIR)
+    double = (apart < TWIN_ROOTS) & (sine < ONE * apart)
+    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > REAL_PAIR)
     away[row, twin] = np.where(double | pair, np.inf, apart)
     return np.asarray(away.min(axis=1))
 
@@ -201,7 +207,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
     value = np.empty((3, v.shape[0]))
     if pencil.prismatic[hidden]:
-        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < 1e-100, 1e-100, x)
+        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < UNDERFLOW, UNDERFLOW, x)
     else:
         value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x)
     if pencil.prismatic[dialytic]:
@@ -219,14 +225,14 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     powers = np.stack([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)], axis=1)
     inner = v[:, :, 0] + v[:, :, 1] * np.cos(k)[:, None] + v[:, :, 2] * np.sin(k)[:, None]
     # a product's square is 2 x 2: of the powers, and of (1, cos, sin)
-    along = (inner * powers).sum(axis=1) ** 2 / (4.0 * np.maximum(size.sum(axis=(1, 2)), 1e-300))
+    along = (inner * powers).sum(axis=1) ** 2 / (4.0 * np.maximum(size.sum(axis=(1, 2)), TINY))
     return value, np.maximum(1.0 - along, 0.0)
 
 
 def _ratio(powers: Array) -> Array:
     """q from multiples of (1, q, q^2, ..) (M, k): the least-squares quotient of neighbours."""
     below = powers[:, :-1]
-    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), 1e-300)
+    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), TINY)
     return out
 
 
@@ -243,7 +249,7 @@ def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: A
     factors = recover[pose] if recover.shape[0] > 1 else recover
     one, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
     sign = np.where(one < 0, -1.0, 1.0)
-    safe = np.where(np.abs(one) < 1e-300, 1.0, one)
+    safe = np.where(np.abs(one) < TINY, 1.0, one)
     a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
     b = b1 / safe if is_b else np.arctan2(sign * b2, sign * b1)
     before = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)

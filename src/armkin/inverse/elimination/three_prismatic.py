@@ -21,13 +21,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination.line_features import joint_motion
+from armkin.inverse.numeric.tolerances import COPLANAR, MERGED_SLIDES, NEARLY_COPLANAR, PARALLEL_SLIDES
 
-PARALLEL = 1e-12  # sine between axes 1 and 3 below which joint 1 is free
 FREE = 0.7321  # [rad] its value there
 OTHERS = (0.0, 1.3, 2.9)  # [rad] values of it at which the slides' directions are compared, beside that one
-COPLANAR = 1e-12  # smallest singular value of the slides' directions below which they are coplanar
-MERGED = 3e-15  # square of the sine of half the angle between the two values of q2 below which they are one
-NEARLY = 1e-5  # smallest singular value and sine below which both happen at once, as far as arithmetic can tell
 
 
 def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
@@ -49,8 +46,8 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     off = np.hypot(B[:, 0, 2], B[:, 1, 2])
     one, other = off * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
     square = (one - other) * (one + other)
-    free = off < PARALLEL
-    square[(square < MERGED) & ~free] = 0.0
+    free = off < PARALLEL_SLIDES
+    square[(square < MERGED_SLIDES) & ~free] = 0.0
     half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
     middle = A[1] @ _turns(q2)[..., :3, :3] @ A[2]
@@ -64,10 +61,10 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
         return _with_slides(chain, prismatic, np.stack([q1, q2[rows], q3], axis=-1), goal[rows])
 
     q, weakest = whole(q1, np.ones(len(goal), bool))
-    sure = ~((square < NEARLY**2) & (weakest < NEARLY)) | free
-    sure[free] = weakest[free] > NEARLY
+    sure = ~((square < NEARLY_COPLANAR**2) & (weakest < NEARLY_COPLANAR)) | free
+    sure[free] = weakest[free] > NEARLY_COPLANAR
     for value in OTHERS if free.any() else ():
-        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < NEARLY
+        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < NEARLY_COPLANAR
     return q, sure
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from armkin.formula.arrays import Array
+from armkin.inverse.numeric.tolerances import NOISE
 
 
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:
@@ -22,7 +23,7 @@ def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Ar
         return np.asarray(function(matrix, *arguments))
     except np.linalg.LinAlgError:
         noise, nudge = np.random.default_rng(0), matrix.copy()
-        size = 1e-13 * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
+        size = NOISE * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
         for _ in range(8):  # the noise may itself cancel what is left of a pivot
             singular = np.linalg.slogdet(nudge).sign == 0
             nudge[singular] = (matrix + size * noise.standard_normal(matrix.shape[1:]))[singular]

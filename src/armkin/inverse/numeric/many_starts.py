@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SEED
+from armkin.inverse.numeric.tolerances import CONVERGING, SEED
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
 STARTS = 64
 STEPS, PATIENCE = 25, 8
-SLOW = (
-    1e-11  # residual above which a root was not reached: one of high order, to which each step goes a part of the way
-)
 ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes are parallel or at such angles
 
 
@@ -35,7 +32,7 @@ def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     if not len(row):
         return out
     q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
-    slow = np.flatnonzero((size > SLOW) & (size < SEED))
+    slow = np.flatnonzero((size > CONVERGING) & (size < SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
         better = newton.missing(arm, task, even, target[row[slow]]) < size[slow]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, wrapped
 from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.tolerances import CONVERGING, FAR_OFF, LEFT_OUT, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -56,7 +57,7 @@ def correct(
     q: Array,
     target: Array,
     steps: int = 6,
-    least: float = 1e-10,
+    least: float = LEFT_OUT,
     patience: int = 1000,
     stalled: float = np.inf,
 ) -> tuple[Array, Array]:
@@ -81,14 +82,14 @@ def correct(
         better = size < before
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
         # done when rounding is all that is left
-        least_gain = np.isfinite(size) & (size > 1e-15) & ((size > 1e-11) | (size < 0.5 * before))
+        least_gain = np.isfinite(size) & (size > ROUNDING) & ((size > CONVERGING) | (size < 0.5 * before))
         idle[active] = np.where((size < 0.9 * before) | (size > stalled), 0, idle[active] + 1)
         going = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)
         active, r, size = active[going], r[going], size[going]
         if k == steps or not len(active):
             break
         step = _least_step(J[going], r, np.maximum(least, 0.1 * size))
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
         q[active] += step * unit
     return best, best_size
 
@@ -108,7 +109,7 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
     few = np.flatnonzero(weak)
     if len(few):
         U, S, Vt = np.linalg.svd(J[few], full_matrices=False)
-        gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, 1e-300), 0.0)
+        gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, TINY), 0.0)
         step[few] = (Vt * (gain * (U * r[few, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
     return step
 
@@ -131,10 +132,10 @@ def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[A
         rows = active[better]
         best[rows], best_size[rows] = q[rows], size[better]
         step = nudged(np.linalg.solve, J, r[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
         q[active] += step * unit
         # a residual of rounding's size falls no further; a step that gains nothing is the last one
-        active = active[(size > 1e-15) & (gained | (size > 1e-3))]
+        active = active[(size > ROUNDING) & (gained | (size > FAR_OFF))]
     return best, best_size
 
 
@@ -158,5 +159,5 @@ def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Ar
     full[:, : S.shape[1]] = S
     # a task with an axis has one more row than constraints
     count = min(task.constraints, arm.n)
-    nullity = arm.n - (full > 1e-6).sum(axis=1)
+    nullity = arm.n - (full > WEAK).sum(axis=1)
     return full[:, count - 1], Vt, nullity - (arm.n - count)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import REACH, SOLUTION
+from armkin.inverse.numeric.tolerances import ARRIVED, FINEST, MOVED, REACH, SMOOTH, SOLUTION, TINY
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -27,16 +27,13 @@ if TYPE_CHECKING:
 NODES = 10  # values of t at which g and x are computed: polynomials of degree 9 are exact to rounding on `span`
 NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, of spans
 ITERATIONS = 8  # Newton steps onto the curve
-ARRIVED = 1e-9  # [rad, reaches] a step that ends them: its square is below rounding
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
-POINTS = np.concatenate([[0.0], np.geomspace(3e-6, 0.9, 40), [1.0]])  # of a span, where |g| is compared
+POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 0.9, 40), [1.0]])  # of a span, where |g| is compared
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 HALVINGS = 20  # of an interval between two points: to a millionth of it
 FINE = 33  # points of a component at which its slope is compared
-SMOOTH = 1e-5  # of a span: how far polynomials may be off their curve
-MOVED = 1e-3  # of the way: a joint that moves less along a component does not move
 
 
 class Structure(NamedTuple):
@@ -204,7 +201,7 @@ def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     slope = _values(g[1:] * np.arange(1, NODES)[:, None, None], s) / span[:, None]  # (FINE, M, k)
     steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
     up = slope[steepest, np.arange(len(rows))]
-    along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), 1e-300)
+    along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), TINY)
     out.known[rows] = long | (below & above)
     out.manifold[rows], out.boundary[rows] = long, ~long & (along.min(axis=0) <= SOLUTION)
     out.joints[rows] = long[:, None] & (extent > MOVED * extent.max(axis=1)[:, None])

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import RedundantArmError, UsageError
 from armkin.formula.arrays import Array
+from armkin.inverse.numeric.tolerances import INDEPENDENT, NEARLY_PARALLEL
 from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
 from armkin.model.chain import Chain, axes
@@ -16,8 +17,6 @@ from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-
-PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
 
 
 def task_for(arm: Arm, name: str | None = None) -> Task:
@@ -68,7 +67,7 @@ def default_task(arm: Arm) -> str | None:
     return None
 
 
-def rank(arm: Arm, task: Task, tolerance: float = 1e-4) -> int:
+def rank(arm: Arm, task: Task, tolerance: float = INDEPENDENT) -> int:
     """Rank of the task's Jacobian at poses in general position; tolerance: of the reach, and in rad."""
     from armkin.forward import fk, jacobian
 
@@ -103,14 +102,14 @@ def _along(directions: Array, reference: Array) -> NDArray[np.float64]:
     """+1 or -1 where a direction is parallel or antiparallel to the reference, else 0."""
     cosine = directions @ reference
     across = np.linalg.norm(np.cross(directions, reference), axis=1)
-    return np.where(across < PARALLEL, np.sign(cosine), 0.0)
+    return np.where(across < NEARLY_PARALLEL, np.sign(cosine), 0.0)
 
 
 def _planar(arm: Arm, name: str) -> Task | str:
     w = _directions(arm)
     z = np.array([0.0, 0.0, 1.0])
     turns = np.where(arm.prismatic, 0.0, _along(w, z))
-    if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ z) > PARALLEL).any():
+    if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ z) > NEARLY_PARALLEL).any():
         return "its joints do not all move in the base's x-y plane"
     if name == "xy":
         return _plain(arm, name, 2, np.zeros((0, arm.n)), np.zeros(0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from armkin.formula.arrays import Array, wrapped
+from armkin.inverse.numeric.tolerances import HALF_TURN, NO_SIZE, SMALL_TURN, TINY
 from armkin.inverse.tasks.task import Task
 
 
@@ -20,7 +21,7 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         # half the sum of the columns' vector products is the rotation vector to third order
         C = R @ np.swapaxes(Rt, 1, 2)
         w = 0.5 * np.stack([C[:, 1, 2] - C[:, 2, 1], C[:, 2, 0] - C[:, 0, 2], C[:, 0, 1] - C[:, 1, 0]], axis=1)
-        far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - 1e-8
+        far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
         if far.any():
             w[far] = _rotation_vector(np.swapaxes(C[far], 1, 2))
         parts.append(w)
@@ -36,8 +37,8 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
             sine = np.linalg.norm(w, axis=1)
             cosine = np.einsum("mi,mi->m", z, target[:, 3:])
             angle = np.arctan2(sine, cosine)
-            w = np.where(sine[:, None] > 1e-12, w * (angle / np.maximum(sine, 1e-300))[:, None], w)
-            half = (sine <= 1e-12) & (cosine < 0)  # opposed: any axis across will do
+            w = np.where(sine[:, None] > NO_SIZE, w * (angle / np.maximum(sine, TINY))[:, None], w)
+            half = (sine <= NO_SIZE) & (cosine < 0)  # opposed: any axis across will do
             w[half] = np.pi * T[half][:, :3, 0]
             parts.append(w)
     return np.concatenate(parts, axis=1)
@@ -69,12 +70,12 @@ def _rotation_vector(R: Array) -> Array:
     s = np.linalg.norm(w, axis=1)
     c = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
     angle = np.arctan2(s, c)
-    near_half = s < 1e-6
+    near_half = s < HALF_TURN
     if near_half.any():
         B = R[near_half] + np.eye(3)
         k = np.argmax(np.einsum("mij,mij->mj", B, B), axis=1)
         axis = B[np.arange(len(B)), :, k]
-        w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+        w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
         s = np.where(near_half, 1.0, s)
-    out: Array = w * (angle / np.maximum(s, 1e-300))[:, None]
+    out: Array = w * (angle / np.maximum(s, TINY))[:, None]
     return out

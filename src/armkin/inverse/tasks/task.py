@@ -22,6 +22,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.trace import StraightLineCode
+from armkin.inverse.numeric.tolerances import AROUND, NO_SIZE, ROTATION, ROUNDED
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -37,8 +38,6 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
-ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
-ROUNDED = 1e-14  # and that needs no correction
 LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
 
 
@@ -108,7 +107,7 @@ def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         _refuse_wild(flat)
     if task.orientation == "axis":
         length = np.linalg.norm(flat[:, 3:], axis=1, keepdims=True)
-        if (length < 1e-12).any():
+        if (length < NO_SIZE).any():
             raise UsageError("a target's axis ax ay az has no length; give the direction of the tool's z axis")
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
     return flat, values.shape[: values.ndim - len(shape)]
@@ -205,7 +204,7 @@ def moved(arm: Arm, task: Task, target: Array, by: Array) -> Array:
     return out
 
 
-def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = 1e-4) -> Array:
+def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND) -> Array:
     """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
     ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
     return np.stack([moved(arm, task, target, sign * by) for by in ways for sign in (1.0, -1.0)], axis=1)

@@ -1,0 +1,27 @@
+"""Small numbers have a name and a reason, in one place."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import armkin.inverse
+
+ROOM = Path(armkin.inverse.__file__).parent
+TOLERANCES = ROOM / "numeric" / "tolerances.py"
+
+
+def small(file: Path) -> list[int]:
+    """Lines of a file with a float between 0 and 0.01."""
+    numbers = (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Constant))
+    return [node.lineno for node in numbers if isinstance(node.value, float) and 0.0 < node.value < 0.01]
+
+
+def test_no_number_below_a_hundredth_stands_elsewhere() -> None:
+    found = {str(file.relative_to(ROOM)): small(file) for file in ROOM.rglob("*.py") if file != TOLERANCES}
+    assert {file: lines for file, lines in found.items() if lines} == {}
+
+
+def test_each_has_a_name_and_a_comment() -> None:
+    lines = TOLERANCES.read_text().splitlines()
+    assert all("  # " in lines[number - 1] for number in small(TOLERANCES))
