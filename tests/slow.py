@@ -119,7 +119,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "export/test_words.py": ("test_a_table_is_the_same_arm",),
     "firmware/test_handshake.py": (),
     "firmware/test_latencies.py": (),
-    "firmware/test_proof.py": (),
+    "firmware/test_proved_core.py": (),
     "formula/test_recorder.py": (
         "test_exact_operations_are_numpys_to_the_last_bit",
         "test_other_operations_are_numpys_to_rounding",
