@@ -49,7 +49,7 @@ MAY_IMPORT: dict[str, str] = {
     "export/c": "keep_out keep_out/shapes"
     " errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
     " inverse/elimination inverse/branches",
-    "export/js": "errors formula model forward inverse inverse/tasks inverse/closed inverse/elimination"
+    "export/js": "errors formula model forward inverse inverse/tasks inverse/closed inverse/numeric inverse/elimination"
     " inverse/branches keep_out motors export/c",
     "compiled": "keep_out keep_out/shapes"
     " errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"

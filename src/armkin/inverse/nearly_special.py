@@ -33,11 +33,11 @@ from armkin.inverse.numeric.tolerances import (
     BLURRED,
     HOPELESS,
     NEAR,
-    NEARLY_PARALLEL,
     ROUNDED_ANSWER,
     SOLUTION,
     STEADY,
 )
+from armkin.inverse.tasks.fitting import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
 

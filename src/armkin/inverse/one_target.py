@@ -21,10 +21,10 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.near_itself import room
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, ROUNDED, THERE
+from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
 from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions, Status
-from armkin.inverse.tasks.task import LARGEST, rotation_check
+from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
 from armkin.model.arm import actual
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach

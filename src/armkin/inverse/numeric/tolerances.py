@@ -1,5 +1,7 @@
 """Every tolerance of the solvers, and every number below 0.01, in one place.
 
+Those that say which targets are read and which task fits stand in `armkin.inverse.tasks`, which this room imports.
+
 Lengths are in units of the arm's reach, angles in rad, unless a line says otherwise.
 """
 
@@ -105,10 +107,6 @@ MOVED = 1e-3  # of the way: a joint that moves less along a component does not m
 DOUBLE_ROOT = 3e-4  # [rad] how far rounding parts a candidate from its root at most
 ROOT_ROUNDING = 1e-13  # that way times the smallest singular value
 DECIMAL = 4e-16  # relative distance of a number from a decimal one that it is printed as
-INDEPENDENT = 1e-4  # singular value of a task's independent rows
-HALF_TURN = 1e-6  # sine of the angle of a rotation that is about half a turn
-SMALL_TURN = 1e-8  # by how much the trace of a small rotation is below 3
-AROUND = 1e-4  # [reaches, rad] how far targets around one are from it
 SHORTEST_STEP = 1e-4  # [rad, reaches] along a curve of a self-motion
 OFF_CURVE = 1e-6  # residual above which the joints move no farther
 CROSSING = 2e-4  # second smallest singular value below which another curve may cross
@@ -146,9 +144,6 @@ ARRIVED = 1e-9  # [rad, reaches] a step that ends them: its square is below roun
 SMOOTH = 1e-5  # of a span: how far polynomials may be off their curve
 EQUAL_RESIDUALS = 1e-14  # residuals below this are equal
 RESTING = 1e-9  # [rad, reaches] a radian: joints that move less do not move
-NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
-ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
-ROUNDED = 1e-14  # distance from orthonormal columns that needs no correction
 LEAST_COST = 1e-30  # a cost that shares are taken of is no smaller
 LOOSE = 1e-12  # singular value, relative, of axes that a closed form takes for exact
 SHAKE = 1e-4  # [reaches, rad] by how much a target is moved to where nothing is free

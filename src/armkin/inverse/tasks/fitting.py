@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import RedundantArmError, UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import INDEPENDENT, NEARLY_PARALLEL
 from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
 from armkin.model.chain import Chain, axes
@@ -17,6 +16,9 @@ from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
+INDEPENDENT = 1e-4  # singular value of a task's independent rows
 
 
 def task_for(arm: Arm, name: str | None = None) -> Task:

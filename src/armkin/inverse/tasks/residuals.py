@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from armkin.formula.arrays import Array, wrapped
-from armkin.inverse.numeric.tolerances import HALF_TURN, NO_SIZE, SMALL_TURN, TINY
-from armkin.inverse.tasks.task import Task
+from armkin.inverse.tasks.task import NO_DIRECTION, Task
+
+SMALL_TURN = 1e-8  # by how much the trace of a small rotation is below 3
+HALF_TURN = 1e-6  # sine of the angle of a rotation that is about half a turn
+TINY = 1e-300  # keeps a quotient finite where its divisor is zero
 
 
 def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
@@ -37,8 +40,8 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
             sine = np.linalg.norm(w, axis=1)
             cosine = np.einsum("mi,mi->m", z, target[:, 3:])
             angle = np.arctan2(sine, cosine)
-            w = np.where(sine[:, None] > NO_SIZE, w * (angle / np.maximum(sine, TINY))[:, None], w)
-            half = (sine <= NO_SIZE) & (cosine < 0)  # opposed: any axis across will do
+            w = np.where(sine[:, None] > NO_DIRECTION, w * (angle / np.maximum(sine, TINY))[:, None], w)
+            half = (sine <= NO_DIRECTION) & (cosine < 0)  # opposed: any axis across will do
             w[half] = np.pi * T[half][:, :3, 0]
             parts.append(w)
     return np.concatenate(parts, axis=1)

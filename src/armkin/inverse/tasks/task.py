@@ -22,7 +22,6 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.trace import StraightLineCode
-from armkin.inverse.numeric.tolerances import AROUND, NO_SIZE, ROTATION, ROUNDED
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -38,6 +37,10 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
+ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
+ROUNDED = 1e-14  # distance from orthonormal columns that needs no correction
+NO_DIRECTION = 1e-12  # a vector that short
+AROUND = 1e-4  # [reaches, rad] how far targets around one are from it
 LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
 
 
@@ -107,7 +110,7 @@ def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         _refuse_wild(flat)
     if task.orientation == "axis":
         length = np.linalg.norm(flat[:, 3:], axis=1, keepdims=True)
-        if (length < NO_SIZE).any():
+        if (length < NO_DIRECTION).any():
             raise UsageError("a target's axis ax ay az has no length; give the direction of the tool's z axis")
         flat = np.concatenate([flat[:, :3], flat[:, 3:] / length], axis=1)
     return flat, values.shape[: values.ndim - len(shape)]
