@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import itertools
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import IO, TYPE_CHECKING
 
 from armkin import files
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 WORTH = 2_000  # rows for which pyarrow is worth its import
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
+AT_ONCE = 64  # lines read before their lengths are looked at
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
@@ -230,10 +233,14 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
 
 def lines_of(file: IO[bytes], source: str) -> list[bytes]:
     lines: list[bytes] = []
-    while len(lines) < ROWS and (line := _line(file, source)):
-        lines.append(line)
-        if len(line) >= LONGEST:  # no use in reading on
-            break
+    endless = iter(partial(file.readline, LONGEST), b"")
+    try:
+        while some := list(itertools.islice(endless, min(ROWS - len(lines), AT_ONCE))):
+            lines += some
+            if max(map(len, some)) >= LONGEST:  # no use in reading on
+                break
+    except (OSError, ValueError) as error:  # ValueError: closed
+        raise _unread(source, error) from None
     return lines
 
 
@@ -241,8 +248,11 @@ def _line(file: IO[bytes], source: str) -> bytes:
     try:
         return file.readline(LONGEST)
     except (OSError, ValueError) as error:  # ValueError: closed
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"{name_of(source)}: cannot read: {reason}") from None
+        raise _unread(source, error) from None
+
+
+def _unread(source: str, error: Exception) -> FileError:
+    return FileError(f"{name_of(source)}: cannot read: {getattr(error, 'strerror', None) or error}")
 
 
 def name_of(source: str) -> str:

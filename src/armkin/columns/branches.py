@@ -46,7 +46,7 @@ def listed(request: choose.Request, targets: Array, rows: NDArray[np.integer], e
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
         q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, s.q)
         within = within & ~limits.outside(arm, q).any(axis=-1)
-    motion = units.joints_out(arm, np.abs(q - near)).sum(axis=-1)
+    motion = _sum(units.joints_out(arm, np.abs(q - near)))
     key = np.where(s.valid, motion.round(EQUAL), np.inf)
     free = within & s.clear if arm.keep_out else within
     wanted = free if request.branch is None else free & np.isin(s.branch, find(s.names, request.branch))
@@ -65,6 +65,16 @@ def listed(request: choose.Request, targets: Array, rows: NDArray[np.integer], e
     chosen = target[there], branch
     table = _table(request, s, rows[target], target, there, q[chosen], within[chosen], motion[chosen], chosen)
     return Listed(table, unsolved)
+
+
+def _sum(values: Array) -> Array:
+    """``values.sum(axis=-1)``, to the same bits: numpy adds up to seven numbers from left to right, but slowly."""
+    if values.shape[-1] > 7:
+        return np.asarray(values.sum(axis=-1))
+    total = values[..., 0].copy()
+    for i in range(1, values.shape[-1]):
+        total += values[..., i]
+    return total
 
 
 def _table(

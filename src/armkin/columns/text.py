@@ -71,12 +71,13 @@ def _arrow() -> Any:
 
 
 def _by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
-    pieces: list[Any] = []
-    for before, column in zip(between, table.values(), strict=False):
-        if before:
-            pieces.append(pa.scalar(before))
-        pieces.append(_arrow_texts(pa, column, quoted, missing))
-    lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[-1]), "")
+    pieces = [_arrow_texts(pa, column, quoted, missing) for column in table.values()]
+    if len(set(between[1:-1])) <= 1 and not between[0]:  # one separator: half as many pieces to join
+        lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[1]))
+        lines = pa.compute.binary_join_element_wise(lines, pa.scalar(""), pa.scalar(between[-1]))
+    else:
+        every = [piece for pair in zip(map(pa.scalar, between), pieces, strict=False) for piece in pair]
+        lines = pa.compute.binary_join_element_wise(*every, pa.scalar(between[-1]), pa.scalar(""))
     _, offsets, data = lines.buffers()
     ends = np.frombuffer(offsets, np.int32, len(lines) + 1, 4 * lines.offset)
     return bytes(memoryview(data)[ends[0] : ends[-1]])

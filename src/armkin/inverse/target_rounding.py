@@ -70,14 +70,16 @@ def printed(units: Sequence[str], values: Array, reach: float) -> Array:
     Half the last decimal of each number that has three or more, together; 390 and 400.0 are exact.
     """
     values = np.asarray(values, float).reshape(-1, len(units))
-    off = np.zeros_like(values)
-    left = np.ones(values.shape, bool)
+    off = np.zeros(values.size)
+    left, number = np.arange(values.size), values.ravel()
     for decimals in range(MOST):
-        scaled = values * 10.0**decimals
-        here = left & (np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0))
+        scaled = number * 10.0**decimals
+        here = np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0)
         if decimals >= FEWEST:
-            off[here] = 0.5 * 10.0**-decimals
-        left &= ~here
+            off[left[here]] = 0.5 * 10.0**-decimals
+        left, number = left[~here], number[~here]
+        if not len(left):
+            break
     scale = [np.pi / 180.0 if unit == "deg" else 1.0 / reach if unit == "mm" else 1.0 for unit in units]
-    size: Array = np.linalg.norm(off * scale, axis=1)
+    size: Array = np.linalg.norm(off.reshape(values.shape) * scale, axis=1)
     return size

@@ -114,10 +114,11 @@ def transforms(xyz: Array, rpy: Array) -> Array:
 
 
 def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
-    """`cos_sin_deg` of many; by the same functions of single numbers, as numpy's differ in the last bit."""
-    flat = (angles * (math.pi / 180)).ravel().tolist()
-    cosine = np.array([math.cos(angle) for angle in flat]).reshape(angles.shape)
-    sine = np.array([math.sin(angle) for angle in flat]).reshape(angles.shape)
+    """`cos_sin_deg` of many; by the C library's functions of single numbers, as numpy's differ in the last bit."""
+    turn = np.zeros(angles.shape, complex)
+    turn.imag = angles * (math.pi / 180)
+    np.exp(turn, out=turn)  # of an imaginary number: the C library's cosine and sine
+    cosine, sine = turn.real.copy(), turn.imag.copy()
     quarter, rest = np.divmod(angles, 90.0)
     exact = rest == 0.0
     if exact.any():
