@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 WORTH = 2_000  # rows for which pyarrow is worth its import
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
-AT_ONCE = 64  # lines read before their lengths are looked at
+AT_ONCE = 8  # lines read before their lengths are looked at
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
