@@ -42,7 +42,7 @@ MAY_IMPORT: dict[str, str] = {
     "path_file": "errors robot_file",
     "motion": "keep_out keep_out/shapes"
     " errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
-    "reachability": "keep_out keep_out/shapes errors files formula model forward motors columns engines"
+    "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
     " inverse inverse/tasks",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",

@@ -12,7 +12,7 @@ from armkin.errors import UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.reachability import place as places
-from command_line import run
+from command_line import ROOT, run
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof", "planar_3dof", "so101", "stanford"])
@@ -64,6 +64,63 @@ def test_the_command_tells_the_best_and_exits_3_where_none_reaches_all(tmp_path:
     assert none.code == 3
     assert none.json["robots"][0]["best"]["reached"] == 1
     assert "no place reaches all 2 targets; three_dof reaches 1 at best" in none.err
+
+
+def test_a_scene_stands_with_the_targets(tmp_path: Path) -> None:
+    """Each place against the arm whose robot file has that base, in the same scene."""
+    scene = ROOT / "examples/scenes/three_dof.yaml"
+    targets, rng = [[500.0, 0.0, 200.0], [420.0, 160.0, 90.0]], np.random.default_rng(5)
+    settings = {"area": (-200.0, 800.0, -600.0, 600.0), "step": 200.0, "yaw": float(np.radians(90.0))}
+    [found] = armkin.place(armkin.load("three_dof"), targets, scene=scene, **settings)  # type: ignore[arg-type]
+    [alone] = armkin.place(armkin.load("three_dof"), targets, **settings)  # type: ignore[arg-type]
+    [loaded] = armkin.place(armkin.load("three_dof", scene=scene), targets, **settings)  # type: ignore[arg-type]
+    assert np.array_equal(found.reached, loaded.reached)
+    assert found.reached.sum() < alone.reached.sum()
+    text = (ROOT / "robots/three_dof.yaml").read_text()
+    assert "\nbase:" not in text
+    asked = 0
+    for i, j, k in rng.permutation(np.argwhere(alone.reached > 0))[:12]:
+        x, y, yaw = float(found.x[i]), float(found.y[j]), float(np.degrees(found.yaw[k]))
+        if 245 <= x <= 555 and abs(y) <= 305:
+            assert found.reached[i, j, k] == 0  # its base would stand in the table
+            continue
+        moved = tmp_path / "moved.yaml"
+        moved.write_text(f"{text}\nbase: {{xyz: [{x}, {y}, 0], rpy: [0, 0, {yaw}]}}\n")
+        s = armkin.ik(armkin.load(moved, scene=scene), targets)
+        assert (s.within_limits & s.clear).any(axis=1).sum() == found.reached[i, j, k]
+        asked += 1
+    assert asked > 4
+
+
+@pytest.mark.parametrize("end", ["npz", "csv"])
+def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str) -> None:
+    path, whole, out = tmp_path / "targets.csv", tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
+    path.write_text("x,y,z\n600,0,200\n600,300,200\n")
+    monkeypatch.setattr(places, "SOLVES", 40)
+    words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
+    done = run(*words, "--out", whole)
+    work, answered = places.work, 0
+
+    def stops(*given: object) -> object:
+        nonlocal answered
+        answered += 1
+        if answered == 5:
+            raise KeyboardInterrupt
+        return work(*given)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(places, "work", stops)
+        assert run(*words, "--out", out).code == 130
+    other = run("place", "three_dof", path, "--step", 100, "--out", out)
+    assert other.code == 2
+    assert "belongs to another job" in other.err
+    assert run(*words, "--out", out) == done
+    assert out.read_bytes() == whole.read_bytes()
+    assert {file.name for file in tmp_path.iterdir()} == {path.name, whole.name, out.name}
+    if end == "csv":
+        rows = whole.read_text().splitlines()
+        assert rows[0] == "robot,x_mm,y_mm,z_mm,yaw_deg,reached,of,margin_mm"
+        assert {row.split(",")[0] for row in rows[1:]} == {"three_dof", "roarm_m2"}
 
 
 def test_bad_input_is_told(tmp_path: Path) -> None:

@@ -176,7 +176,7 @@ class Batch:
     def _stream(self, format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
         """To a pipe, piece by piece; what is no text when all is there."""
         kept: list[bytes] = []
-        with _binary(self.out) as write, output.progress("rows") as tick:
+        with _binary(self.out) as write, output.progress("rows", pieces.count) as tick:
             for done in in_order(self.engine, work, job, pieces):
                 if format.is_text:
                     write(_headed(done, job, format, tally) + done.data)
@@ -238,7 +238,7 @@ class _ToFile:
         else:
             self.parts.refuse_begun()
         try:
-            with output.progress("rows") as tick:
+            with output.progress("rows", pieces.count) as tick:
                 for done in in_order(self.batch.engine, work, self.job, self._missing(pieces)):
                     self._keep(done)
                     tick(self.tally.rows)

@@ -5,7 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
@@ -149,37 +149,42 @@ def _coloured(stream: TextIO) -> bool:
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
+class Tick(Protocol):
+    """How far a command has come: done, and of how many where that is known only then."""
+
+    def __call__(self, done: int, total: int | None = None) -> None: ...
+
+
 @contextmanager
-def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A bar on stderr, or a counter without a total, if that is a terminal; call it with the count so far."""
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda done: None
+def progress(what: str, total: int | Callable[[], int | None] | None = None) -> Iterator[Tick]:
+    """A bar with rate and time left on stderr, or a counter without a total, if that is a terminal.
+
+    Call it with the count so far. total: or a function that finds it out, called on a terminal alone.
+    """
+    if sys.stderr is None or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+        yield lambda done, total=None: None
         return
-    import shutil
     import time
 
-    last = time.monotonic() - (0.2 if total else 0.0)  # how long a counter takes is not known
-    shown = False
+    known = total() if callable(total) else total
+    began = last = time.monotonic()
+    shown: Any = None
 
-    def tick(done: int) -> None:
-        nonlocal last, shown
-        if (now := time.monotonic()) - last >= 0.2 or done == total:
-            last, shown = now, True
-            line = bar(done, total, what) if total else f"{done:,} {what}"
-            print(f"\r{line[: shutil.get_terminal_size().columns - 1]}\x1b[K", end="", file=sys.stderr, flush=True)
+    def tick(done: int, total: int | None = None) -> None:
+        nonlocal last, shown, known
+        known = total or known
+        now = time.monotonic()
+        if now - last < 0.2 and done != known:
+            return
+        last = now
+        if shown is None:
+            from armkin.cli.progress_bar import begun
+
+            shown = begun(what)
+        shown.tell(done, known, now - began)
 
     try:
         yield tick
     finally:
-        if shown:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
-
-
-def bar(done: int, total: int, what: str, width: int = 24) -> str:
-    """How far a long command has come.
-
-    >>> bar(1_250_000, 3_000_000, "samples")
-    '[##########..............]  41 %  1,250,000 of 3,000,000 samples'
-    """
-    full = width * done // total
-    return f"[{'#' * full}{'.' * (width - full)}] {100 * done // total:3d} %  {done:,} of {total:,} {what}"
+        if shown is not None:
+            shown.end()

@@ -60,6 +60,16 @@ class Rows:
         """Of the file [bytes]; None for what is no file."""
         return os.path.getsize(self.source) if self.source is not None and os.path.isfile(self.source) else None
 
+    def count(self) -> int | None:
+        """How many rows there are to come, for the progress; None: not known before they are read."""
+        if self.source is None:
+            return len(self.values)
+        text = not self.source.lower().endswith((".npz", ".parquet"))
+        if not text or not os.path.isfile(self.source):
+            return None
+        with csv_rows.opened(self.source) as file:
+            return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
+
     def __iter__(self) -> Iterator[Piece]:
         if self.source is None:
             import numpy as np

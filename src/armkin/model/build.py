@@ -91,7 +91,7 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     if scene is not None:
         fields["keep_out"] = (*file.keep_out, *scene.keep_out)
         fields["clearance"] = max(file.clearance, scene.clearance)
-        fields |= {"scene": scene.path, "scene_sha256": scene.sha256}
+        fields |= {"scene": scene.path, "scene_sha256": scene.sha256, "of_scene": len(scene.keep_out)}
     return fields
 
 

@@ -11,7 +11,8 @@ Where, with which orientations, by how many branches:
 cells.py     rings of cells about joint 1's axis, and the orientations in each
 answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
 map.py       `reach`: all rings, in chunks, by any engine
-place.py     `place`: where to put an arm for given targets
+place.py     `place`: where to put an arm for given targets; place_file.py: its columns
+standing.py  an arm at a place, among what stands with the targets
 """
 
 from armkin.reachability.survey import Workspace, workspace

@@ -3,18 +3,25 @@
 A place is a position of the arm's frame (the one in which its targets are given, before its `base`) on a grid in the
 plane of the targets' frame, and a yaw about its z axis. Where joint 1's axis is the frame's z axis, a yaw adds to joint
 1 alone: one solve a target and position answers all yaws as an arc. Other arms are asked yaw by yaw.
+
+The robot's own keep-outs move with it; those of a scene stand with the targets.
 """
 
 from __future__ import annotations
 
+import io
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin import files
+from armkin.columns import npz
+from armkin.columns.parts import Parts, digest
 from armkin.engines.run import Engine, in_order
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -25,6 +32,7 @@ from armkin.inverse.tasks.task import Task, read_targets
 from armkin.model.rotation import rotation_about
 from armkin.reachability.answers import TURN, arc, inside, limit_margin
 from armkin.reachability.cells import STRAIGHT
+from armkin.reachability.standing import Around, apart, free
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -73,21 +81,24 @@ class Question(NamedTuple):
     yaws: int
     step: float  # [rad] of the yaw
     z: float
+    around: Around = Around()
 
     @property
     def arcs(self) -> bool:
         """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
         arm, axis = self.arm, self.arm.link[0]
         upright = np.abs(axis[:2, 2]).max() <= STRAIGHT and np.abs(axis[:2, 3]).max() <= STRAIGHT * arm.reach
-        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and not arm.keep_out
+        free = not arm.keep_out and not self.around.keep_out
+        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and free
         whole = abs(self.yaws * self.step - TURN) < STRAIGHT
         return bool(upright) and plain and whole and arm.n == self.task.constraints
 
 
 class Chunk(NamedTuple):
-    """Some positions: (P, 2) [mm]."""
+    """Some positions (P, 2) [mm] of one arm."""
 
     number: int
+    which: int  # of the questions
     at: Array
 
 
@@ -99,6 +110,8 @@ def place(
     step: float = 50.0,
     yaw: float = math.radians(15.0),
     z: float = 0.0,
+    scene: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
     workers: int = 1,
     cluster: str | None = None,
     progress: Callable[[int], None] | None = None,
@@ -106,7 +119,9 @@ def place(
     """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task.
 
     area: x and y, each from and to [mm], by default the targets' box grown by the arm's reach; step [mm] and yaw [rad]
-    of the places; z [mm] of all. workers, cluster: see `armkin.reach`; progress gets the positions done.
+    of the places; z [mm] of all. scene: keep-outs that stand with the targets. out: what is finished stays beside that
+    file until `armkin.reachability.place_file.write` has written it: after a kill it goes on. workers, cluster: see
+    `armkin.reach`; progress gets the positions done.
 
     >>> import armkin
     >>> [found] = armkin.place(armkin.load("three_dof"), [[600, 0, 200], [600, 300, 200]], step=100.0)
@@ -114,41 +129,95 @@ def place(
     (True, 2)
     """
     several = [arms] if not isinstance(arms, Sequence) else list(arms)
-    return [_placed(arm, targets, area, step, yaw, z, Engine(workers, cluster), progress) for arm in several]
+    settings = {"area": area, "step": step, "yaw": yaw, "z": z}
+    told = None if progress is None else lambda done, total: progress(done)
+    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told)
 
 
-def _placed(
-    arm: Arm,
-    targets: ArrayLike,
-    area: Sequence[float] | None,
-    step: float,
-    yaw: float,
-    z: float,
+def each(
+    arms: Sequence[Arm],
+    targets: Sequence[ArrayLike],
+    settings: dict[str, Any],
+    scene: str | os.PathLike[str] | None,
+    out: str | os.PathLike[str] | None,
     engine: Engine,
-    progress: Callable[[int], None] | None,
-) -> Place:
+    progress: Callable[[int, int], None] | None,
+) -> list[Place]:
+    """`place` of arms that have their own targets each; settings: area, step, yaw, z; progress: done, of so many."""
+    for name in ("step", "yaw"):
+        if not (math.isfinite(settings[name]) and settings[name] > 0):
+            raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
+    asked = [_question(arm, some, settings, scene) for arm, some in zip(arms, targets, strict=True)]
+    grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
+    work_list: list[Chunk] = []
+    for i, (one, (axes, _)) in enumerate(zip(asked, grids, strict=True)):
+        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        work_list += [Chunk(len(work_list) + k, i, part) for k, part in enumerate(_blocks(one, at))]
+    counts = _Run(asked, settings, out, engine, progress).done(work_list)
+    found = []
+    for i, (one, (axes, inner)) in enumerate(zip(asked, grids, strict=True)):
+        mine = [counts[chunk.number] for chunk in work_list if chunk.which == i]
+        every = np.concatenate(mine).reshape(len(axes[0]), len(axes[1]), one.yaws)
+        margin, reached = _margins(every == len(one.targets), settings["step"])[inner], every[inner]
+        x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(one.yaws) * settings["yaw"]
+        best = _best(one, reached, margin, x, y, yaws)
+        found.append(Place(one.arm, x, y, yaws, one.z, reached, margin, len(one.targets), best))
+    return found
+
+
+def _question(arm: Arm, targets: ArrayLike, settings: dict[str, Any], scene: str | os.PathLike[str] | None) -> Question:
+    """What is asked of one arm: its own keep-outs apart from those of a scene."""
     task = task_for(arm, None)
-    goals = read_targets(task, targets).values
-    for name, value in (("step", step), ("yaw", yaw)):
-        if not (math.isfinite(value) and value > 0):
-            raise UsageError(f"{name}: {value:g}; it must be above 0")
-    yaws = np.asarray(np.arange(math.ceil(TURN / yaw - STRAIGHT)) * yaw, dtype=float)
-    question = Question(arm, task, goals, len(yaws), yaw, z)
-    axes, inner = _axes(arm, question, area, step, len(yaws))
-    at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    counts = []
-    done = 0
-    for part in in_order(engine, work, question, _chunks(question, at)):
-        counts.append(part)
-        done += len(part)
-        if progress is not None:
-            progress(done)
-    every = np.concatenate(counts).reshape(len(axes[0]), len(axes[1]), len(yaws))
-    margin = _margins(every == len(goals), step)[inner]
-    reached = every[inner]
-    x, y = axes[0][inner[0]], axes[1][inner[1]]
-    best = _best(question, reached, margin, x, y, yaws)
-    return Place(arm, x, y, yaws, z, reached, margin, len(goals), best)
+    arm, around = apart(arm, scene)
+    yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
+    return Question(arm, task, read_targets(task, targets).values, yaws, settings["yaw"], settings["z"], around)
+
+
+class _Run:
+    """Chunks that are answered, kept beside the file until it stands, and the file."""
+
+    def __init__(
+        self,
+        questions: list[Question],
+        settings: dict[str, Any],
+        out: str | os.PathLike[str] | None,
+        engine: Engine,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self.questions, self.engine, self.progress = questions, engine, progress
+        self.parts: Parts | None = None
+        if out is None:
+            return
+        files.check(os.fspath(out))
+        robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes())] for one in questions]
+        self.parts = Parts(os.fspath(out), {"command": "place", "robots, scene and targets": robots, **settings})
+
+    def done(self, chunks: list[Chunk]) -> dict[int, NDArray[np.int64]]:
+        """Counts (P, K) of all chunks, by their number."""
+        counts: dict[int, NDArray[np.int64]] = {}
+        if self.parts is not None and len(chunks) > 1:
+            self.parts.begin()
+        try:
+            total = sum(len(chunk.at) for chunk in chunks)
+            missing = [chunk for chunk in chunks if not self._kept(chunk, counts)]
+            for chunk, found in zip(missing, in_order(self.engine, work, self.questions, missing), strict=True):
+                counts[chunk.number] = found
+                if self.parts is not None and self.parts.held:
+                    self.parts.keep(chunk.number, {}, npz.encoded({"reached": found.ravel()}))
+                if self.progress is not None:
+                    self.progress(sum(map(len, counts.values())), total)
+        finally:
+            if self.parts is not None:
+                self.parts.leave()
+        return counts
+
+    def _kept(self, chunk: Chunk, counts: dict[int, NDArray[np.int64]]) -> bool:
+        """Whether an earlier run has answered a chunk."""
+        if self.parts is None or not self.parts.held or self.parts.about(chunk.number) is None:
+            return False
+        with np.load(io.BytesIO(self.parts.read(chunk.number))) as archive:
+            counts[chunk.number] = archive["reached"].reshape(len(chunk.at), -1)
+        return True
 
 
 def positions_of(task: Task, targets: Array) -> Array:
@@ -157,9 +226,10 @@ def positions_of(task: Task, targets: Array) -> Array:
 
 
 def _axes(
-    arm: Arm, question: Question, area: Sequence[float] | None, step: float, yaws: int
+    question: Question, area: Sequence[float] | None, step: float
 ) -> tuple[tuple[Array, Array], tuple[slice, slice]]:
     """The grid's x and y, as far as any place can reach all targets, and which of them are in the area."""
+    arm = question.arm
     p = positions_of(question.task, question.targets)[:, :2]
     far = arm.reach + float(np.linalg.norm(arm.link[0][:2, 3]))
     low, high = p.max(axis=0) - far, p.min(axis=0) + far  # beyond, one target is out of reach
@@ -172,22 +242,22 @@ def _axes(
         last = math.floor((end - start) / step + 1e-9)
         before = max(math.ceil((start - low[i]) / step), 0) + 1
         behind = max(math.ceil((high[i] - start) / step) - last, 0) + 1
-        if (last + before + behind + 1) ** 2 * yaws > 4 * MOST:
+        if (last + before + behind + 1) ** 2 * question.yaws > 4 * MOST:
             raise UsageError(f"more than {MOST:,} places: take a larger step or a smaller area", most=MOST)
         axes.append(start + np.arange(-before, last + behind + 1) * step)
         inner.append(slice(before, before + last + 1))
     return (axes[0], axes[1]), (inner[0], inner[1])
 
 
-def _chunks(question: Question, at: Array) -> Iterator[Chunk]:
-    each = max(SOLVES // (len(question.targets) * (1 if question.arcs else question.yaws)), 1)
-    for number, start in enumerate(range(0, len(at), each)):
-        yield Chunk(number, at[start : start + each])
+def _blocks(question: Question, at: Array) -> Iterator[Array]:
+    count = max(SOLVES // (len(question.targets) * (1 if question.arcs else question.yaws)), 1)
+    for start in range(0, len(at), count):
+        yield at[start : start + count]
 
 
-def work(question: Question, chunk: Chunk) -> NDArray[np.int64]:
+def work(questions: list[Question], chunk: Chunk) -> NDArray[np.int64]:
     """How many targets are reached from each position and yaw: (P, K)."""
-    return np.concatenate([_counted(question, at) for at in chunk.at])
+    return np.concatenate([_counted(questions[chunk.which], at) for at in chunk.at])
 
 
 def _counted(question: Question, at: Array) -> NDArray[np.int64]:
@@ -218,9 +288,17 @@ def _counted(question: Question, at: Array) -> NDArray[np.int64]:
 
 def _legal(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
     """Which targets are reached from one place: (N,)."""
+    return np.asarray(_answers(question, at, turn)[1].any(axis=1))
+
+
+def _answers(question: Question, at: Array, turn: float) -> tuple[Array, NDArray[np.bool_]]:
+    """The branches of all targets from one place (N, B, n), and which are within limits and free (N, B)."""
     s = ik(question.arm, _seen(question, at, turn))
     legal = s.within_limits & s.clear if question.arm.keep_out else s.within_limits
-    return np.asarray(legal.any(axis=1))
+    if question.around.keep_out and legal.any():
+        place, q = (float(at[0]), float(at[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
+        legal = legal & free(question.arm, question.around, place, turn, q)
+    return s.q, np.asarray(legal)
 
 
 def _seen(question: Question, at: Array, turn: float) -> Array:
@@ -279,7 +357,7 @@ def _best(
 
 def _room(question: Question, at: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
-    s = ik(question.arm, _seen(question, at, turn))
-    margins = np.where(s.within_limits, limit_margin(question.arm, s.q), -np.inf).max(axis=1)
+    q, legal = _answers(question, at, turn)
+    margins = np.where(legal, limit_margin(question.arm, q), -np.inf).max(axis=1, initial=-np.inf)
     there = margins[np.isfinite(margins)]
     return float(there.min()) if len(there) else 0.0

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import listed, number
-from armkin.cli.options import Cluster, Json, Workers
+from armkin.cli.options import Cluster, Json, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -29,8 +29,13 @@ def place(
     step: Annotated[str, typer.Option("--step", metavar="MM", help="From place to place.")] = "50",
     yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="From yaw to yaw.")] = "15",
     z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
+    scene: Scene = None,
     workers: Workers = 1,
     cluster: Cluster = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", "-o", metavar="FILE", help="All places: .npz, .parquet, .csv; after a kill it goes on."),
+    ] = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
     json: Json = False,
 ) -> None:
@@ -39,8 +44,6 @@ def place(
     Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
     one is farthest from places that do not reach all. Exit code 3: no place does; the best part is told.
     """
-    import armkin
-
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets: armkin place ur5e targets.csv")
     if words[-1].lower().endswith((".yaml", ".yml")):
@@ -51,33 +54,29 @@ def place(
         canvas.check(plot)
         canvas.require()
     arms = [inputs.load(word) for word in words[:-1]]
-    settings = {"step": number(step, "--step"), "z": number(z, "--z")}
+    settings: dict[str, Any] = {"step": number(step, "--step"), "z": number(z, "--z")}
     turn = number(yaw, "--yaw")
     if settings["step"] <= 0 or turn <= 0:
         raise UsageError("--step and --yaw must be above 0")
     bounds = None if area is None else listed(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
+    from armkin.engines.run import Engine
     from armkin.model.units import DEGREE
+    from armkin.reachability.place import each
+    from armkin.reachability.place_file import write
 
-    found = []
+    settings |= {"area": bounds, "yaw": turn * DEGREE}
+    targets = [_targets(arm, words[-1]) for arm in arms]
     with output.progress("positions") as tick:
-        for arm in arms:
-            found += armkin.place(
-                arm,
-                _targets(arm, words[-1]),
-                area=bounds,
-                yaw=turn * DEGREE,
-                workers=workers,
-                cluster=cluster,
-                progress=tick,
-                **settings,
-            )
+        found = each(arms, targets, settings, scene, out, Engine(workers, cluster), tick)
+    if out is not None:
+        write(found, out)
     if plot is not None:
         from armkin.plot.place import plot_place
 
         plot_place(found, plot)
     answer: Answer = {"robots": [_answer(one) for one in found]}
-    with output.destination(None) as write:
-        write(f"{render.to_json(answer)}\n" if json else _text(found))
+    with output.destination(None) as say:
+        say(f"{render.to_json(answer)}\n" if json else _text(found))
     if not any(one.reach_all for one in found):
         most = max(found, key=lambda one: int(one.reached.max()))
         raise NoSolutionError(

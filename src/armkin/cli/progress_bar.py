@@ -1,0 +1,53 @@
+"""How far a long command has come, on a terminal: a bar, count, rate and time left (rich, imported here alone)."""
+
+from __future__ import annotations
+
+import sys
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+
+
+class Bar:
+    """One line that is drawn anew, and gone at the end."""
+
+    def __init__(self, what: str, console: Console) -> None:
+        self.what = what
+        columns = (BarColumn(24), TextColumn("{task.fields[said]}"))
+        self._drawn = Progress(*columns, console=console, auto_refresh=False, transient=True)
+        self._task: TaskID = self._drawn.add_task("", total=None, said="")
+        self._drawn.start()
+
+    def tell(self, done: int, total: int | None, seconds: float) -> None:
+        """So many are done, of so many, after so long."""
+        self._drawn.update(self._task, completed=done, total=total, said=said(self.what, done, total, seconds))
+        self._drawn.refresh()
+
+    def end(self) -> None:
+        """Take the line away."""
+        self._drawn.stop()
+
+
+def begun(what: str) -> Bar:
+    """A bar on stderr."""
+    return Bar(what, Console(file=sys.stderr, highlight=False))
+
+
+def said(what: str, done: int, total: int | None, seconds: float) -> str:
+    """Count, rate and time left in words.
+
+    >>> said("rows", 250_000, 1_000_000, 5.0)
+    '25 %  250,000 of 1,000,000 rows, 50,000/s, 0:00:15 left'
+    >>> said("rows", 250_000, None, 5.0)
+    '250,000 rows, 50,000/s, 0:00:05'
+    """
+    rate = done / max(seconds, 1e-3)
+    if not total:
+        return f"{done:,} {what}, {rate:,.0f}/s, {_clock(seconds)}"
+    left = f", {_clock((total - done) / rate)} left" if 0 < done <= total else ""
+    return f"{100 * done // total} %  {done:,} of {total:,} {what}, {rate:,.0f}/s{left}"
+
+
+def _clock(seconds: float) -> str:
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"

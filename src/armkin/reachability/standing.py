@@ -1,0 +1,77 @@
+"""An arm at a place, among keep-outs that stand with the targets."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.keep_out.clearance import clear
+from armkin.keep_out.guard import guard
+from armkin.model.rotation import rotation_about
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.robot_file.keep_out import Entry
+
+INSIDE = 1e-6  # [mm] of a base that stands on an obstacle, by rounding
+
+
+class Around(NamedTuple):
+    """What stands with the targets: keep-outs, and how far arms stay away from them [mm]."""
+
+    keep_out: tuple[Entry, ...] = ()
+    clearance: float = 0.0
+    sha256: str = ""
+
+
+def apart(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Around]:
+    """An arm with its own keep-outs alone, and those of its scene and of another.
+
+    What the arm's bodies keep from each other is the arm's own, wherever it is asked for.
+    """
+    own = len(arm.keep_out) - arm.of_scene
+    mine, there, clearance, sha256 = arm.keep_out[:own], list(arm.keep_out[own:]), arm.clearance, arm.scene_sha256
+    if scene is not None:
+        from armkin.robot_file.scene import read
+
+        more = read(os.fspath(scene))
+        there, clearance, sha256 = [*there, *more.keep_out], max(clearance, more.clearance), more.sha256
+    if not there:
+        return arm, Around()
+    selves = tuple(entry for entry in there if entry.kind == "self")
+    if not any(entry.kind == "self" for entry in mine):
+        mine += selves[:1]
+    still = tuple(entry for entry in there if entry.kind != "self")
+    return replace(arm, keep_out=mine, clearance=clearance, of_scene=0), Around(still, clearance, sha256)
+
+
+def free(arm: Arm, around: Around, at: tuple[float, float, float], turn: float, q: Array) -> NDArray[np.bool_]:
+    """Which postures (..., n) of an arm at a place hit nothing of what stands there; nan: none.
+
+    None does where the base's axis goes into an obstacle: a base may stand on one, but not in it.
+    """
+    stands = _standing(arm, around, at, turn)
+    held = guard(stands)
+    base = held.bodies.owner == 0
+    begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
+    if any((shape.distance(begin, end) < -INSIDE).any() for _, shape in held.obstacles):
+        return np.zeros(q.shape[:-1], bool)
+    return clear(stands, q)
+
+
+@lru_cache(maxsize=4)
+def _standing(arm: Arm, around: Around, at: tuple[float, float, float], turn: float) -> Arm:
+    """The arm at a place, in the targets' frame, among what stands with the targets."""
+    P = np.eye(4)
+    P[:3, :3], P[:3, 3] = rotation_about(2, turn), at
+    link, base = arm.link.copy(), P @ arm.base
+    link[0] = P @ link[0]
+    for moved in (link, base):
+        moved.flags.writeable = False
+    return replace(arm, link=link, base=base, keep_out=around.keep_out, clearance=around.clearance)
