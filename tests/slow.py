@@ -114,6 +114,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_two_runs_do_not_share_a_folder",
     ),
     "compiled/test_compiled.py": (),
+    "engines/test_cluster.py": (),
     "export/test_c.py": (),
     "export/test_js.py": (),
     "export/test_words.py": ("test_a_table_is_the_same_arm",),

@@ -21,6 +21,7 @@ keep_outs.py       radii that are assumed, the scene of a port, hits that are ig
 What is printed:
 
 output.py          where it goes
+progress_bar.py    how far a long command has come, with rate and time left
 render.py          JSON and aligned columns; info_text.py: `info` for people
 
 A command is a function of the same name in a module of the same name, written for Typer:

@@ -1,0 +1,81 @@
+"""A Dask cluster on this machine: the bytes of one process, whatever is killed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.cli import csv_rows
+from armkin.engines import cluster
+from armkin.engines.run import Engine, in_order
+from armkin.errors import ClusterError
+from command_line import ROOT, THREE_DOF, run
+from killed_once import square
+
+_CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1")
+    print(cluster.scheduler_address, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A scheduler with two worker processes, whose nannies start another for one that is killed."""
+    script = tmp_path_factory.mktemp("cluster") / "two_workers.py"
+    script.write_text(_CLUSTER)
+    finds = {**os.environ, "PYTHONPATH": os.fspath(ROOT / "tests")}  # where the work is
+    with subprocess.Popen(
+        [sys.executable, script], env=finds, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    ) as process:  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.stdin.close()
+        process.wait(60)
+
+
+@pytest.mark.parametrize("where", ["cluster", "pool"])
+def test_a_killed_worker_loses_its_chunk_alone(address: str, where: str, tmp_path: Path) -> None:
+    engine = Engine(cluster=address) if where == "cluster" else Engine(workers=2)
+    mark = tmp_path / "killed"
+    assert list(in_order(engine, square, str(mark), range(8))) == [i * i for i in range(8)]
+    assert mark.exists()
+
+
+def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csv_rows, "ROWS", 30)
+    values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
+    rows, one, two = tmp_path / "in.csv", tmp_path / "one.csv", tmp_path / "two.csv"
+    rows.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")
+    words = ("ik", THREE_DOF, "--batch", rows, "--out")
+    assert run(*words, one) == run(*words, two, "--cluster", address)
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_reach_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path) -> None:
+    one, two = tmp_path / "one.npz", tmp_path / "two.npz"
+    words = ("reach", "three_dof", "--grid", 60, "--out")
+    assert run(*words, one).code == run(*words, two, "--cluster", address).code == 0
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(armkin, "__version__", "0.0.9")
+    with pytest.raises(ClusterError, match="has armkin .* \\(here 0.0.9\\)"):
+        list(in_order(Engine(cluster=address), square, "", range(3)))
+    monkeypatch.undo()
+    monkeypatch.setattr(cluster, "SECONDS", 0.5)
+    with pytest.raises(ClusterError, match="no scheduler answers"):
+        list(in_order(Engine(cluster="tcp://127.0.0.1:9"), square, "", range(3)))
