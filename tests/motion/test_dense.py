@@ -215,3 +215,14 @@ def test_noise_is_no_corner_and_a_small_square_is() -> None:
     assert not fitting.corners(noisy, 0.05).any()
     small = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
     assert fitting.corners(small, 0.05).tolist() == [False, True, True, False]
+
+
+def test_blends_that_share_a_side_s_middle_are_planned(three_dof: Arm) -> None:
+    """A slicer's infill: lines 0.2 mm apart, so that the two blends of each turn take half of the short side each."""
+    corners = [[(30.0 if (k + 1) // 2 % 2 else -30.0), 0.2 * (k // 2) / np.sqrt(3), 0.0] for k in range(60)]
+    points = CENTRE + np.array(corners)
+    plan = armkin.path(three_dof, {"moves": [{"point": points[0].tolist()}, {"polyline": points[1:].tolist()}]})
+    assert plan.deviation <= 0.05
+    assert np.isfinite(plan.duration)
+    assert (plan.limits["accel"] <= 1.002).all()
+    assert worst_miss(points, tips(plan), 0.05)[0] <= 0.05

@@ -36,7 +36,7 @@ class Polyline:
 
     def add(self, value: Sequence[float], speed: float | None, tool_speed: float | None) -> None:
         """One more target. Raises UsageError for one that is none of the task."""
-        if len(value) != self.task.position or len(self.task.labels) == self.task.position:
+        if len(value) != self.task.position:
             last = path_numbers.target(self.task, self.last, value)
             self._last = len(self.rows) + 1, last
         self.rows.append(value)
@@ -47,7 +47,7 @@ class Polyline:
         """The last target."""
         number, spot = self._last
         if number < len(self.rows):  # the position alone was given since
-            self._last = len(self.rows), replace(spot, p=np.asarray(self.rows[-1], dtype=float))
+            self._last = len(self.rows), replace(spot, p=np.array(self.rows[-1], dtype=float))
         return self._last[1]
 
     def pieces(self, tolerance: float) -> list[Piece]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _TIMES = 16.0  # as many points, at most, where the tolerance needs them
 _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
-_EACH = (8, 64)  # of a section between two bends, at least, with many sections and with few
+_EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
 _DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
@@ -37,8 +37,9 @@ def fine_enough(
     where, breaks = _places(arm, route, s, q, a, b, number)
     most = _TIMES * len(where)
     for damping in _DAMPING:
+        path = None
         for _ in range(_ROUNDS):
-            path = _solved(arm, route, s, q, where, breaks, damping)
+            path = _solved(arm, route, s, q, where, breaks, damping, path)
             if tolerance is None:
                 return path, breaks.tolist(), 0.0
             off = interval_deviations(arm, route, path)
@@ -85,10 +86,17 @@ def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
     return np.append(new, where[-1]), begin[breaks]
 
 
-def _solved(arm: Arm, route: Route, s: Array, q: Array, where: Array, breaks: Int, damping: float) -> Knots:
-    """Joint values at the points, exact to the inverse kinematics."""
-    guess = np.stack([np.interp(where, s, q[:, j]) for j in range(arm.n)], axis=1)
-    return knots(where, corrected(arm, route.task, guess, route.targets(where), damping), breaks.tolist())
+def _solved(
+    arm: Arm, route: Route, s: Array, q: Array, where: Array, breaks: Int, damping: float, known: Knots | None
+) -> Knots:
+    """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
+    values, new = np.empty((len(where), arm.n)), np.ones(len(where), bool)
+    if known is not None:
+        old = np.searchsorted(where, known.s)
+        values[old], new[old] = known.q, False
+    guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
+    values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
+    return knots(where, values, breaks.tolist())
 
 
 def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:

@@ -15,6 +15,7 @@ from armkin.motion.fitting import REVERSAL
 from armkin.motion.geometry import SMALL, Dense, Piece, blend
 from armkin.motion.trajectory import grouped
 
+_SAME = 1e-6  # [mm] breaks that are nearer are one
 _SMOOTH = 1e-3  # [rad] between two directions that count as one
 
 
@@ -55,7 +56,13 @@ class Route:
     def breaks(self) -> Array:
         """Where the curvature may jump: ends of pieces, and bends inside of dense ones, sorted [mm]."""
         inside = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
-        return np.unique(np.concatenate([self.ends, *inside])) if inside else self.ends
+        if not inside:
+            return self.ends
+        found = np.sort(np.concatenate([self.ends, *inside]))
+        apart = np.append(True, np.diff(found) > _SAME)  # blends that take half of a side each meet in its middle
+        found = found[apart]
+        found[-1] = self.length
+        return np.asarray(found)
 
     @cached_property
     def spans(self) -> Array:

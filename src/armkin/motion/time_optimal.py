@@ -32,8 +32,9 @@ TINY = 1e-300
 _NEIGHBOURS = 5  # samples that give a slope
 _SECTIONS = 16  # of samples, between breaks: more are worked on together
 _MOST = 1e18  # of x, where nothing bounds it
-_EXCESS = 1.001  # of an acceleration, between grid points
-_ROUNDS = 6
+_EXCESS = 1.001  # of an acceleration, or of a speed squared, between grid points
+_ROUNDS = 8
+_SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _FEW = 400  # samples of a way: the law needs more grid points
 _FEWEST = 8  # intervals that are followed one by one before it is asked whether that can end
@@ -162,37 +163,54 @@ class _Motion(NamedTuple):
     h: Array  # (M,)
     accel: Array  # (k, M) greatest acceleration
 
-    def row(self, f: Array | float) -> tuple[Array, Array]:
-        """P and R of the acceleration P u + R x at fractions f of the intervals, x at the left end: (k, M) each.
+    def excess(self, x: Array) -> Array:
+        """Greatest share of the acceleration inside every interval: (k, M).
 
-        With q'' = l + f (r - l) and x(f) = x + 2 u h f it is u q'(f) + q''(f) x(f).
+        With q'' = l + f (r - l) and x(f) = x + 2 u h f at its fraction f it is u q'(f) + q''(f) x(f).
         """
-        if np.ndim(f) == 0 and f == 0:
-            return self.first, self.left
-        return self.first + self.h * f * (3 * self.left + 2.5 * f * self.bend), self.left + f * self.bend
-
-    def excess(self, x: Array) -> tuple[Array, Array]:
-        """Greatest share of the acceleration inside every interval, and at which fraction: (k, M) each."""
         u = (x[1:] - x[:-1]) / (2 * self.h)
         a = u * self.first + self.left * x[:-1]  # a + b f + c f^2
         b = 3 * u * self.h * self.left + self.bend * x[:-1]
         c = 2.5 * u * self.h * self.bend
         f = np.fmin(np.fmax(-b / (2 * c), 0.0), 1.0)  # 0 where it does not bend
-        return np.abs(a + f * (b + f * c)) / self.accel, f
+        inside = np.abs(a + f * (b + f * c))
+        return np.asarray(np.maximum(np.maximum(inside, np.abs(a)), np.abs(a + b + c)) / self.accel)
+
+    def rush(self, x: Array, speed: Array) -> Array:
+        """Greatest share of the joints' speeds (n, M) inside every interval, squared: (M,).
+
+        (q'(f))^2 x(f) is greatest at an end, which its cap holds, or where its derivative, a quadratic, is zero.
+        """
+        n, h = len(speed), self.h
+        ends = np.maximum(np.abs(self.first[:n]), np.abs(self.first[:n] + h * (self.left[:n] + 0.5 * self.bend[:n])))
+        bound = ((ends + 0.125 * h * np.abs(self.bend[:n])) / speed).max(axis=0) ** 2 * np.maximum(x[1:], x[:-1])
+        near = np.flatnonzero(bound > 1.0)
+        d, left, bend = self.first[:n, near], self.left[:n, near], self.bend[:n, near]
+        h, dx, x = h[near], np.diff(x)[near], x[near]
+        c = 2 * h * left * x + d * dx
+        b = 2 * h * bend * x + 3 * h * left * dx
+        a = 2.5 * h * bend * dx
+        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b))
+        most = np.zeros(len(bound))
+        for root in (q / a, c / q):
+            f = np.fmin(np.fmax(root, 0.0), 1.0)
+            slope = d + h * f * (left + 0.5 * f * bend)
+            share = np.nan_to_num((slope / speed[:, near]) ** 2 * (x + f * dx)).max(axis=0, initial=0.0)
+            most[near] = np.maximum(most[near], share)
+        return most
 
 
 Motions = Callable[[slice], _Motion]  # of some of the intervals
 
 
-def _motions(path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> Motions:
-    """What is bounded along a path: of a long one it is made anew whenever a part is worked on."""
-    if len(path.h) <= _AT_ONCE:
-        whole = _motion(path, accel, rows)
-        return lambda _: whole
+def _motions(path: Knots, accel: Array, rows: tuple[Array, Array] | None, share: NDArray[np.float32]) -> Motions:
+    """What is bounded along a path, by shares (k, M) of the accelerations: of a long one it is made anew, in parts."""
+    whole = _motion(path, accel, rows) if len(path.h) <= _AT_ONCE else None
 
     def part(some: slice) -> _Motion:
         ends = slice(some.start, some.stop + 1)
-        return _motion(Knots(path.s[ends], path.q[ends], path.d[ends]), accel[ends], rows)
+        made = whole or _motion(Knots(path.s[ends], path.q[ends], path.d[ends]), accel[ends], rows)
+        return made._replace(accel=made.accel * share[:, some])
 
     return part
 
@@ -214,29 +232,39 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
 
     rows: weights (k, n) of joints and the greatest acceleration (k,) of each such sum: coupled motors.
 
-    Accelerations are bounded at both ends of every interval; where that leaves more than the limit between them,
-    there, too, and all is done again. What is left of that after some rounds, the whole law slows down for.
+    Speeds and accelerations are bounded at both ends of every interval. Where one is above its limit in between, that
+    interval is given less, and all is done again; what is left after some rounds, the whole law slows down for.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         cap = np.minimum(bounds.cap, _MOST)
+        speed = np.broadcast_to(bounds.speed, path.q.shape)
         for some in in_parts(len(cap)):
-            speed = bounds.speed if bounds.speed.ndim == 1 else bounds.speed[some]
-            rate = np.ascontiguousarray((speed / np.maximum(np.abs(path.d[some]), TINY)).T).min(axis=0)
+            rate = np.ascontiguousarray((speed[some] / np.maximum(np.abs(path.d[some]), TINY)).T).min(axis=0)
             cap[some] = np.minimum(cap[some], rate**2)
         cap[0] = cap[-1] = 0.0
         if len(cap) < 2:
             return np.asarray(cap)
-        motion = _motions(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
-        inside: list[Array | float] = [0.0, 1.0]
-        for _ in range(_ROUNDS):
-            x, most, beyond = _fastest(cap.copy(), path.h, motion, inside), 0.0, []
+        share = np.ones((path.q.shape[1] + (0 if rows is None else len(rows[0])), len(path.h)), np.float32)
+        accel = np.broadcast_to(bounds.accel, path.q.shape)
+        whole = np.broadcast_to(np.ones((), np.float32), share.shape)
+        given, limits = (_motions(path, accel, rows, each) for each in (share, whole))
+        for round_ in range(_ROUNDS):
+            x, most = _fastest(cap.copy(), path.h, given), 0.0
             for some in in_parts(len(path.h)):
-                over, where = motion(some).excess(x[some.start : some.stop + 1])
-                most = max(most, float(over.max()))
-                beyond.append(np.where(over > 1.0, where, 0.0))
+                ends = slice(some.start, some.stop + 1)
+                motion = limits(some)
+                over = motion.excess(x[ends])
+                rush = motion.rush(x[ends], np.minimum(speed[ends][:-1], speed[ends][1:]).T)
+                most = max(most, float(over.max()), float(rush.max()))
+                if round_ < _SHARED:
+                    share[:, some] /= np.where(over > 1.0, over, 1.0)
+                else:
+                    rush = np.maximum(rush, over.max(axis=0))
+                less = np.where(rush > 1.0, rush, np.nan)
+                cap[some] = np.fmin(cap[some], x[some] / less)
+                cap[ends][1:] = np.fmin(cap[ends][1:], x[ends][1:] / less)
             if most <= _EXCESS:
                 return x
-            inside.append(np.concatenate(beyond, axis=1))
         return np.asarray(x / most)
 
 
@@ -245,11 +273,11 @@ def in_parts(intervals: int) -> list[slice]:
     return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
 
 
-def _fastest(cap: Array, h: Array, motion: Motions, inside: Sequence[Array | float]) -> Array:
-    """The fastest x (N,) within cap, the accelerations kept at fractions `inside` of the intervals."""
+def _fastest(cap: Array, h: Array, motion: Motions) -> Array:
+    """The fastest x (N,) within cap, the accelerations kept at both ends of the intervals."""
     parts = in_parts(len(h))
     for some in parts:
-        slope, level = _affine(motion, inside, some)
+        slope, level = _affine(motion, some)
         # x + 2 h u >= 0 must leave room below the upper bounds of u
         steep = slope - 0.5 / h[some]
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
@@ -263,25 +291,27 @@ def _fastest(cap: Array, h: Array, motion: Motions, inside: Sequence[Array | flo
         return _scan(beta, [both.part(M, 2 * M)._replace(reach=reach)])
 
     def ahead(some: slice) -> tuple[Array, Array]:  # of a long path made anew for each of the passes
-        return _ahead(h[some], *_affine(motion, inside, some))
+        return _ahead(h[some], *_affine(motion, some))
 
     back = (_least(*_back(*ahead(some)), cap[some.start + 1 : some.stop + 1][::-1]) for some in reversed(parts))
     beta = _scan(cap[::-1], back)[::-1]
     return _scan(beta, (_least(*ahead(some), beta[some]) for some in parts))
 
 
-def _affine(motion: Motions, inside: Sequence[Array | float], some: slice) -> tuple[Array, Array]:
+def _affine(motion: Motions, some: slice) -> tuple[Array, Array]:
     """Slope and level of the bounds of u, which is between -level - slope x and level - slope x: (k, M) each."""
-    P, R, C = _rows(motion(some), [f if isinstance(f, float) else f[:, some] for f in inside])
+    P, R, C = _rows(motion(some))
     return R / P, C / P
 
 
-def _rows(motion: _Motion, inside: Sequence[Array | float]) -> tuple[Array, Array, Array]:
-    """P > 0, R, C of |P u + R x| <= C, x at the left end: (k, M)."""
-    p, r = (np.concatenate(part) for part in zip(*map(motion.row, inside), strict=True))
+def _rows(motion: _Motion) -> tuple[Array, Array, Array]:
+    """P > 0, R, C of |P u + R x| <= C, x at the left end, for both ends of the intervals: (k, M)."""
+    right = motion.left + motion.bend
+    p = np.concatenate([motion.first, motion.first + motion.h * (3 * motion.left + 2.5 * motion.bend)])
+    r = np.concatenate([motion.left, right])
     size = np.abs(p)
     P = np.maximum(size, 1e-12 * size.max(initial=0.0) + TINY)
-    return P, np.copysign(1.0, p) * r, np.concatenate([motion.accel] * len(inside))
+    return P, np.copysign(1.0, p) * r, np.concatenate([motion.accel, motion.accel])
 
 
 def _meeting(cap: Array, slope: Array, level: Array) -> Array:
