@@ -37,9 +37,9 @@ def fine_enough(
     where, breaks = _places(arm, route, s, q, a, b, number)
     most = _TIMES * len(where)
     for damping in _DAMPING:
-        path = None
+        known = None
         for _ in range(_ROUNDS):
-            path = _solved(arm, route, s, q, where, breaks, damping, path)
+            path = known = _solved(arm, route, s, q, where, breaks, damping, known)
             if tolerance is None:
                 return path, breaks.tolist(), 0.0
             off = interval_deviations(arm, route, path)
