@@ -189,7 +189,7 @@ def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> lis
         i0, i1 = min(chain.first, N), min(chain.last + 1, N)
         alive[i0:i1] |= chain.reach[: i1 - i0] >= np.arange(i0, i1)
     while i < N:
-        choices = allowed if allowed is not None and i == 0 else all_
+        choices = allowed if allowed is not None and not runs and i == 0 else all_
         reach = {chain: chain.carries(i) for chain in choices}
         far = max(reach.values(), default=i - 1)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):

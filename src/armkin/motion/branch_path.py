@@ -15,11 +15,12 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
+from armkin.motion.boundary import through_boundaries
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.grid import fine_enough
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.linked_branches import ENDS, Columns, change, chord_bound, levers, linked
+from armkin.motion.linked_branches import ENDS, Columns, change, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, finer, knots, optimal
 from armkin.motors import motor_accel
@@ -64,7 +65,14 @@ class Carried:
         """Whether the runs carry everything, with reconfigurations in between."""
         if not self.runs or self.runs[0].first != 0 or self.runs[-1].last != len(self.columns.s) - 1:
             return False
-        return all(a.last == b.first for a, b in zip(self.runs, self.runs[1:], strict=False))
+        s = self.columns.s  # ends of runs are known to ENDS
+        return all(s[b.first] - s[a.last] <= ENDS for a, b in pairwise(self.runs))
+
+    @property
+    def moving(self) -> list[Run]:
+        """The runs that lead anywhere."""
+        s = self.columns.s
+        return self.runs if self.whole else [run for run in self.runs if s[run.last] - s[run.first] > ENDS]
 
 
 def samples(route: Route, count: int | None = None) -> Array:
@@ -93,12 +101,12 @@ def carry(
     name = route.task.name
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
-    if fixed is not None:
-        all_ = [*all_, *_from_boundary(arm, columns, all_, fixed, tolerance)]
+    all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
     starts = [c for c in all_ if c.first == 0]
     if fixed is not None:
-        apart = [float(np.abs(change(arm, c.q[0], fixed)).max()) for c in starts]
-        starts = [c for c, d in zip(starts, apart, strict=True) if d < 1e-4]
+        starts = [c for c in starts if stands(c, fixed)]
+        if not starts:  # it stands where no branch goes on: a wrist that has to turn first, at rest
+            starts = [Chain(arm, 0, fixed[None], np.full(1, -1))]
     if branch is not None:
         wanted = find(columns.names, branch)
         starts = [c for c in starts if c.labels[0] in wanted]
@@ -114,19 +122,9 @@ def carry(
     return Carried(route, columns, all_, fewest(all_, end + 1, starts))
 
 
-def _from_boundary(arm: Arm, columns: Columns, all_: list[Chain], fixed: Array, tolerance: float) -> list[Chain]:
-    """Branches that begin just behind the route's start and meet the arm's posture there: it stands on a boundary."""
-    found = []
-    for c in all_:
-        if c.first == 0 or columns.s[c.first] > 10 * ENDS:
-            continue
-        step = change(arm, fixed, c.q[0])
-        if float(chord_bound(levers(arm), step)) <= tolerance:
-            share = (columns.s[: c.first] / columns.s[c.first]) ** 0.5  # joints leave a boundary as roots do
-            q = np.concatenate([c.q[0] - (1 - share)[:, None] * step, c.q])
-            labels = np.concatenate([np.repeat(c.labels[:1], c.first), c.labels])
-            found.append(Chain(arm, 0, q, labels))
-    return found
+def stands(chain: Chain, q: Array) -> bool:
+    """Whether a chain begins in a posture (n,), whole turns apart."""
+    return float(np.abs(change(chain.arm, chain.q[0], q)).max()) < 1e-4
 
 
 def _approach(chain: Chain, end: int, near: Array, fixed: Array | None) -> float:

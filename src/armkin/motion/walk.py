@@ -19,7 +19,7 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, said
 from armkin.motion import branch_report, geometry, path_numbers
-from armkin.motion.branch_path import Pace, carry, stretches
+from armkin.motion.branch_path import Pace, carry, stands, stretches
 from armkin.motion.curve import Curve, Smoothed, way_of
 from armkin.motion.dense import FIT, PLAN, Polyline
 from armkin.motion.geometry import Piece, Spot
@@ -191,11 +191,9 @@ class Walk:
         near = self.q if self.wishes.near is None else self.wishes.near
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
-            if run.first == run.last:
-                continue
-            fixed = self.q if not free and k == 0 else None
+            fixed = self.q if not free and k == 0 and run.first == 0 and stands(run.chain, self.q) else None
             curves = self._curves(route, s, run, near, fixed)
-            if free or k:
+            if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
             self.append_curves(route, curves, order)
             near = self.q
@@ -215,7 +213,7 @@ class Walk:
         branch_report.note(self.plan, carried, near)
         if not carried.whole and not (self.wishes.split and carried.covered):
             raise branch_report.refused(self.plan, carried, branch)
-        return carried.columns.s, carried.runs
+        return carried.columns.s, carried.moving
 
     def _curves(self, route: Route, s: Array, run: Run, near: Array, fixed: Array | None) -> list[Curve | Smoothed]:
         """A run in time; a route that is fitted to points leaves the motion little of the tolerance."""

@@ -1,0 +1,94 @@
+"""Chains of branches that meet on a boundary: both go on to the posture there, and from it.
+
+Where a path begins, ends or turns exactly on a boundary, an arm stretched for example, two branches have one posture
+there, which is linked to one of them. The other one's chain ends a few micrometres before.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.inverse.solutions import Status
+from armkin.motion.branch_chains import Chain
+from armkin.motion.linked_branches import ENDS, Columns, change, chord_bound, levers, turns_of
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_NEAR = 10 * ENDS  # [mm] of a chain's end before the boundary
+_SAME = 1e-4  # [rad | mm] between two postures that are one
+_MOST = 8  # boundaries on the way: a path along one has thousands, and its chains go on anyway
+
+
+def through_boundaries(
+    arm: Arm, columns: Columns, all_: list[Chain], fixed: Array | None, tolerance: float
+) -> list[Chain]:
+    """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
+    s, end = columns.s, len(columns.s) - 1
+    ends = np.unique([at for c in all_ for at in (c.first, c.last)])
+    inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
+    rows = [j for j in inner.tolist() if len(ends) and np.abs(s[ends] - s[j]).min() <= _NEAR]
+    found = list(all_)
+    for j in [0, *(rows if len(rows) <= _MOST else []), end]:
+        postures = fixed[None] if j == 0 and fixed is not None else columns.q[j][columns.valid[j]]
+        to = [one for c in found for one in _arriving(columns, c, j, postures, tolerance)] if j > 0 else []
+        on = [one for c in found for one in _leaving(columns, c, j, postures, tolerance)] if j < end else []
+        if j in (0, end):
+            found += [c for c in (*to, *on) if c not in found]
+        else:
+            found += [_joined(a, b) for a in to for b in on if _meet(a, b)]
+    return found
+
+
+def _arriving(columns: Columns, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+    """A chain as far as sample j: the part that leads there, or it and what is between it and a posture there."""
+    if c.first < j <= c.last:
+        return [c] if c.last == j else [Chain(c.arm, c.first, c.q[: j + 1 - c.first], c.labels[: j + 1 - c.first])]
+    gap = columns.s[j] - columns.s[c.last]
+    if c.last > j or gap > _NEAR:
+        return []
+    share = 1 - ((columns.s[j] - columns.s[c.last + 1 : j + 1]) / gap) ** 0.5  # joints leave a boundary as roots do
+    made = []
+    for step in _steps(c, c.q[-1], postures, tolerance):
+        labels = np.concatenate([c.labels, np.repeat(c.labels[-1:], j - c.last)])
+        made.append(Chain(c.arm, c.first, np.concatenate([c.q, c.q[-1] + share[:, None] * step]), labels))
+    return made
+
+
+def _leaving(columns: Columns, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+    """A chain from sample j on: the part behind it, or a posture there, what is between, and it."""
+    if c.first <= j < c.last:
+        return [c] if c.first == j else [Chain(c.arm, j, c.q[j - c.first :], c.labels[j - c.first :])]
+    gap = columns.s[c.first] - columns.s[j]
+    if c.first < j or gap > _NEAR:
+        return []
+    share = 1 - ((columns.s[j : c.first] - columns.s[j]) / gap) ** 0.5
+    made = []
+    for step in _steps(c, c.q[0], postures, tolerance):
+        labels = np.concatenate([np.repeat(c.labels[:1], c.first - j), c.labels])
+        made.append(Chain(c.arm, j, np.concatenate([c.q[0] + share[:, None] * step, c.q]), labels))
+    return made
+
+
+def _steps(c: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]:
+    """From a chain's end to the postures that are certified to be on the same way: (n,) each."""
+    lever = levers(c.arm)
+    steps = [change(c.arm, q, posture) for posture in postures]
+    return [step for step in steps if float(chord_bound(lever, step)) <= tolerance]
+
+
+def _meet(a: Chain, b: Chain) -> bool:
+    """Whether a chain begins where another ends, and is not its own continuation."""
+    step = change(a.arm, a.q[-1], b.q[0])
+    same = np.shares_memory(a.q, b.q)  # parts of one chain
+    return not same and float(np.abs(step).max()) < _SAME
+
+
+def _joined(a: Chain, b: Chain) -> Chain:
+    """One chain and then another that begins at its last sample."""
+    turns = np.where(a.arm.prismatic, 0.0, turns_of(a.arm))
+    offset = turns * np.rint((a.q[-1] - b.q[0]) / turns_of(a.arm))
+    return Chain(a.arm, a.first, np.concatenate([a.q, b.q[1:] + offset]), np.concatenate([a.labels, b.labels[1:]]))
