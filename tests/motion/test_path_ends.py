@@ -47,12 +47,61 @@ def test_a_singular_home_is_left_or_the_wrist_turns_first(name: str) -> None:
     home = armkin.fk(arm, arm.home)[:3, 3]
     up, sideways = ({"start": "home", "moves": [{"offset": {"xyz": way}}]} for way in ([0, 0, 20], [0, 20, 0]))
     plan = armkin.path(arm, up)
-    np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], home + [0, 0, 20], atol=0.01)
+    np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], home + np.array([0, 0, 20]), atol=0.01)
     with pytest.raises(NoSolutionError, match="with 1 change of branch it can be done"):
         armkin.path(arm, sideways)
     plan = armkin.path(arm, sideways, split=True)
     turn = plan.motion.stretches[0]  # at rest before and after
     assert np.abs(turn.end - arm.home).max() > 1.0
     assert np.linalg.norm(armkin.fk(arm, turn.end)[:3, 3] - home) <= 0.01
-    np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], home + [0, 20, 0], atol=0.01)
+    np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], home + np.array([0, 20, 0]), atol=0.01)
     assert (plan.limits["speed"] <= 1.002).all()
+
+
+def test_an_offset_in_the_tool_s_frame_takes_the_posture_that_carries_what_follows() -> None:
+    """The tool's axes are another posture's with each branch, so that a point and an offset have several lines."""
+    arm, rng, other = armkin.load("labvolt_5150"), np.random.default_rng(1), 0
+    arm = replace(arm, max_speed=np.full(5, 1.0), max_accel=np.full(5, 2.0))
+    arm = replace(arm, lower=np.full(5, -2.8), upper=np.full(5, 2.8))
+    postures = rng.uniform(-2.6, 2.6, (19, 5))
+    for q in postures[[3, 7, 15, 18]]:
+        tip = armkin.fk(arm, q)[:3, 3].tolist()
+        sums = np.rad2deg([q[1] + q[2] + q[3], q[4]]).tolist()
+        moves = [{"point": [*tip, *sums]}, {"offset": {"xyz": [60, 0, 100], "frame": "tool"}}]
+        carried = []
+        found = armkin.ik(arm, np.array([*tip, *np.deg2rad(sums)]))
+        for b in [b for b in found.order if found.within_limits[b] and found.valid[b]]:
+            start = {"joints": np.rad2deg(found.q[b]).tolist()}
+            try:
+                armkin.path(arm, {"start": start, "moves": moves[1:]})
+                carried.append(True)
+            except NoSolutionError:
+                carried.append(False)
+        try:
+            armkin.path(arm, {"moves": moves})
+            planned = True
+        except NoSolutionError:
+            planned = False
+        assert planned == any(carried)
+        other += planned and not carried[0]
+    assert other > 0
+
+
+def test_sums_stay_what_was_typed() -> None:
+    """phi 79 and then 81 is two degrees, in whatever posture the tool's frame was known before it."""
+    arm = armkin.load("labvolt_5150")
+    arm = replace(arm, max_speed=np.full(5, 1.0), max_accel=np.full(5, 2.0))
+    for roll in (0.0, 40.0):
+        point = [250.0, 60.0, 200.0, 79.0, roll]
+        near = np.deg2rad([0.0, -150.0, -100.0, -31.0, roll])
+        file = {
+            "moves": [
+                {"point": point},
+                {"offset": {"xyz": [0, 0, 1], "frame": "tool"}},
+                {"line": [*point[:3], 81.0, roll]},
+            ]
+        }
+        plan = armkin.path(arm, file, start=near)
+        stretch = next(plan.motion.begins[k] for k in sorted(plan.on_path))
+        q = plan.q(np.linspace(stretch, plan.duration, 300))
+        assert np.ptp(np.rad2deg(q[:, 1:4].sum(axis=1))) <= 2.1

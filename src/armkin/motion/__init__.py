@@ -9,10 +9,11 @@ dense.py            targets on lines, gathered; fitting.py: one smooth curve of 
 route.py            one after another, with rests at corners
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
+boundary.py         what branches that meet on a boundary make of it
 branch_path.py      the branch that is taken: joint values along the route
 grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
-hold_cap.py         how fast it may be for a hold on it
+scan.py             passes along it; hold_cap.py: how fast it may be for a hold on it
 path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: with joints held
 
 The way of waypoints:

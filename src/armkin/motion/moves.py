@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 def _joint(walk: Walk, move: Move, value: Any) -> None:
     walk.close()
+    walk.others, walk.refused = (), None
     goal = path_numbers.joints(walk.arm, walk.q, value)
     walk.append_joint_move(goal, move)
     walk.clear(None)
@@ -28,7 +29,7 @@ def _joint(walk: Walk, move: Move, value: Any) -> None:
 def _point(walk: Walk, move: Move, value: list[float]) -> None:
     goal = walk.target(value)
     walk.close()
-    walk.leads = move
+    walk.leads, walk.others, walk.refused = move, (), None
     walk.clear(goal, move.branch)
 
 
@@ -79,8 +80,11 @@ def _offset(walk: Walk, move: Move, value: Any) -> None:
             assert walk.spot.turned is not None
             d = walk.spot.turned @ d
         else:  # the tool's axes are known once the joints are
-            walk.close()
+            typed = walk.spot.sums
+            walk.take_posture()
             walk.clear(None)
+            turns = np.rint((typed - walk.spot.sums) / (2 * np.pi))
+            walk._spot = replace(walk.spot, sums=walk.spot.sums + 2 * np.pi * turns)
             d = (fk(walk.arm, walk.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
     walk.add(move, geometry.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
 

@@ -16,7 +16,7 @@ of numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.motion.scan import ahead, back, least_of, scan
 
 Int = NDArray[np.intp]
 TINY = 1e-300
@@ -37,7 +38,6 @@ _ROUNDS = 8
 _SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _FEW = 400  # samples of a way: the law needs more grid points
-_FEWEST = 8  # intervals that are followed one by one before it is asked whether that can end
 _PAIRS = 4096  # intervals whose rows are compared pair by pair at once
 
 
@@ -283,19 +283,19 @@ def _fastest(cap: Array, h: Array, motion: Motions) -> Array:
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
         cap[some] = _meeting(np.minimum(cap[some], room), slope, level)
     if len(parts) == 1:  # the rows of both passes are pruned together
-        forth, M = _ahead(h, slope, level), len(h)
-        a, b = (np.concatenate(each, axis=1) for each in zip(_back(*forth), forth, strict=True))
-        both = _least(a, b, np.concatenate([cap[:0:-1], cap[:-1]]))
-        beta = _scan(cap[::-1], [both.part(0, M)])[::-1]
+        forth, M = ahead(h, slope, level), len(h)
+        a, b = (np.concatenate(each, axis=1) for each in zip(back(*forth), forth, strict=True))
+        both = least_of(a, b, np.concatenate([cap[:0:-1], cap[:-1]]))
+        beta = scan(cap[::-1], [both.part(0, M)])[::-1]
         reach = (forth[0] * beta[:-1] + forth[1]).min(axis=0)
-        return _scan(beta, [both.part(M, 2 * M)._replace(reach=reach)])
+        return scan(beta, [both.part(M, 2 * M)._replace(reach=reach)])
 
-    def ahead(some: slice) -> tuple[Array, Array]:  # of a long path made anew for each of the passes
-        return _ahead(h[some], *_affine(motion, some))
+    def made(some: slice) -> tuple[Array, Array]:  # of a long path made anew for each of the passes
+        return ahead(h[some], *_affine(motion, some))
 
-    back = (_least(*_back(*ahead(some)), cap[some.start + 1 : some.stop + 1][::-1]) for some in reversed(parts))
-    beta = _scan(cap[::-1], back)[::-1]
-    return _scan(beta, (_least(*ahead(some), beta[some]) for some in parts))
+    behind = (least_of(*back(*made(some)), cap[some.start + 1 : some.stop + 1][::-1]) for some in reversed(parts))
+    beta = scan(cap[::-1], behind)[::-1]
+    return scan(beta, (least_of(*made(some), beta[some]) for some in parts))
 
 
 def _affine(motion: Motions, some: slice) -> tuple[Array, Array]:
@@ -337,91 +337,3 @@ def _meeting(cap: Array, slope: Array, level: Array) -> Array:
 def _pairs(k: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Every two of k rows."""
     return np.triu_indices(k, 1)
-
-
-class _Least(NamedTuple):
-    """The least of affine functions a y + b for y from 0 to `top`, in every interval.
-
-    Of the many rows of an interval only a few are the least anywhere: that at y = 0, that at y = top, and of the
-    others at most those (`more`) that are lower where these two cross.
-    """
-
-    reach: Array  # (M,) its value at y = top
-    a0: Array
-    b0: Array
-    a1: Array
-    b1: Array
-    more: dict[int, list[tuple[float, float]]]
-
-    def part(self, lo: int, hi: int) -> _Least:
-        """The same of intervals lo to hi."""
-        more = {i - lo: rows for i, rows in self.more.items() if lo <= i < hi}
-        reach, a0, b0, a1, b1 = (each[lo:hi] for each in (self.reach, self.a0, self.b0, self.a1, self.b1))
-        return _Least(reach, a0, b0, a1, b1, more)
-
-
-def _least(a: Array, b: Array, top: Array) -> _Least:
-    """Affine functions (k, M) on 0 <= y <= top (M,), pruned."""
-    i = np.arange(len(top))
-    first, last = b.argmin(axis=0), (a * top + b).argmin(axis=0)
-    a0, b0, a1, b1 = a[first, i], b[first, i], a[last, i], b[last, i]
-    y = np.minimum(np.maximum((b1 - b0) / (a0 - a1), 0.0), top)
-    two = ((first != last) & (y >= 0.0)).nonzero()[0]
-    a, b, y = a.take(two, axis=1), b.take(two, axis=1), y[two]
-    j, k = np.nonzero(a * y + b < (a0[two] * y + b0[two]) * (1 - 1e-12))
-    more: dict[int, list[tuple[float, float]]] = {}
-    for at, slope, level in zip(two[k].tolist(), a[j, k].tolist(), b[j, k].tolist(), strict=True):
-        more.setdefault(at, []).append((slope, level))
-    return _Least(a1 * top + b1, a0, b0, a1, b1, more)
-
-
-def _ahead(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
-    """`keep` and `gain` of every row: from x[i] one comes to keep x[i] + gain at most, and the least of all counts."""
-    return 1.0 - 2 * h * slope, 2 * h * level
-
-
-def _back(keep: Array, gain: Array) -> tuple[Array, Array]:
-    """The same from the end of the path: x[i+1] is reached from e x[i+1] + f at most; the last interval is first."""
-    e = np.where(keep > 0, 1.0 / keep, 0.0)
-    return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
-
-
-def _scan(most: Array, functions: Iterable[_Least]) -> Array:
-    """y[0] = most[0], y[i+1] = min(most[i+1], least_i(y[i])), not below 0.
-
-    Where y is at `most` and from there reaches the next of it, nothing has to be done: in most intervals.
-    """
-    out, at = most.copy(), 0
-    for least in functions:
-        part = out[at : at + len(least.reach) + 1]
-        below = (~(least.reach >= part[1:])).nonzero()[0].tolist()
-        done = _follow(part, least, 0) if part[0] < most[at] else 0
-        for k in below:
-            if k >= done:
-                done = _follow(part, least, k)
-        at += len(least.reach)
-    return out
-
-
-def _follow(y: Array, least: _Least, k: int) -> int:
-    """Write y[k+1], ... where `most` stands, up to some place where y is at `most` again, and return that."""
-    now, more, size = float(y[k]), least.more, _FEWEST
-    while True:
-        end = min(k + size, len(y) - 1)
-        most, found = y[k + 1 : end + 1].tolist(), []
-        rows = (each[k:end].tolist() for each in (least.a0, least.b0, least.a1, least.b1))
-        for i, top, a0, b0, a1, b1 in zip(range(k, end), most, *rows, strict=True):
-            value, other = a0 * now + b0, a1 * now + b1
-            if other < value:
-                value = other
-            if i in more:
-                for a, b in more[i]:
-                    other = a * now + b
-                    if other < value:
-                        value = other
-            now = top if top < value else value if value > 0.0 else 0.0
-            found.append(now)
-        y[k + 1 : end + 1] = found
-        if now == most[-1] or end == len(y) - 1:
-            return end
-        k, size = end, min(2 * size, _PAIRS)

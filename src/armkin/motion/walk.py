@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -27,7 +28,7 @@ from armkin.motion.grid import deviation, missed
 from armkin.motion.path_plan import Marker, PathPlan
 from armkin.motion.plan import approach, straight
 from armkin.motion.profile import at_rest
-from armkin.motion.route import joined
+from armkin.motion.route import Reduced, joined
 from armkin.motion.trajectory import Straight, Stretch
 
 if TYPE_CHECKING:
@@ -58,6 +59,9 @@ class Walk:
     _spot: Spot | None = None
     opening = False  # whether the path's first posture is not chosen yet
     leads: Move | None = None  # the move of the file that leads to a group's first point
+    others: tuple[Array, ...] = ()  # postures of the last target that were not tried
+    refused: NoSolutionError | None = None  # why the first of them does not do
+    before: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan, before it was reached
     at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, wishes: Wishes) -> None:
@@ -97,14 +101,51 @@ class Walk:
         here = self.q
         with _of_key(self.file, "start"):
             self._begin()
-        for number, move in enumerate(self.file.moves):
-            self.at = number, number
-            with _of_moves(self):
-                kinds[move.kind](self, move, getattr(move, move.kind))
-        with _of_moves(self):
-            self.close()
+        number = 0
+        while number <= len(self.file.moves):
+            try:
+                self._do(kinds, number)
+                number += 1
+            except NoSolutionError as error:
+                self.refused = self.refused or error
+                if not self.others:
+                    raise self.refused from None
+                number = self._back()
         self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
         return self.plan.finished(self.begun, self.made, self.markers)
+
+    def _do(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
+        """Do a move; behind the last one, what has gathered."""
+        if number == len(self.file.moves):
+            with _of_moves(self):
+                self.close()
+            return
+        move = self.file.moves[number]
+        self.at = number, number
+        with _of_moves(self):
+            kinds[move.kind](self, move, getattr(move, move.kind))
+
+    def take_posture(self) -> None:
+        """Go to the target that has gathered alone, in a posture; the others are tried if what follows is refused."""
+        if self.goal is None or self.pieces:
+            self.close()
+            return
+        found = self.others or self._postures(self.goal, self.goal_branch)
+        self.goal_branch, self.others = None, found[1:]
+        if self.others:
+            self.before = {}, {}
+            self.before = _kept(vars(self)), _kept(vars(self.plan))
+        self.append_joint_move(found[0], self.leads)
+        for kind, value in self.pauses.get(0, ()):
+            self.emit_event(kind, value)
+        self.goal = None
+
+    def _back(self) -> int:
+        """Be again where a posture was taken, with the others left; the number of that move."""
+        others, refused, (state, plan) = self.others, self.refused, self.before
+        vars(self).update({**_kept(state), "others": others, "refused": refused, "before": self.before})
+        vars(self.plan).update(_kept(plan))
+        return self.at[0]
 
     def _begin(self) -> None:
         """Where the path begins: where the arm stands, in a posture, or at a point, which the first moves choose."""
@@ -266,13 +307,17 @@ class Walk:
 
     def _reached(self, goal: Spot, branch: str | None) -> Array:
         """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
+        return self._postures(goal, branch)[0]
+
+    def _postures(self, goal: Spot, branch: str | None) -> tuple[Array, ...]:
+        """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
         found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
         meant = find(found.names, wanted) if (wanted := branch or self.wishes.branch) else None
         free = found.clear if self.arm.keep_out and not self.arm.ignores_keep_out else None
-        for b in found.order:
-            named = meant is None or found.branch[b] in meant
-            if found.valid[b] and found.within_limits[b] and named and (free is None or free[b]):
-                return np.asarray(found.q[b])
+        good = found.valid & found.within_limits & (True if free is None else free)
+        postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))
+        if postures:
+            return postures
         what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
         if found.status == Status.UNREACHABLE:
             raise NoSolutionError(f"{what} is out of reach: nothing was moved")
@@ -280,6 +325,11 @@ class Walk:
         if free is not None and (found.within_limits & ~free).any():
             raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
         raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
+
+
+def _kept(state: dict[str, Any]) -> dict[str, Any]:
+    """A state whose lists do not change with the original's."""
+    return {key: copy(each) if isinstance(each, list | dict | Reduced) else each for key, each in state.items()}
 
 
 def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
