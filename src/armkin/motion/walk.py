@@ -130,7 +130,7 @@ class Walk:
         if self.goal is None or self.pieces:
             self.close()
             return
-        found = self.others or self._postures(self.goal, self.goal_branch)
+        found = self.others or _postures(self, self.goal, self.goal_branch)
         self.goal_branch, self.others = None, found[1:]
         if self.others:
             self.before = {}, {}
@@ -153,7 +153,7 @@ class Walk:
         value = start if start is None or isinstance(start, str) else start.joints
         if start is not None and value is None:
             goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
-            self._reached(goal, None)  # refused here, of this key
+            _reached(self, goal, None)  # refused here, of this key
             self.clear(goal)
             self.opening = True
         elif value is not None:
@@ -218,7 +218,7 @@ class Walk:
     def _plan_group(self) -> None:
         if not self.pieces:
             if self.goal is not None:
-                self.append_joint_move(self._reached(self.goal, self.goal_branch), self.leads)
+                self.append_joint_move(_reached(self, self.goal, self.goal_branch), self.leads)
                 for kind, value in self.pauses.get(0, ()):
                     self.emit_event(kind, value)
             self.goal = None
@@ -290,8 +290,6 @@ class Walk:
             self.plan.deviation = max(self.plan.deviation, off)
             self.plan.nearer_singularity(path_.q, path_.s)
 
-    # Joint moves
-
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
         bad = np.flatnonzero(outside(self.arm, goal))
@@ -305,26 +303,28 @@ class Walk:
             self.made += [one] if one.duration > 0 else []
         self.q = goal
 
-    def _reached(self, goal: Spot, branch: str | None) -> Array:
-        """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
-        return self._postures(goal, branch)[0]
 
-    def _postures(self, goal: Spot, branch: str | None) -> tuple[Array, ...]:
-        """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
-        found = ik(self.arm, geometry.line(self.task, goal, goal).targets(np.zeros(1))[0], self.task.name, near=self.q)
-        meant = find(found.names, wanted) if (wanted := branch or self.wishes.branch) else None
-        free = found.clear if self.arm.keep_out and not self.arm.ignores_keep_out else None
-        good = found.valid & found.within_limits & (True if free is None else free)
-        postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))
-        if postures:
-            return postures
-        what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
-        if found.status == Status.UNREACHABLE:
-            raise NoSolutionError(f"{what} is out of reach: nothing was moved")
-        on = f" on branch '{wanted}'" if wanted else ""
-        if free is not None and (found.within_limits & ~free).any():
-            raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
-        raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
+def _reached(walk: Walk, goal: Spot, branch: str | None) -> Array:
+    """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
+    return _postures(walk, goal, branch)[0]
+
+
+def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
+    """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
+    found = ik(walk.arm, geometry.line(walk.task, goal, goal).targets(np.zeros(1))[0], walk.task.name, near=walk.q)
+    meant = find(found.names, wanted) if (wanted := branch or walk.wishes.branch) else None
+    free = found.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
+    good = found.valid & found.within_limits & (True if free is None else free)
+    postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))
+    if postures:
+        return postures
+    what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
+    if found.status == Status.UNREACHABLE:
+        raise NoSolutionError(f"{what} is out of reach: nothing was moved")
+    on = f" on branch '{wanted}'" if wanted else ""
+    if free is not None and (found.within_limits & ~free).any():
+        raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
+    raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
 
 
 def _kept(state: dict[str, Any]) -> dict[str, Any]:
