@@ -105,6 +105,7 @@ def test_what_is_as_planned_is_left_alone() -> None:
 def test_one_damaged_report_is_not_believed() -> None:
     _, one = opened()
     job = one.plan(one.counts(), np.deg2rad([-60, 60, -60]))
+    assert isinstance(job, Job)
     watch = Watch(job, one.axes, np.zeros(3, dtype=np.int64))
     one.refresh()
     report = one.session.report

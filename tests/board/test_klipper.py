@@ -295,9 +295,9 @@ def test_printer_cfg_is_compared() -> None:
 
 def test_arms_that_klipper_cannot_drive_are_refused() -> None:
     text = FILE.read_text()
-    with pytest.raises(UsageError, match="motor q1 is on axis X; for Klipper it is one of A, B, C, D, H"):
+    with pytest.raises(UsageError, match="motor q1 is on axis X; Klipper has A, B, C, D, H"):
         axes_of(build(parse(text.replace("axis: A", "axis: X").replace("board: {kind: klipper}", ""))))
-    with pytest.raises(UsageError, match="armkin drives steppers alone"):
+    with pytest.raises(UsageError, match="Klipper drives steppers alone"):
         axes_of(armkin.load("ra02"))
 
 

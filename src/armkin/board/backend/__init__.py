@@ -4,6 +4,7 @@ board.py         what a kind is: one class, with capabilities
 starting.py      where a motion begins: what every trajectory that becomes counts is held to
 job.py           a trajectory for a board that is sent positions, not segments
 servo_arm.py     an arm of bus servos of any make
+stepper_arm.py   an arm of steppers on a board that obeys every program
 record.py        what armkin last left on a board that other programs write to
 missing_keys.py  what a robot file lacks for its board
 
@@ -13,8 +14,12 @@ becomes bytes is its own business.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from armkin.board.backend.job import planned
+from armkin.motors import joints
 
 if TYPE_CHECKING:
     import numpy as np
@@ -65,35 +70,39 @@ class Planned(Protocol):
         """Greatest rate of every motor: (motors,) [counts/s]."""
 
 
-class Backend(Protocol):
+class Backend(ABC):
     """An arm on its board."""
 
+    differences: tuple[str, ...] = ()  # what this kind of board cannot promise, for people
     arm: Arm
     port: Port
 
-    @property
-    def differences(self) -> tuple[str, ...]:
-        """What this kind of board cannot promise, for people."""
-
+    @abstractmethod
     def position(self) -> Position:
         """Whether the board knows where the arm stands."""
 
     @property
+    @abstractmethod
     def why(self) -> str:
         """Why the position is lost, in words; empty while it is known."""
 
+    @abstractmethod
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
 
     def joints(self) -> Array:
         """Joint values where it stands, as last read: (n,) [rad | mm]."""
+        return joints(self.arm, self.counts())
 
+    @abstractmethod
     def refresh(self) -> None:
         """Read again where the arm stands."""
 
+    @abstractmethod
     def hold(self) -> None:
         """Stop along the path, and stay."""
 
+    @abstractmethod
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Get ready to move; True if the position was lost.
 
@@ -102,15 +111,20 @@ class Backend(Protocol):
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
+        return self.lay(*planned(self.arm, start, targets, speed))
 
+    @abstractmethod
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
 
+    @abstractmethod
     def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> object:
         """Carry out plans, one after another; None in between: nothing to do yet."""
 
+    @abstractmethod
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
 
+    @abstractmethod
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -42,36 +41,6 @@ class Job(Laid):
     def top_rate(self) -> Array:
         """Greatest rate of every motor: (motors,) [counts/s]."""
         return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
-
-
-class JobMachine(ABC):
-    """What machines that carry out jobs share: joints are counts in other words, moves are planned from counts."""
-
-    arm: Arm
-
-    @abstractmethod
-    def counts(self) -> tuple[int, ...]:
-        """Counts of the arm's motors, as last read."""
-
-    @abstractmethod
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-        """A trajectory that starts at counts (motors,)."""
-
-    @abstractmethod
-    def _read(self) -> None:
-        """Read where the arm stands."""
-
-    def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
-        return joints(self.arm, self.counts())
-
-    def refresh(self) -> None:
-        """Read again where the arm stands."""
-        self._read()
-
-    def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Job:
-        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return self.lay(*planned(self.arm, start, targets, speed))
 
 
 def planned(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:

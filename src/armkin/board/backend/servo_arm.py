@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, JobMachine, braking
+from armkin.board.backend import Backend, Position, Progress, StoppedError
+from armkin.board.backend.job import Job, braking
 from armkin.board.backend.starting import from_counts
 from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
@@ -60,7 +60,7 @@ def servo_ids(arm: Arm) -> list[int]:
     return ids
 
 
-class ServoArm(JobMachine):
+class ServoArm(Backend):
     """An arm of bus servos behind an open port, of any make."""
 
     firmware: str  # what `armkin status` calls them
@@ -101,6 +101,10 @@ class ServoArm(JobMachine):
         """Counts of the arm's motors, read now."""
         self._read()
         return self.counts()
+
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self._read()
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -161,7 +165,7 @@ class ServoArm(JobMachine):
         self._check_limits(made)
         return made
 
-    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
+    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = done = 0.0
         for one in filter(None, plans if isinstance(plans, list) else ()):

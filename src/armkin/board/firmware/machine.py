@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from armkin.board.backend import StoppedError
+from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
 from armkin.board.firmware.board_status import WHY, told
@@ -18,7 +18,6 @@ from armkin.board.firmware.session import DeviceError, Session
 from armkin.board_kinds import board_name
 from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
-from armkin.motors import joints as joints_of
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
@@ -29,17 +28,13 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
 
-Position = Literal["known", "retained", "lost"]
-Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
-
-class Machine:
+class Machine(Backend):
     """An arm on the board behind an open port.
 
     `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.
     """
 
-    differences: tuple[str, ...] = ()  # what armkin promises of a board is what this firmware does
     resumable = False  # whether what was held is noted: `armkin.board.resuming`
 
     def __init__(
@@ -88,10 +83,6 @@ class Machine:
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(self.status.counts[axis] for axis in self.configuration.axes)
-
-    def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
-        return joints_of(self.arm, self.counts())
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -10,22 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, JobMachine
-from armkin.board.backend.starting import from_counts
+from armkin.board.backend.job import Job
+from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.place import Place
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
 from armkin.board.grbl.watch import Watch
-from armkin.errors import LinkError, PositionKnownError, PositionLostError
-from armkin.model.units import joints_out
-from armkin.motors import pulses
+from armkin.errors import LinkError
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
-    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
     from armkin.robot_file.model import Gripper
@@ -34,9 +30,12 @@ _REST = 30.0  # [s] that a hold may take
 _FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second
 
 
-class GrblMachine(JobMachine):
+class GrblMachine(StepperArm):
     """An arm on the GRBL board behind an open port."""
 
+    put = "home it, or put it in its home pose and say so"
+    piece = gcode.PIECE
+    homes = True
     differences = (
         "GRBL has no checksum: a damaged line may move the arm wrongly until a report, some 0.2 s later, tells",
         "GRBL forgets its position at a reset, and an Arduino resets when its port is opened",
@@ -49,15 +48,12 @@ class GrblMachine(JobMachine):
         self.session = Session(port)
         self.session.open()
         self._place = Place(self.session, arm, self.axes)
+        self._record = self._place.record
         self.settings, self.told = self.session.settings(), port.now()  # when they were read
         self._spindle = Spindle(self.session)
         self._read()
 
     # Where it stands
-
-    def position(self) -> Position:
-        """Known while all that GRBL keeps is what armkin left there."""
-        return "lost" if self._place.why else "known"
 
     @property
     def why(self) -> str:
@@ -68,23 +64,11 @@ class GrblMachine(JobMachine):
         """Counts of the arm's motors, as last read."""
         return self._place.counts()
 
-    def standing(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
-        if self.why:
-            return f"the arm's position is lost ({self.why}): home it, or put it in its home pose and say so"
-        where = _listed(self.arm, joints_out(self.arm, self.joints()).tolist())
-        return f"the arm stands at {where}, its position is known: the next command starts there"
-
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
         status = self.session.status()
-        return {
-            "firmware": f"GRBL {self.session.version}",
-            "state": status.state.lower(),
-            "inputs": status.pins,
-            "settings": [str(difference) for difference in self.wrong()],
-            "lost_because": self.why or None,
-        }
+        said = {"firmware": f"GRBL {self.session.version}", "state": status.state.lower(), "inputs": status.pins}
+        return {**said, **super().report()}
 
     # Getting ready
 
@@ -110,8 +94,8 @@ class GrblMachine(JobMachine):
             raise LinkError(f"GRBL did not keep what was written: {left[0]}")
         return before
 
-    def prepare(self, *, assume: Array | None = None) -> bool:
-        """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
+    def _ready(self) -> None:
+        """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
         report = self.session.status()
         self.session.demand_rest(report)
         serious = _serious(self)
@@ -122,22 +106,8 @@ class GrblMachine(JobMachine):
             raise LinkError(f"GRBL is in state {report.state}, not Idle: home it, or unlock it once you know why")
         self.session.was_reset = False  # what a reset has taken from it is read now
         self._read()
-        if assume is not None and not self.why:
-            joints = joints_out(self.arm, self.joints()).tolist()
-            raise PositionKnownError(f"the position is known ({_listed(self.arm, joints)})", joints=joints)
-        if not self.why:
-            return False
-        if assume is None and not self.port.simulated:
-            raise PositionLostError(
-                f"the arm's position is lost: {self.why}",
-                robot_file=self.arm.path,
-                port=self.port.name,
-                homing=all(self.arm.homing),
-            )
-        self.vouch(np.asarray(pulses(self.arm, self.arm.home if assume is None else assume), dtype=np.int64))
-        return True
 
-    def vouch(self, counts: Any) -> None:
+    def vouch(self, counts: Sequence[int]) -> None:
         """Take somebody's word that the motors stand at these counts."""
         self._place.vouch(np.asarray(counts, dtype=np.int64))
 
@@ -147,52 +117,32 @@ class GrblMachine(JobMachine):
         """A trajectory that starts at counts (motors,)."""
         return gcode.job(trajectory, start)
 
-    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
-        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
-        total = done = 0.0
-        seen = False  # where the arm stands was read just now
-        for job in from_counts(plans, self.counts):
-            if job is None:
-                if self._stop():
-                    self.hold()
-                    raise StoppedError
-                self.port.read(0.01)
-                seen = False
-                continue
-            self._begin(job, seen=seen)
-            total += job.duration
-            began = self.port.now()
-            watch = Watch(job, self.axes, self._place.offset)
+    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
+        """Send a job's lines and watch the arm on its way; the position at its end is recorded."""
+        began, watch = self.port.now(), Watch(job, self.axes, self._place.offset)
 
-            def tick(done: float = done, total: float = total, began: float = began, watch: Watch = watch) -> bool:
-                progress(min(done + self.port.now() - began, total), total)
-                watch.heed(self.session.fresh(), self.port.now() - began)
-                return self._stop()
+        def tick() -> bool:
+            tell(self.port.now() - began)
+            watch.heed(self.session.fresh(), self.port.now() - began)
+            return self._stop()
 
-            try:
-                # the dwell is answered when all before it has been carried out
-                whole = self.session.stream(chain(gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick)
-            except LinkError as error:
-                raise self._explain(error) from None
-            if not whole:
-                self.hold()
-                raise StoppedError
-            self._compare(job)
-            done, seen = total, True
-            progress(done, total)
+        # the dwell is answered when all before it has been carried out
+        if not self.session.stream(chain(gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick):
+            return False
+        if self.session.status().state in ("Run", "Jog"):
+            raise LinkError("the arm moves on after its plan: another program drives it")
+        self._read()
+        if not self.why and self.counts() == tuple(job.end.tolist()):
+            self._place.arrived()
+        return True
 
     def _begin(self, job: Job, *, seen: bool) -> None:
         """Make sure that the arm stands where a job starts, at its own feed; record the motion."""
         if not seen:
             self.session.realtime(replies.PLAIN_FEED)
-            self._read()
-        if self.why:
-            raise LinkError(self.standing())
-        if self.counts() != tuple(job.start.tolist()):
-            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
+        super()._begin(job, seen=seen)
         if self.session.feed != 100:
             raise LinkError(f"GRBL overrides feeds by {self.session.feed} %, and does not take that back")
-        self._place.record.moves(job, gcode.PIECE)
 
     def hold(self) -> None:
         """Stop along the path and clear what is queued; the position stays known."""
@@ -220,18 +170,6 @@ class GrblMachine(JobMachine):
         self.session.reset()
         self._spindle.again()
 
-    def _compare(self, job: Job) -> None:
-        """Make sure that a job has ended where it should, and record that. Raises LinkError."""
-        if self.session.status().state in ("Run", "Jog"):
-            raise self._explain(LinkError("the arm moves on after its plan: another program drives it"))
-        self._read()
-        if self.why or self.counts() != tuple(job.end.tolist()):
-            raise LinkError(
-                f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}: a line was "
-                f"damaged on its way, or another program has moved the arm\n{self.standing()}"
-            )
-        self._place.arrived()
-
     def _explain(self, error: LinkError) -> LinkError:
         if not isinstance(error, GrblError) or error.error:  # what is queued must not go on by itself
             try:
@@ -258,7 +196,7 @@ class GrblMachine(JobMachine):
             raise self._explain(error) from None
         pull = self.settings.get(27, 0.0)
         away = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
-        self.vouch(np.rint(np.asarray(at) - away))
+        self.vouch(np.rint(np.asarray(at) - away).tolist())
 
     def _read(self) -> None:
         self._place.read()
@@ -275,8 +213,3 @@ def _serious(machine: GrblMachine) -> list[settings.Difference]:
         if not any(difference.serious for difference in machine.wrong()):
             break
     return [difference for difference in machine.wrong() if difference.serious]
-
-
-def _listed(arm: Arm, joints: list[float]) -> str:
-    """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90``."""
-    return ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in zip(arm.joint_names, joints, strict=True))

@@ -11,10 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from armkin.errors import UsageError
-from armkin.motors import motor_accel, motor_names
+from armkin.board.backend.stepper_arm import steppers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -72,35 +69,11 @@ class Difference:
 
 def axes_of(arm: Arm) -> list[Axis]:
     """One axis a motor, in the arm's order. Raises UsageError, naming the motor, for what Klipper cannot drive so."""
-    where = arm.path or arm.name
-    if not arm.motors:
-        raise UsageError(f"{where}: no joint has a drive")
-    speed = np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed)  # [counts/s] all joints at once
-    accel = motor_accel(arm)
     home = arm.motor_gain @ arm.home  # [counts] of the motors at the home pose, if 0 is where all joint values are 0
-    found: list[Axis] = []
-    for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
-        if motor.kind != "stepper":
-            raise UsageError(f"{where}: motor {name} is a {motor.kind}; armkin drives steppers alone through Klipper")
-        if motor.axis not in LETTERS or motor.axis in (axis.letter for axis in found):
-            raise UsageError(
-                f"{where}: motor {name} is on axis {motor.axis}; for Klipper it is one of {', '.join(LETTERS)}, "
-                "one motor on each"
-            )
-        steps = motor.pulses_per_unit()
-        rates = float(np.nan_to_num(speed[k] / steps)), float(np.nan_to_num(accel[k] / steps, posinf=0.0))
-        found.append(
-            Axis(
-                motor.axis,
-                name,
-                steps,
-                float(home[k] / steps),
-                motor.full_steps or 0,
-                motor.microsteps or 0,
-                motor.invert,
-                *rates,
-            )
-        )
+    found = []
+    for k, motor, name, steps, *rates in steppers(arm, "Klipper", LETTERS):
+        full, micro = motor.full_steps or 0, motor.microsteps or 0
+        found.append(Axis(motor.axis, name, steps, float(home[k] / steps), full, micro, motor.invert, *rates))
     return found
 
 

@@ -8,26 +8,23 @@ armkin left, by a record beside the port's lock.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend import Position, Progress, StoppedError
-from armkin.board.backend.job import Job, JobMachine, braking
+from armkin.board.backend.job import Job, braking
 from armkin.board.backend.record import Record
-from armkin.board.backend.starting import from_counts, unbelievable
+from armkin.board.backend.starting import unbelievable
+from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
 from armkin.board.klipper.axes import PIECE, Axis, Difference, axes_of, differences
-from armkin.errors import LinkError, PositionKnownError, PositionLostError
-from armkin.model.units import joints_out
-from armkin.motors import pulses
+from armkin.errors import LinkError
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
-    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.trajectory import Trajectory
 
@@ -43,9 +40,10 @@ def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     return Job(trajectory, start, gcode.segments(trajectory))
 
 
-class KlipperMachine(JobMachine):
+class KlipperMachine(StepperArm):
     """An arm behind the socket of Klipper's API server."""
 
+    piece = PIECE
     differences = (
         "Klipper tells the position that it was commanded; a restart, a shutdown and motors switched off lose it",
         "a stop takes effect when Klipper has carried out what it holds, about a second later; M112 stops at once, "
@@ -59,38 +57,25 @@ class KlipperMachine(JobMachine):
         told = self.api.ask("info")
         self.version, self.state = str(told.get("software_version", "")), str(told.get("state", ""))
         self._message = str(told.get("state_message", "")).partition("\n")[0]
-        self.why, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
+        self._why, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
         self._record, self._marks = Record(port, arm), dict[str, str]()
         self.settings: dict[str, Any] = {}
         self._read()
 
     # Where it stands
 
-    def position(self) -> Position:
-        """Known while Klipper is ready, the axes are registered, their motors on, and stand where armkin left them."""
-        return "lost" if self.why else "known"
+    @property
+    def why(self) -> str:
+        """Why the position is lost, in words; empty while it is known."""
+        return self._why
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)
 
-    def standing(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
-        if self.why:
-            return f"the arm's position is lost ({self.why}): put it in its home pose and say so"
-        names = zip(self.arm.joint_names, joints_out(self.arm, self.joints()).tolist(), strict=True)
-        where = ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in names)
-        return f"the arm stands at {where}, its position is known: the next command starts there"
-
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        return {
-            "firmware": f"Klipper {self.version}",
-            "state": self.state,
-            "inputs": "",
-            "settings": [str(difference) for difference in self.wrong()],
-            "lost_because": self.why or None,
-        }
+        return {"firmware": f"Klipper {self.version}", "state": self.state, "inputs": "", **super().report()}
 
     def wrong(self) -> list[Difference]:
         """Options of printer.cfg that are not as the robot file wants them."""
@@ -98,8 +83,8 @@ class KlipperMachine(JobMachine):
 
     # Getting ready
 
-    def prepare(self, *, assume: Array | None = None) -> bool:
-        """Check printer.cfg and position; True if the position was lost: the arm stands at `assume` from now on."""
+    def _ready(self) -> None:
+        """Read where the arm stands. Raises LinkError if printer.cfg or Klipper's state forbid a motion."""
         self._read()
         if self.state != "ready":
             raise LinkError(f"Klipper is not ready, it says {self.state}: {self._message}")
@@ -107,20 +92,6 @@ class KlipperMachine(JobMachine):
             more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
             raise LinkError(f"printer.cfg does not fit {self.arm.name}: {wrong[0]}{more}; armkin setup prints it")
         self._settle()
-        if assume is not None and not self.why:
-            joints = joints_out(self.arm, self.joints()).tolist()
-            raise PositionKnownError("the position is known", joints=joints)
-        if not self.why:
-            return False
-        if assume is None and not self.port.simulated:
-            raise PositionLostError(
-                f"the arm's position is lost: {self.why}",
-                robot_file=self.arm.path,
-                port=self.port.name,
-                homing=False,
-            )
-        self.vouch(pulses(self.arm, self.arm.home if assume is None else assume).tolist())
-        return True
 
     def vouch(self, counts: Sequence[int]) -> None:
         """Take somebody's word that the motors stand at these counts: register the axes there, motors on."""
@@ -142,45 +113,13 @@ class KlipperMachine(JobMachine):
         """A trajectory that starts at counts (motors,)."""
         return job(trajectory, start)
 
-    def run(self, plans: Iterable[Job | None], progress: Progress = lambda done, total: None) -> None:
-        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
-        total = done = 0.0
-        seen = False  # where the arm stands was read just now
-        for one in from_counts(plans, self.counts):
-            if one is None:
-                if self._stop():
-                    raise StoppedError
-                self.port.read(0.01)
-                seen = False
-                continue
-            self._begin(one, seen=seen)
-            total += one.duration
-            try:
-                whole = self._follow(one, lambda t, done=done, total=total: progress(done + t, total))  # type: ignore[misc]
-                self._settle()
-            except LinkError as error:
-                raise self._explain(error) from None
-            if not self.why:
-                self._record.stands(self._marks, self.counts(), [0] * len(self.axes))
-            if not whole or self._stop():
-                raise StoppedError
-            if self.why or self.counts() != tuple(one.end.tolist()):
-                raise LinkError(
-                    f"Klipper stands at {list(self.counts())} steps, the plan ends at {one.end.tolist()}\n"
-                    f"{self.standing()}"
-                )
-            done, seen = total, True
-            progress(done, total)
-
-    def _begin(self, one: Job, *, seen: bool) -> None:
-        """Make sure that the arm stands where a job starts, and record the motion."""
-        if not seen:
-            self._read()
-        if self.why:
-            raise LinkError(self.standing())
-        if self.counts() != tuple(one.start.tolist()):
-            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
-        self._record.moves(one, PIECE)
+    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
+        """Send a job's lines in their time, to the end of all that Klipper holds."""
+        whole = self._follow(job, tell)
+        self._settle()
+        if not self.why:
+            self._record.stands(self._marks, self.counts(), [0] * len(self.axes))
+        return whole and not self._stop()
 
     def hold(self) -> None:
         """Wait until what was sent is done: Klipper takes nothing of it back."""
@@ -227,7 +166,7 @@ class KlipperMachine(JobMachine):
     def _read(self) -> None:
         """Read where the arm stands: known while that is where armkin left it."""
         why = self._ask() or self._record.differs(self._marks)
-        self.why = why or self._record.moved(self.counts()) or unbelievable(self.arm, self.counts()) or ""
+        self._why = why or self._record.moved(self.counts()) or unbelievable(self.arm, self.counts()) or ""
 
     def _ask(self) -> str:
         """Read Klipper's state, its configuration and its places; returns why these mean nothing, in words."""

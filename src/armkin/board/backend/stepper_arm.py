@@ -1,0 +1,167 @@
+"""An arm of steppers on a board that obeys every program: its place is believed by the record of what armkin left.
+
+Such a kind says what it can drive, reads where the arm stands and why that means nothing, and carries out a job; where
+a motion begins and ends, who vouches for a lost place, and the words for it are here.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from armkin.board.backend import Backend, Position, Progress, StoppedError
+from armkin.board.backend.job import Job
+from armkin.board.backend.starting import from_counts
+from armkin.errors import LinkError, PositionKnownError, PositionLostError, UsageError
+from armkin.model.units import joints_out
+from armkin.motors import motor_accel, motor_names, pulses
+
+if TYPE_CHECKING:
+    from armkin.board.backend.record import Record
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+
+
+def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[int, Any, str, float, float, float]]:
+    """Number, motor, name, steps a unit, greatest speed and acceleration [units/s, units/s2] of the arm's motors.
+
+    Raises UsageError, naming the motor, for one that is no stepper, or has no axis of its own.
+    """
+    where = arm.path or arm.name
+    if not arm.motors:
+        raise UsageError(f"{where}: no joint has a drive")
+    speed = np.nan_to_num(np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed), posinf=0.0)  # all joints at once
+    accel = np.nan_to_num(motor_accel(arm), posinf=0.0)
+    free = list(letters)
+    for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
+        if motor.kind != "stepper":
+            raise UsageError(f"{where}: motor {name} is a {motor.kind}; {called} drives steppers alone")
+        if motor.axis not in free:
+            raise UsageError(
+                f"{where}: motor {name} is on axis {motor.axis}; {called} has {', '.join(letters)}, one motor on each"
+            )
+        free.remove(motor.axis)
+        steps = motor.pulses_per_unit()
+        yield k, motor, name, steps, float(speed[k] / steps), float(accel[k] / steps)
+
+
+class StepperArm(Backend):
+    """An arm of steppers behind an open port."""
+
+    put: ClassVar[str] = "put it in its home pose and say so"  # what cures a lost position
+    piece: ClassVar[float]  # [s] of a curve that one line is sent for
+    homes: ClassVar[bool] = False  # it can search switches
+    _stop: Callable[[], bool]
+    _record: Record  # what armkin last left on the board
+
+    def position(self) -> Position:
+        """Known while all that the board keeps is what armkin left there."""
+        return "lost" if self.why else "known"
+
+    def refresh(self) -> None:
+        """Read again where the arm stands."""
+        self._read()
+
+    def standing(self) -> str:
+        """Where the arm has come to rest, and what that means for the next command."""
+        if self.why:
+            return f"the arm's position is lost ({self.why}): {self.put}"
+        return f"the arm stands at {self._where()}, its position is known: the next command starts there"
+
+    def report(self) -> dict[str, Any]:
+        """What `armkin status` tells besides the position."""
+        return {"settings": [str(one) for one in self.wrong()], "lost_because": self.why or None}
+
+    def prepare(self, *, assume: Array | None = None) -> bool:
+        """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
+        self._ready()
+        if not self.why:
+            if assume is not None:
+                joints = joints_out(self.arm, self.joints()).tolist()
+                raise PositionKnownError(f"the position is known ({self._where()})", joints=joints)
+            return False
+        if assume is None and not self.port.simulated:
+            raise PositionLostError(
+                f"the arm's position is lost: {self.why}",
+                robot_file=self.arm.path,
+                port=self.port.name,
+                homing=self.homes and all(self.arm.homing),
+            )
+        self.vouch(pulses(self.arm, self.arm.home if assume is None else assume).tolist())
+        return True
+
+    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
+        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
+        total = done = 0.0
+        seen = False  # where the arm stands was read just now
+        for job in from_counts(plans, self.counts):
+            if job is None:
+                if self._stop():
+                    self.hold()
+                    raise StoppedError
+                self.port.read(0.01)
+                seen = False
+                continue
+            self._begin(job, seen=seen)
+            total += job.duration
+
+            def tell(t: float, done: float = done, total: float = total) -> None:
+                progress(min(done + t, total), total)
+
+            try:
+                whole = self._carry_out(job, tell)
+            except LinkError as error:
+                raise self._explain(error) from None
+            if not whole:
+                self.hold()
+                raise StoppedError
+            if self.why or self.counts() != tuple(job.end.tolist()):
+                cause = "" if self.why else ": a line was damaged on its way, or another program has moved the arm"
+                where = f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}"
+                raise LinkError(f"{where}{cause}\n{self.standing()}")
+            done, seen = total, True
+            progress(done, total)
+
+    def _begin(self, job: Job, *, seen: bool) -> None:
+        """Make sure that the arm stands where a job starts, and record the motion."""
+        if not seen:
+            self._read()
+        if self.why:
+            raise LinkError(self.standing())
+        if self.counts() != tuple(job.start.tolist()):
+            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
+        self._record.moves(job, self.piece)
+
+    def _where(self) -> str:
+        """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90``."""
+        names = zip(self.arm.joint_names, joints_out(self.arm, self.joints()).tolist(), strict=True)
+        return ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in names)
+
+    # What depends on the board
+
+    @abstractmethod
+    def wrong(self) -> Sequence[Any]:
+        """Settings that are not as the robot file wants them."""
+
+    @abstractmethod
+    def vouch(self, counts: Sequence[int]) -> None:
+        """Take somebody's word that the motors stand at these counts."""
+
+    @abstractmethod
+    def _read(self) -> None:
+        """Read where the arm stands."""
+
+    @abstractmethod
+    def _ready(self) -> None:
+        """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
+
+    @abstractmethod
+    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
+        """Carry out a job, to rest, and read where the arm stands; False: a stop was asked for; tell: seconds done."""
+
+    @abstractmethod
+    def _explain(self, error: LinkError) -> LinkError:
+        """The same error, with where the arm has come to rest."""
