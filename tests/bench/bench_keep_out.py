@@ -239,14 +239,13 @@ def motions(count: int, rng: np.random.Generator) -> None:
         done = free = wrong = needless = 0
         deepest, looked = 0.0, []
         for arm in scenes(name, rng):
-            fast = armkin.compile(arm)
-            q = random_joints(arm, rng, 600)
-            q = q[np.asarray(fast.clearance(q).mm) >= 0]
+            held, q = guard(arm), random_joints(arm, rng, 600)
+            q = q[held.least(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
                 b = b if rng.random() < 0.5 else np.clip(a + rng.uniform(0.02, 0.5) * (b - a), arm.lower, arm.upper)
                 found = proved(plan(arm, a, b))
                 assert found is not None
-                least = float(np.asarray(fast.clearance(a + share * (b - a)).mm).min())
+                least = float(held.least(a + share * (b - a))[0].min())
                 done, free = done + 1, free + found.free
                 looked.append(found.postures)
                 if found.free:

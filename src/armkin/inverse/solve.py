@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
-from armkin.inverse import chunks, legal_postures, near_itself, one_target, target_rounding
+from armkin.inverse import chunks, free_postures, legal_postures, near_itself, one_target, target_rounding
 from armkin.inverse.batch import Batch, Goals, empty, pack
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -105,6 +105,7 @@ def ik(
     if examine:
         out = legal_postures.listed(Goals(arm, definition, target, each), out)
         out = near_itself.stand(Goals(arm, definition, target, each), out, most)
+        out = free_postures.listed(Goals(arm, definition, target, each), out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:
