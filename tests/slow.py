@@ -185,6 +185,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_board.py": (),
     "teach/test_teach_browser.py": (),
     "teach/test_teach_flow.py": (),
+    "teach/test_teach_keep_outs.py": (),
     "teach/test_teach_follow.py": (),
     "teach/test_teach_mended.py": (),
     "teach/test_teach_guard.py": ("test_a_thousand_connections_do_not_keep_the_page_out",),

@@ -21,6 +21,7 @@ null_directions.py  the directions that a posture loses
 corners.py          postures in which self-motions meet, replaced by one of each
 circuits.py         the connected pieces of a self-motion of three joints or more
 legal_postures.py   edges of which only other postures than those listed are within limits
+free_postures.py    self-motions beside keep-outs: by their nearest free posture
 solutions.py        the answer
 choose.py           one branch a target, of an arm with joints held or swept, too; or why none is
 closest.py          the nearest legal pose when there is no branch

@@ -74,9 +74,10 @@ def _break(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Recon
     """Where and why a run from a sample ends."""
     why, joint, value, beyond = why_ended(c, chain, first)
     e = max(chain.carries(first), 0)
-    hit = hits_said(arm, chain.q[min(e + 1, chain.last) - chain.first]) if why == "hit" else ""
+    q = chain.q[min(e + 1, chain.last) - chain.first].copy() if why == "hit" else None
+    hit = "" if q is None else hits_said(arm, q)
     return Reconfiguration(
-        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond, hit
+        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond, hit, q
     )
 
 
@@ -158,7 +159,7 @@ def _shown(arm: Arm, joint: int, value: float) -> float:
 
 def refused(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSolutionError:
     """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
-    best = plan.branches[0] if plan.branches else None
+    best, at = plan.branches[0] if plan.branches else None, None
     length = carried.route.length
     if best is None:
         text = "the path's first point is out of reach"
@@ -171,11 +172,14 @@ def refused(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSo
         far = float(carried.columns.s[carried.runs[0].last])
         text = f"no branch carries the whole path: {far:.3f} of {length:.3f} mm, then "
         text += words(plan.arm, plan.reconfigurations[0])
+        at = plan.reconfigurations[0].joints
         changes = len(carried.runs) - 1
         if carried.covered:
             text += f"; with {changes} change{'s' * (changes > 1)} of branch it can be done"
     plan.length += length
     fields: dict[str, Any] = {"splittable": carried.covered}
+    if at is not None:
+        fields["joints"] = units.joints_out(plan.arm, at).tolist()
     error = NoSolutionError(f"{text}: nothing was moved", **fields)
     error.plan = plan
     return error

@@ -45,6 +45,7 @@ class Reconfiguration:
     value: float | None  # [rad | mm] the limit
     beyond: str  # the inverse kinematics' status just behind
     hit: str = ""  # what hits what
+    joints: Array | None = None  # (n,) [rad | mm] there
 
 
 @dataclass(frozen=True)

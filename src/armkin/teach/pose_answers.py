@@ -49,6 +49,7 @@ def look(arm: Arm, question: Question) -> dict[str, Any]:
         **solved,
         "q": units.joints_out(arm, q).tolist(),
         "outside": _words(arm, q),
+        "red": _red(arm, q),
         "tip": {
             "position_mm": T[:3, 3].tolist(),
             "rpy_deg": units.angles_out(rpy(T[:3, :3])).tolist(),
@@ -156,6 +157,15 @@ def _same(branches: Sequence[choose.Branch], q: Array) -> int | None:
         if np.minimum(apart, np.abs(apart % (2 * np.pi) - 2 * np.pi)).max() < 1e-6 or apart.max() < 1e-6:
             return k
     return None
+
+
+def _red(arm: Arm, q: Array) -> list[int]:
+    """Bodies that hit something, 0 the base's: also those that others hit."""
+    if not arm.keep_out:
+        return []
+    bodies = ["base", *arm.joint_names]
+    named = {name for hit in hits(arm, q[None])[0][1] for name in (hit["body"], hit["with"])}
+    return [k for k, name in enumerate(bodies) if name in named]
 
 
 def _words(arm: Arm, q: Array) -> list[str]:

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from armkin.errors import NoSolutionError
+from armkin.forward import fk
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
@@ -57,9 +59,20 @@ class ProgramActions:
             return {"text": self.program.text(), "name": f"{self.arm.name}_path.yaml"}
 
     def plan(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The program's motion from where the arm stands, else from home: to be played."""
+        """The program's motion from where the arm stands, else from home: to be played.
+
+        One that hits something has `refused`, why, and `hit`, where the tip is then; a plan that is whole is played.
+        """
         with self._lock:
-            return played(self.arm, self.program.plan(self.start()))
+            try:
+                return played(self.arm, self.program.plan(self.start()))
+            except NoSolutionError as error:
+                if "joints" not in error.fields:
+                    raise
+                q = units.joints_in(self.arm, error.fields["joints"])
+                whole = error.plan is not None and error.plan.trajectory is not None
+                way = played(self.arm, error.plan) if whole else {"tips": []}
+                return {**way, "refused": str(error), "hit": fk(self.arm, q)[:3, 3].round(3).tolist()}
 
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a move ends."""

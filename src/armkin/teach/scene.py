@@ -52,6 +52,7 @@ def scene(arm: Arm) -> dict[str, Any]:
             )
         ],
         "poses": units.poses_out(arm),
+        "obstacles": _obstacles(arm),
         **_motors(arm),
         "gripper": _gripper(arm),
         "lock": first_lock(arm),
@@ -75,6 +76,15 @@ def _steps(arm: Arm) -> list[float]:
     except UsageError:
         return [0.1] * arm.n
     return [float(step) or 0.1 for step in units.joints_out(arm, per_pulse)]
+
+
+def _obstacles(arm: Arm) -> list[float]:
+    """The surfaces of all keep-outs, as triangles: nine numbers each, in the frame of targets."""
+    if not arm.keep_out:
+        return []
+    from armkin.keep_out.guard import guard
+
+    return [x for _, one in guard(arm).obstacles for x in one.triangles(1.4 * arm.reach).round(2).ravel().tolist()]
 
 
 def _motors(arm: Arm) -> dict[str, Any]:

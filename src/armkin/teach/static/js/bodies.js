@@ -182,6 +182,16 @@ export class Figure {
     this.at = [];
   }
 
+  /** Paint some bodies in another colour, and all others in their own. @param {number[]} some @param {import("three").Material} other */
+  paint(some, other) {
+    this.bodies.forEach((group, i) => {
+      for (const part of /** @type {Mesh[]} */ (group.children)) {
+        part.userData.own ??= part.material;
+        part.material = some.includes(i) ? other : part.userData.own;
+      }
+    });
+  }
+
   /** Take a pose. @param {number[]} q */
   pose(q) {
     const { before, after, tool } = frames(this.shapes.arm, q);

@@ -43,7 +43,7 @@ class Page {
     });
     this.program = new Program(arm, {
       pose, settled: () => this.refresh(), show: (q) => this.turn(q), played: (q) => this.played(q),
-      trail: (tips) => this.view?.trail(tips),
+      trail: (tips, hit) => this.view?.trail(tips, hit),
       trouble: (text) => trouble(text, "program"), begun, mine: () => this.mine,
     });
     this.asking = new Latest((fields) => this.answer(fields));
@@ -65,7 +65,7 @@ class Page {
     begun();
     this.q = q;
     this.joints.show(q);
-    if (!this.moving) this.view?.pose(q);
+    if (!this.moving) this.view?.pose(q, this.look.red);
     this.ask({ goal });
   }
 
@@ -161,7 +161,7 @@ class Page {
     this.tip.show(look, stale);
     this.motors.show(look);
     if (!this.view || this.moving) return;
-    this.view.pose(look.q);
+    this.view.pose(look.q, look.red);
     this.showGhosts();
     const flat = isFlat(look.task);
     const { position_mm: tip, rpy_deg } = look.tip;

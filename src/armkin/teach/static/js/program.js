@@ -10,7 +10,7 @@ export class Program {
   /**
    * @param {import("./types.js").Arm} arm
    * @param {{pose: () => Promise<number[]>, settled: () => void, show: (q: number[]) => void, played: (q: number[]) => void,
-   *   trail: (tips: number[][]) => void, trouble: (text: string) => void, begun: () => void, mine: () => boolean}} page
+   *   trail: (tips: number[][], hit?: number[]) => void, trouble: (text: string) => void, begun: () => void, mine: () => boolean}} page
    */
   constructor(arm, page) {
     this.page = page;
@@ -93,8 +93,13 @@ export class Program {
 
   /** @param {import("./types.js").Played} plan */
   take(plan) {
-    this.player.load(plan);
-    this.page.trail(plan.tips);
+    this.player.load(plan.time ? plan : null);
+    this.page.trail(plan.tips, plan.hit);
+    if (plan.refused) {
+      get("planned").textContent = `${plan.refused} (the red place)`;
+      get("planned").className = "bad";
+      return;
+    }
     let text = `${fixed(plan.duration_s, 3)} s`;
     if (plan.approach_s) text = `first a joint move to its start, ${fixed(plan.approach_s, 3)} s; then ${text}`;
     if (plan.length_mm) text += `, ${fixed(plan.length_mm, 1)} mm on lines and arcs`;

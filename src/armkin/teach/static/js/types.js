@@ -8,11 +8,11 @@
  * @typedef {{robot: string, robot_file: string, reach: number, base: number[][],
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
  *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
- *   lock: string|null, locks: boolean}} Arm
+ *   lock: string|null, locks: boolean, obstacles?: number[]}} Arm
  * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], hits?: string, motion: number}} Branch
  * @typedef {{pulses: number[], moves: number[], from: string, error_mm: number, best: boolean,
  *   outside_travel: string[]}} Motors
- * @typedef {{q: number[], outside: string[], tip: {position_mm: number[], rpy_deg: number[]},
+ * @typedef {{q: number[], outside: string[], red?: number[], tip: {position_mm: number[], rpy_deg: number[]},
  *   motors: Motors|null, task: string|null, why?: string, labels?: string[], units?: string[], target?: number[],
  *   status: string|null, complete?: boolean, free?: string[], branches: Branch[], names?: string[],
  *   chosen?: number|null, closest?: {joints: number[], distance_mm: number, angle_deg: number}|null}} Look
@@ -22,6 +22,6 @@
  * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,
  *   undo: number, redo: number}} ProgramState
  * @typedef {{duration_s: number, approach_s: number, length_mm: number, shown_mm: number, time: number[], joints: number[][], tips: number[][],
- *   shares: number[][], stops: number[]}} Played
+ *   shares: number[][], stops: number[], refused?: string, hit?: number[]}} Played
  */
 export {};

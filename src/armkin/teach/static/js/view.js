@@ -2,8 +2,8 @@
 /** The 3-D view: drawn when something has changed, never in a loop. */
 import {
   AmbientLight, AxesHelper, Box3, BufferGeometry, CustomBlending, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper,
-  HemisphereLight, Line, LineBasicMaterial, MeshBasicMaterial, MeshLambertMaterial, NotEqualStencilFunc, OneFactor,
-  PerspectiveCamera, ReplaceStencilOp, Scene, Vector3, WebGLRenderer,
+  HemisphereLight, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshLambertMaterial, NotEqualStencilFunc, OneFactor,
+  PerspectiveCamera, ReplaceStencilOp, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
@@ -13,6 +13,8 @@ import { Pointing } from "./pointing.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
+const RED = 0xd62728; // what hits something
+const AMBER = 0xe69f00; // what must not be hit
 const SUN = [1.2, -1.6, 3]; // where the light comes from
 
 // Points of the picture for one of the window's. Edges are smooth because there are more of them, at rest; the
@@ -49,9 +51,13 @@ export class View {
     this.shapes = new Shapes(arm);
     this.tube = new MeshLambertMaterial();
     this.drum = new MeshLambertMaterial();
+    this.wrong = new MeshLambertMaterial({ color: RED });
+    this.place = new Mesh(new SphereGeometry(0.02 * arm.reach, 20, 14), new MeshBasicMaterial({ color: RED }));
+    this.place.visible = false; // of a program's first hit
     this.solid = new Figure(this.shapes, this.tube, this.drum);
     this.ghosts = new Ghosts(this.shapes);
-    this.scene.add(this.solid.group, this.ghosts.group);
+    this.scene.add(this.solid.group, this.ghosts.group, this.place);
+    this.obstacles();
     this.lights();
     this.floor();
     const length = 0.14 * arm.reach;
@@ -85,6 +91,16 @@ export class View {
     const sun = new DirectionalLight(0xffffff, 2.4);
     sun.position.set(SUN[0], SUN[1], SUN[2]);
     this.scene.add(sun, new HemisphereLight(0xffffff, 0x8090a0, 1.3), new AmbientLight(0xffffff, 0.25));
+  }
+
+  /** What the arm must not touch: seen through, and hiding nothing. */
+  obstacles() {
+    if (!this.arm.obstacles?.length) return;
+    const surface = new BufferGeometry();
+    surface.setAttribute("position", new Float32BufferAttribute(this.arm.obstacles, 3));
+    surface.computeVertexNormals();
+    const glass = new MeshLambertMaterial({ color: AMBER, transparent: true, opacity: 0.3, side: DoubleSide, depthWrite: false });
+    this.scene.add(new Mesh(surface, glass));
   }
 
   /** A grid, and the arm's shadow on it: the arm itself, flattened along the light. */
@@ -163,10 +179,12 @@ export class View {
     else this.inside = seen;
   }
 
-  /** @param {number[]} q */
-  pose(q) {
+  /** @param {number[]} q @param {number[]} [red] bodies that hit something */
+  pose(q, red = []) {
     this.q = q;
     this.solid.pose(q);
+    this.solid.paint(red, this.wrong);
+    this.canvas.dataset.red = red.join(" "); // for tests
     this.shadow?.pose(q);
     if (this.solid.tool) this.tool.matrix.fromArray(this.solid.tool).transpose();
     this.tool.matrixWorldNeedsUpdate = true;
@@ -181,8 +199,11 @@ export class View {
     this.draw();
   }
 
-  /** Draw the tip's way through a program. @param {number[][]} tips */
-  trail(tips) {
+  /** Draw the tip's way through a program. @param {number[][]} tips @param {number[]} [hit] where it hits something */
+  trail(tips, hit) {
+    this.place.visible = hit !== undefined;
+    if (hit) this.place.position.set(hit[0], hit[1], hit[2]);
+    this.canvas.dataset.hit = hit?.join(" ") ?? ""; // for tests
     if (this.way) {
       this.scene.remove(this.way);
       this.way.geometry.dispose();

@@ -1,0 +1,56 @@
+"""Keep-outs on the page: bodies that hit are red, so is the place on a program's way, and Send is refused in words."""
+
+from __future__ import annotations
+
+import pytest
+from browsing import aim, chromium, opened, settled, until
+from served import serving
+
+import armkin
+from armkin.teach.actions import Actions
+from command_line import ROOT
+
+HIT = [0.0, 0.0, -45.0]  # q3 is in the table
+
+
+@pytest.fixture
+def arm() -> armkin.Arm:
+    return armkin.load("three_dof", scene=ROOT / "examples/scenes/three_dof.yaml")
+
+
+def test_a_hit_is_red_and_send_says_why_not(arm: armkin.Arm) -> None:
+    with serving(Actions(arm, "sim")) as server, chromium() as browser, opened(browser, server.address) as page:
+        red = "document.getElementById('canvas').dataset.red"
+        assert page.evaluate(red) == ""
+        for joint, value in enumerate(HIT):
+            page.fill(f"#box-{joint}", str(value))
+            page.press(f"#box-{joint}", "Enter")
+            settled(page)
+        until(page, f"{red} === '3'")
+        assert "it hits table by 47.5 mm (q3)" in page.inner_text("#outside")
+        before = server.actions.board.thread.state()["pulses"]  # type: ignore[union-attr]
+        page.click("#send")
+        until(page, "document.getElementById('trouble').innerText.includes('q3 would hit table')")
+        assert server.actions.board.thread.state()["pulses"] == before  # type: ignore[union-attr]
+        # A program whose line goes through the table.
+        aim(page, 300, 280, 200)
+        page.click("#record")
+        aim(page, 380, 0, 30)
+        page.select_option("#kind", "line")
+        page.click("#record")
+        until(page, "document.getElementById('canvas').dataset.hit")
+        assert "table" in page.inner_text("#planned")
+        assert page.get_attribute("#planned", "class") == "bad"
+
+
+def test_a_program_that_hits_something_tells_where(arm: armkin.Arm) -> None:
+    actions = Actions(arm)
+    told = actions.program_actions
+    told.program.edit({"do": "record", "kind": "joint", "q": [80.0, 10.0, -45.0]})
+    told.program.edit({"do": "record", "kind": "joint", "q": [-80.0, 10.0, -45.0]})
+    answer = told.plan(None, {})  # type: ignore[arg-type]
+    assert "would hit table" in answer["refused"]
+    assert len(answer["tips"]) > 10  # the way is shown, the place on it
+    tip = min(sum((a - b) ** 2 for a, b in zip(answer["hit"], one, strict=True)) for one in answer["tips"])
+    assert tip**0.5 < 20
+    assert actions._open()["scene"]["obstacles"]
