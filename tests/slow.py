@@ -118,6 +118,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "export/test_c.py": (),
     "export/test_js.py": (),
     "export/test_words.py": ("test_a_table_is_the_same_arm",),
+    "firmware/test_analyser.py": (),
     "firmware/test_handshake.py": (),
     "firmware/test_latencies.py": (),
     "firmware/test_proved_core.py": (),

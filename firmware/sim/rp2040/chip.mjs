@@ -12,7 +12,9 @@ const VTOR = 0x10000100;
 const EXCEPTION_ENTRY = 15; // cycles (Cortex-M0+ TRM, 3.7); its return takes 13
 const EXCEPTION_RETURN = 13;
 const LOOK = 2500; // cycles between two looks outside: half a byte on the line
+const BESIDE = 8; // cycles that the DMA may be behind the PIO
 const CHIP_RESET = 0x40064;
+const DMA_ABORT = 0x444;
 
 /** The flash that a UF2 file describes (https://github.com/microsoft/uf2), after the checks of the boot ROM's loader. */
 export function readUf2(file) {
@@ -153,6 +155,9 @@ export class Chip {
       this.rp2040.pio[number] = block;
       this.rp2040.peripherals[0x50200 + 0x100 * number] = block;
     });
+    const { dma } = this.rp2040; // an abort is over at once
+    const read = dma.readUint32.bind(dma);
+    dma.readUint32 = (offset) => (offset === DMA_ABORT ? 0 : read(offset));
   }
 
   /** The cycle of what a pin is doing just now. */
@@ -187,30 +192,39 @@ export class Chip {
       return;
     }
     while (this.cycle < end && !this.pendingReset) {
-      let alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
+      const alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
       if (core.waiting && core.pendingInterrupts & core.enabledInterrupts) {
         core.waiting = false; // an interrupt that was pending before WFI ends it at once, which rp2040js misses
       }
+      let to = this.cycle;
       if (this.absent) {
-        this.cycle += this.absent;
+        to += this.absent;
         this.absent = 0;
       } else if (core.waiting) {
         const next = Math.min(end, Math.ceil(alarm), this.pio[0].next, this.pio[1].next);
-        const woken = Math.max(next, this.cycle + 1);
-        this.slept += woken - this.cycle;
-        this.cycle = woken;
+        to = Math.max(next, this.cycle + 1);
+        this.slept += to - this.cycle;
       } else {
-        this.cycle += core.executeInstruction() + this.extra;
+        to += core.executeInstruction() + this.extra;
         this.extra = 0;
-        alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
       }
-      for (const block of this.pio) {
+      this.#pass(to);
+    }
+  }
+
+  /** What goes on beside the processor up to a cycle: PIO, and the DMA and timers that the clock has. */
+  #pass(to) {
+    const { clock, pio } = this;
+    while (this.cycle < to) {
+      const busy = pio[0].next <= to || pio[1].next <= to;
+      this.cycle = busy ? Math.min(to, this.cycle + BESIDE) : to;
+      for (const block of pio) {
         if (block.next <= this.cycle) {
           block.run(this.cycle);
         }
       }
       const nanos = this.cycle * NANOS;
-      if (alarm <= this.cycle) {
+      if (clock.nextAlarm && clock.nextAlarm.nanos / NANOS <= this.cycle) {
         clock.tick(nanos - clock.nanosCounter);
       } else {
         clock.nanosCounter = nanos;
