@@ -6,10 +6,13 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
 import pytest
 from browsing import aim, chromium, opened, settled, until
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Route
 from served import served, teaching
+
+import armkin
 
 
 @pytest.fixture(scope="module")
@@ -159,3 +162,28 @@ def test_the_branch_that_is_pointed_at_is_solid_and_f_fits_the_arm_in(browser: B
         assert box is not None
         assert 0 < x < box["width"]
         assert 0 < y < box["height"]
+
+
+def test_a_drag_does_not_wait_for_the_server(browser: Browser) -> None:
+    """The page's own module answers first, the server confirms: to the last digit that is shown."""
+    with served("three_dof", board="sim") as server, opened(browser, server.address) as page:
+        until(page, "document.documentElement.dataset.own === 'yes'")
+        held: list[Route] = []
+        late = [True]
+        page.route("**/api/look", lambda route: held.append(route) if late else route.continue_())
+        slider = page.locator("#sliders input[type=range]").nth(1)
+        before = page.inner_text("#motors tbody")
+        slider.evaluate("bar => { bar.value = 70; bar.dispatchEvent(new Event('input')); }")
+        numbers = "[...document.querySelectorAll('#target input, #sliders input[type=number]')].map((box) => box.value)"
+        first, motors = page.evaluate(numbers), page.inner_text("#motors tbody")
+        names = page.locator("#branches .name").all_inner_texts()
+        assert motors != before
+        assert page.evaluate("document.documentElement.dataset.asking") == "yes"
+        T = armkin.fk(armkin.load("three_dof"), np.deg2rad([float(number) for number in first[3:]]))
+        assert [float(number) for number in first[:3]] == pytest.approx(T[:3, 3], abs=0.01)
+        late.clear()
+        for route in held:
+            route.continue_()
+        settled(page)
+        assert (page.evaluate(numbers), page.inner_text("#motors tbody")) == (first, motors)
+        assert page.locator("#branches .name").all_inner_texts() == names

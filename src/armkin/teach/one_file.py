@@ -10,10 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.export.js.program import module
-from armkin.inverse.recognise import solver
-from armkin.model import units
-from armkin.model.arm import actual
-from armkin.motors import pulse_range
+from armkin.teach.own_solver import about
 from armkin.teach.playing import played
 from armkin.teach.scene import scene
 
@@ -84,17 +81,8 @@ def _hash(text: str) -> str:
 
 def _data(arm: Arm, task_name: str | None, plan: PathPlan | None) -> str:
     """What the page must know besides the solver: the scene, words, and a plan."""
-    turned = actual(arm)
-    task, _ = solver(turned, task_name)
     drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": None, "locks": False}
-    about = {
-        "robot": Path(arm.path).stem if arm.path else arm.name,
-        "task": task.name,
-        "labels": list(task.labels),
-        "units": units.label_units(task.labels),
-        "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
-    }
-    values = {"arm": drawn, "solver": about, "plan": None if plan is None else played(arm, plan)}
+    values = {"arm": drawn, "solver": about(arm, task_name), "plan": None if plan is None else played(arm, plan)}
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
 
 

@@ -42,3 +42,6 @@ function motion(slides, value) {
   const s = Math.sin((value * Math.PI) / 180);
   return [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 }
+
+/** Whether a task's targets lie in the base's x-y plane. @param {string | null} task */
+export const isFlat = (task) => task === "xy" || task === "xy_theta";

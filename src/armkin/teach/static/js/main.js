@@ -1,6 +1,7 @@
 // @ts-check
 /** The page: one pose, shown by all of its parts. */
 import { Board } from "./board.js";
+import { isFlat } from "./chain.js";
 import { get } from "./dom.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
@@ -8,6 +9,8 @@ import { Latest } from "./latest.js";
 import { Motors } from "./motors.js";
 import { Program } from "./program.js";
 import { act, enter } from "./server.js";
+import { ownSolver } from "./solving.js";
+import { theme } from "./theme.js";
 import { Tip } from "./tip.js";
 import { begun, trouble } from "./trouble.js";
 
@@ -33,6 +36,8 @@ class Page {
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
     this.jobs = 0; // that the board has ended
+    /** @type {((fields: any) => Look) | null} the arm's own module */
+    this.own = null;
     this.mine = false; // whether this page holds control; one that watches asks for nothing
     const pose = async () => {
       await this.asking.idle();
@@ -89,7 +94,16 @@ class Page {
   ask(fields) {
     if (!this.mine) return;
     document.documentElement.dataset.asking = "yes";
-    this.asking.push(fields);
+    const asked = { q: this.q, ...fields };
+    this.asking.push(asked);
+    this.first(asked);
+  }
+
+  /** The first numbers, from this page itself; the server's answer confirms or corrects them. @param {any} fields */
+  first(fields) {
+    if (!this.own || this.joints.held.size || this.motors.best.checked) return;
+    const stands = this.board.state?.pulses ?? null;
+    this.show(this.own({ ...fields, stands }), fields.target !== undefined);
   }
 
   /** Ask for the same pose again; what waits to be asked is newer than that. */
@@ -103,8 +117,8 @@ class Page {
       const look = /** @type {Look} */ (await act("look", {
         q: this.q, held: [...this.joints.held], best: this.motors.best.checked, ...fields,
       }));
-      const turned = !fields.target && this.asking.next !== null;
-      if (!turned) this.show(look, fields.target !== undefined, this.asking.next !== null);
+      const older = (this.own || !fields.target) && this.asking.next !== null; // what is shown is newer
+      if (!older) this.show(look, fields.target !== undefined, this.asking.next !== null);
       trouble("");
     } catch (error) {
       trouble(/** @type {Error} */ (error).message);
@@ -194,11 +208,7 @@ class Page {
     }
     const view = this.view;
     get("legend").textContent = `a square is ${view.step} mm`;
-    view.pointing.pointed = (name) => this.tip.point(name);
-    view.pointing.chose = (name) => {
-      const row = this.tip.rows.findIndex(({ branch, chosen }) => branch.name === name && !chosen);
-      this.tip.choose(row);
-    };
+    view.pointing.with(this.tip);
     view.gizmo.moved = (position, rpy) => {
       const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);
       const flat = isFlat(this.look.task);
@@ -220,15 +230,6 @@ class Page {
     view.look("space");
     this.show(this.look);
   }
-}
-
-/** Whether a task's targets lie in the base's x-y plane. @param {string | null} task */
-const isFlat = (task) => task === "xy" || task === "xy_theta";
-
-function theme(/** @type {string} */ name, /** @type {Page} */ page) {
-  document.documentElement.dataset.theme = name;
-  get("theme").textContent = name === "dark" ? "Light" : "Dark";
-  page.view?.theme();
 }
 
 async function start() {
@@ -287,6 +288,7 @@ async function start() {
   one.hold(here.mine);
   opened.ready?.(one); // of a page without a server
   await one.draw();
+  if (!opened.ready) one.own = await ownSolver(opened.scene, act);
   await known; // who holds control
   document.documentElement.dataset.ready = "yes";
 }

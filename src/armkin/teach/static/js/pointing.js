@@ -46,6 +46,12 @@ export class Pointing {
     });
   }
 
+  /** Tell the list of branches. @param {import("./tip.js").Tip} tip */
+  with(tip) {
+    this.pointed = (name) => tip.point(name);
+    this.chose = (name) => tip.choose(tip.rows.findIndex(({ branch, chosen }) => branch.name === name && !chosen));
+  }
+
   /** @param {import("./ghosts.js").Ghost[]} ghosts @param {number[]} q of the solid arm */
   show(ghosts, q) {
     const arm = this.view.arm;

@@ -1,0 +1,40 @@
+"""The arm's solver for the browser itself: its module, and the words that go with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armkin.errors import UsageError
+from armkin.inverse.recognise import solver
+from armkin.model import units
+from armkin.model.arm import actual
+from armkin.motors import pulse_range
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+def about(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
+    """What a page must know of the module: the task, its numbers' names and units, how far the motors go."""
+    task, _ = solver(actual(arm), task_name)
+    return {
+        "robot": Path(arm.path).stem if arm.path else arm.name,
+        "task": task.name,
+        "labels": list(task.labels),
+        "units": units.label_units(task.labels),
+        "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
+    }
+
+
+def own_solver(arm: Arm) -> dict[str, Any]:
+    """The module's text and `about`; none where the arm is no closed form: the server is as quick then."""
+    from armkin.export.js.program import module  # only pages that are open need it
+
+    try:
+        _, geometry = solver(actual(arm), None)
+        if geometry.pairs is not None:
+            return {"module": module(arm), "about": about(arm)}
+    except UsageError:
+        pass
+    return {"module": None, "about": None}
