@@ -2,6 +2,7 @@
 /** The handle at the tip's target: drag it along an axis, in a plane, or turn it. */
 import { Object3D } from "three";
 import { TransformControls } from "/vendor/three/TransformControls.js";
+import { get } from "./dom.js";
 
 export class Gizmo {
   /** @param {import("./view.js").View} view */
@@ -26,6 +27,12 @@ export class Gizmo {
     this.controls.addEventListener("objectChange", () => {
       const { position: p, rotation: r } = this.handle;
       this.moved([p.x, p.y, p.z], [r.x, r.y, r.z].map((angle) => (angle * 180) / Math.PI));
+    });
+    const turn = get("turn");
+    turn.addEventListener("click", () => {
+      const on = turn.getAttribute("aria-pressed") !== "true";
+      turn.setAttribute("aria-pressed", String(on));
+      this.mode(on ? "rotate" : "translate");
     });
   }
 

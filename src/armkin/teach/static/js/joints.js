@@ -5,7 +5,7 @@ import { fixed, get, make, show, typed } from "./dom.js";
 export class Joints {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {(q: number[], byHand?: boolean) => void} moved byHand: dragged or typed
+   * @param {(q: number[], byHand?: boolean, held?: boolean) => void} moved byHand: dragged or typed; held: of a joint that is held
    * @param {() => void} locked
    */
   constructor(arm, moved, locked) {
@@ -32,7 +32,7 @@ export class Joints {
       const change = (/** @type {number} */ value) => {
         const q = [...this.q];
         q[i] = value;
-        moved(q, true);
+        moved(q, true, this.held.has(joint.name));
       };
       slider.addEventListener("input", () => change(slider.valueAsNumber));
       typed(box, change);

@@ -27,7 +27,7 @@ class Page {
     this.look = look;
     this.q = look.q;
     this.branch = "";
-    this.joints = new Joints(arm, (q, byHand) => this.turn(q, byHand), () => this.refresh());
+    this.joints = new Joints(arm, (q, byHand, held) => (held && this.tip.target.length ? this.swing(q) : this.turn(q, byHand)), () => this.refresh());
     this.tip = new Tip((target) => this.aim(target, { goal: true }), (branch) => this.choose(branch), (q) => this.turn(q), () => {
       if (!this.moving) this.showGhosts();
     });
@@ -82,6 +82,12 @@ class Page {
   aim(target, { dragging = false, goal = false } = {}) {
     begun();
     this.ask({ target, branch: this.branch, nearest: !dragging, goal });
+  }
+
+  /** Turn a held joint of an arm that has one to spare: the others follow, the tip stays. @param {number[]} q */
+  swing(q) {
+    begun();
+    this.ask({ q, target: this.tip.target, branch: this.branch, goal: true });
   }
 
   /** @param {import("./types.js").Branch} branch */
@@ -219,12 +225,6 @@ class Page {
     for (const button of document.querySelectorAll("[data-view]")) {
       button.addEventListener("click", () => view.look(/** @type {HTMLElement} */ (button).dataset.view ?? ""));
     }
-    const turn = get("turn");
-    turn.addEventListener("click", () => {
-      const on = turn.getAttribute("aria-pressed") !== "true";
-      turn.setAttribute("aria-pressed", String(on));
-      view.gizmo.mode(on ? "rotate" : "translate");
-    });
     view.size();
     view.pose(this.q);
     view.look("space");
