@@ -158,7 +158,11 @@ SLOW: dict[str, tuple[str, ...]] = {
     "keep_out/test_in_c.py": (),
     "keep_out/test_motions_proved.py": ("test_random_motions_are_free_when_proved_and_hit_when_not",),
     "keep_out/test_self_motions.py": (),
-    "keep_out/test_shown.py": ("test_a_hit_is_red_in_a_picture", "test_the_workspace_tells_the_free_share"),
+    "keep_out/test_shown.py": (
+        "test_a_hit_is_red_in_a_picture",
+        "test_branches_that_hit_much_leave_the_arm_its_room",
+        "test_the_workspace_tells_the_free_share",
+    ),
     "motion/test_corners.py": (
         "test_corners_are_rounded_within_their_blend_and_all_limits",
         "test_waypoints_cost_little_memory_beyond_the_way_itself",

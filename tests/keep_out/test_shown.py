@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,15 @@ def test_a_hit_is_red_in_a_picture(tmp_path: Path) -> None:
     drawn = out.read_text()
     assert "hits table by 11.9 mm" in drawn
     assert "#d62728" in drawn
+
+
+def test_branches_that_hit_much_leave_the_arm_its_room(tmp_path: Path) -> None:
+    out, words = tmp_path / "arm.svg", ["ur5e", "--target", "500,200,50,180,0,0"]
+    assert run("plot", *words, "--scene", "examples/scenes/ur5e.yaml", "-o", out).code == 0
+    assert "hits floor by 270.5 mm (J2) and 3 more" in out.read_text()
+    lines = [float(x) for x in re.findall(r'id="axis3d_.*?M (\d+\.\d+)', out.read_text(), re.DOTALL)]
+    assert lines
+    assert min(lines) < 0.5 * 9.6 * 72
 
 
 def test_the_workspace_tells_the_free_share() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,12 +21,14 @@ from armkin.reachability.volume import motion
 from armkin.view.skeleton import Skeleton, skeleton
 
 if TYPE_CHECKING:
+    from armkin.keep_out.clearance import Hit
     from armkin.model.arm import Arm
 
 MOST = 20_000  # poses of one path
 _DRAWN = 40  # of them, evenly spaced, that are drawn as arms
 _BETWEEN = 16  # points of the tip's way from one pose to the next
 _ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # of the eye [deg]
+_WIDE = 40  # characters of a line that tells what is hit: the legend leaves the arm its room
 _HIT, _SOLID = "#d62728", "#7a6a58"  # of an arm that hits something, of what it must not touch
 _AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # x, y, z of a frame
 
@@ -61,11 +64,11 @@ def plot_poses(
     bones = [skeleton(arm, pose) for pose in shown]
     with_frames = alone if frames is None else frames
     legal = [not outside(arm, pose).any() for pose in shown]
-    hit = [said(found) for _, found in hits(arm, shown)] if arm.keep_out else [""] * len(shown)
+    hit = [_briefly(found) for _, found in hits(arm, shown)] if arm.keep_out else [""] * len(shown)
     legend = ["start", "end"]
     if names is not None:
         legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
-        legend = [name + (f" ({what})" if what else "") for name, what in zip(legend, hit, strict=True)]
+        legend = ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
@@ -98,6 +101,11 @@ def plot_poses(
         if alone:
             drawing.name_joints(bones[0])
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
+
+
+def _briefly(found: list[Hit]) -> str:
+    """The deepest hit in words, and how many more there are."""
+    return said(found[:1]) + (f" and {len(found) - 1} more" if len(found) > 1 else "")
 
 
 class _Drawing:
@@ -225,7 +233,7 @@ class _Drawing:
         """Title, legend beside the axes, and limits that fill what is left."""
         self.figure.text(0.03, 0.97, title, fontsize=min(13.0, 800 / max(len(title), 1)), va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
-        left = 0.02 if order is None else self._legend(order, 0.895 if note else 0.935)
+        left = 0.02 if order is None else min(self._legend(order, 0.895 if note else 0.935), 0.5)
         if self.dimensions == 3:
             self.axes.set_position([left, 0.02, 0.98 - left, 0.86])
             true_proportions(self.axes, self.points, self.floor)
@@ -238,8 +246,9 @@ class _Drawing:
         handles, texts = self.axes.get_legend_handles_labels()
         rank = {text: k for k, text in enumerate(order)}
         pairs = sorted(zip(handles, texts, strict=True), key=lambda pair: rank.get(pair[1], len(rank)))
+        lines = sum(1 + text.count("\n") for text in texts)
         place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, top)}
-        place |= {"bbox_transform": self.figure.transFigure, "fontsize": 9.5 if len(pairs) < 14 else 7.5}
+        place |= {"bbox_transform": self.figure.transFigure, "fontsize": 9.5 if lines < 18 else 7.5}
         legend = self.axes.legend(*zip(*pairs, strict=True), handlelength=2.6, **place)
         for handle in legend.get_lines():
             handle.set_linewidth(min(handle.get_linewidth(), 4.0))
