@@ -26,7 +26,7 @@ from armkin.inverse.recognise import solver
 from armkin.inverse.solutions import Solutions
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.inverse.workers import check, shared
-from armkin.keep_out.clearance import Clearance, clearance, named
+from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -114,11 +114,9 @@ class _CompiledTask:
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._poses, self._points = code.arm_poses, code.arm_points
-        for function in (self._poses, self._points):
-            function.argtypes, function.restype = [size, *[pointer] * 3], size
         self._clearances = code.arm_clearances if arm.keep_out and arm.whole is None else None
-        if self._clearances is not None:
-            self._clearances.argtypes, self._clearances.restype = [size, *[pointer] * 4], size
+        for function in filter(None, (self._poses, self._points, self._clearances)):
+            function.argtypes, function.restype = [size, *[pointer] * 3], size
         self.branches = library.branches
         if not self.branches:
             return
@@ -143,11 +141,8 @@ class _CompiledTask:
         values = forward.as_joints(self.arm, q)
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
-        flat = np.ascontiguousarray(values.reshape(-1, self.n))
-        mm, which, wild = np.empty(len(flat)), np.empty(len(flat), np.int32), np.empty(len(flat), np.uint8)
-        if self._clearances(len(flat), *(a.ctypes.data for a in (flat, mm, which, wild))):
-            return clearance(self.arm, values)
-        return named(self.arm, mm, which.astype(np.intp), values.shape[:-1])
+        found = self._of_joints(self._clearances, least, (2,), values, 1).reshape(-1, 2)
+        return named(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
 
     def _of_joints(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int

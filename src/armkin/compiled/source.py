@@ -58,6 +58,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
         parts += [keep_outs.clearances(commanded), _part("clearances")]
+        parts += [_of_joints("Least clearances and their pairs", "arm_clearance", 2)]
     if branches:
         assert task is not None
         accepted = ACCEPTED**2

@@ -58,6 +58,11 @@ def named(arm: Arm, mm: Array, which: NDArray[np.intp], lead: tuple[int, ...]) -
     return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
 
 
+def least(arm: Arm, q: Array) -> Array:
+    """Least clearances and the numbers of their pairs of an arm with keep-outs: q (N, n) -> (N, 2)."""
+    return np.stack(_guard(arm).least(q), axis=1)
+
+
 def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
     """The arm whose joints `armkin.lock` held, and its joint values: q (N, n)."""
     while arm.whole is not None:

@@ -1,28 +1,13 @@
-/* Least clearances (n,) of joint values (n, ARM_JOINTS), and their pairs. Returns how many have an angle beyond ARM_WILD,
-   or none at all; these are marked. */
-int64_t arm_clearances(int64_t n, const double *joints, double *out, int32_t *pairs, uint8_t *wild)
+/* Least clearances, and the numbers of their pairs, of up to ARM_LANES joint values. */
+static void arm_clearance(const double *q, double *found, int count)
 {
-    double q[ARM_JOINTS * ARM_LANES], found[6 * ARM_SEGMENTS * ARM_LANES], ends[6 * ARM_SEGMENTS];
-    int64_t start, left = 0;
+    double of_all[6 * ARM_SEGMENTS * ARM_LANES], ends[6 * ARM_SEGMENTS];
     int i, j, pair;
-    for (start = 0; start < n; start += ARM_LANES) {
-        const int count = n - start < ARM_LANES ? (int)(n - start) : ARM_LANES;
-        for (i = 0; i < count; i++) {
-            uint8_t far = 0;
-            for (j = 0; j < ARM_JOINTS; j++) {
-                q[j * ARM_LANES + i] = joints[(start + i) * ARM_JOINTS + j];
-                far |= !(fabs(q[j * ARM_LANES + i]) <= ARM_WILD);
-            }
-            wild[start + i] = far;
-            left += far;
-        }
-        arm_ends(q, found, count);
-        for (i = 0; i < count; i++) {
-            for (j = 0; j < 6 * ARM_SEGMENTS; j++)
-                ends[j] = found[j * ARM_LANES + i];
-            out[start + i] = arm_least(ends, &pair);
-            pairs[start + i] = pair;
-        }
+    arm_ends(q, of_all, count);
+    for (i = 0; i < count; i++) {
+        for (j = 0; j < 6 * ARM_SEGMENTS; j++)
+            ends[j] = of_all[j * ARM_LANES + i];
+        found[i] = arm_least(ends, &pair);
+        found[ARM_LANES + i] = pair;
     }
-    return left;
 }
