@@ -159,9 +159,11 @@ def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
-    _, one = stuck(number, 100)
+    port, one = stuck(number, 100)
     with pytest.raises(LinkError, match=rf"servo {number} \(j{number}\) stands 1[0-9][0-9] counts from its goal"):
         one.run([one.plan(one.counts(), np.deg2rad([20, -20, 20]))])
+    blocked = port.servos[number]
+    assert blocked.get(registers.GOAL_POSITION) == pytest.approx(blocked.at, abs=10)  # it pushes no longer
 
 
 def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:

@@ -84,6 +84,22 @@ def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytes
     assert toolchain._folder() is None
 
 
+def test_a_library_by_a_link_is_not_loaded(cache: Path, tmp_path: Path) -> None:
+    """What it leads to may be another's folder."""
+    toolchain.load(SOURCE, "abc")
+    [kept] = cache.glob("*.so")
+    kept.rename(tmp_path / kept.name)
+    kept.symlink_to(tmp_path / kept.name)
+    assert toolchain._kept(cache, kept.stem.partition("-")[0], "abc") is None
+
+
+@pytest.mark.parametrize("above", [0, 1, 2])
+def test_a_cache_in_a_folder_that_others_may_write_is_not_used(cache: Path, above: int) -> None:
+    assert toolchain._folder() == cache
+    (cache, *cache.parents)[above].chmod(0o770)
+    assert toolchain._folder() is None
+
+
 def test_the_cache_is_used_under_a_umask_of_groups(cache: Path) -> None:
     """002 is what Fedora gives its users, whose folders are then open to their group."""
     before = os.umask(0o002)

@@ -12,12 +12,16 @@ from emulator import EmulatedBoard
 from pins import net
 
 import armkin
+from armkin.errors import NoSolutionError
 from command_line import THREE_DOF, patiently, run
 from starting_elsewhere import Result, judged
 
 
 def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Sequence[float]) -> Result:
-    """Put the arm into a place [deg], send the path from there, and read the pins while it moves."""
+    """Put the arm into a place [deg], send the path from there, and read the pins while it moves.
+
+    Raises NoSolutionError if it was refused, without a step.
+    """
     arm = armkin.load(THREE_DOF)
     file = folder / "path.yaml"
     file.write_text(json.dumps(moves))
@@ -33,6 +37,9 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
         return run(*words)
 
     done = patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
+    if done.code == 3:
+        assert net(board) == before
+        raise NoSolutionError(done.err.strip())
     assert done.code == 0, done.err
     assert net(board) == done.json["pulses"]
     trace = board.trace()
