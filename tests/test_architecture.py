@@ -194,7 +194,11 @@ def test_classes_have_at_most_250_lines() -> None:
 
 
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
-LISTED_ELSEWHERE = {SOURCE / "armkin", SOURCE / "armkin/cli/commands"}  # docs/architecture.md; its table of commands
+LISTED_ELSEWHERE = {  # docs/architecture.md; its table of commands; a kind is one file and no line elsewhere
+    SOURCE / "armkin",
+    SOURCE / "armkin/cli/commands",
+    SOURCE / "armkin/board/kinds",
+}
 
 
 @pytest.mark.parametrize("package", [path for path in PACKAGES if path not in LISTED_ELSEWHERE], ids=lambda p: p.name)

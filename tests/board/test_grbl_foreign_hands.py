@@ -222,36 +222,6 @@ def test_an_offset_that_is_set_in_a_motion_is_found_at_its_end_and_at_its_stop(p
         other(port, "G10L2P1X0Y0Z0", "G54", "G49", "G92.1")
 
 
-@pytest.mark.parametrize("after", [0.0, 0.3, 0.9, 2.0, 30.0])
-def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(port: Grbl, after: float) -> None:
-    class Killed(BaseException):
-        pass
-
-    def die() -> bool:
-        if port.now() > began + after:
-            raise Killed
-        return False
-
-    stands_elsewhere(port)
-    one = machine(port, die)
-    began = port.now()
-    moves = [{"joint": [40, 60, -50]}, {"line": [390, 80, 300]}, {"joint": [0, 90, -90]}]
-    path = armkin.path(ARM, {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": moves})
-    plan = one.lay(path.motion, np.array(one.counts()))
-    if after < plan.duration:
-        with pytest.raises(Killed):
-            one.run([plan])
-    else:
-        one.run([plan])
-    for _ in range(500):
-        port.advance(0.02)
-    port.close()
-    again = machine(port)
-    assert (again.position(), list(again.counts())) == ("known", port.steps[:3])
-    again.run([again.plan(again.counts(), GOAL)])
-    assert port.steps[:3] == armkin.pulses(ARM, GOAL).tolist()
-
-
 def test_a_reset_in_the_motion_of_a_killed_sender_is_lost(port: Grbl) -> None:
     """grblHAL keeps G92 over a soft reset, and the motors have lost steps: the parser's modes tell."""
 

@@ -6,7 +6,6 @@ The other side is a stand-in written from Klipper's public documentation, not Kl
 from __future__ import annotations
 
 import itertools
-import math
 import os
 import random
 from collections.abc import Callable
@@ -21,7 +20,6 @@ from armkin.board.backend.job import Job
 from armkin.board.klipper.axes import axes_of, differences, printer_cfg, settings_of
 from armkin.board.klipper.gcode import Lines
 from armkin.board.klipper.machine import KlipperMachine
-from armkin.board.ports import record_path
 from armkin.board.sim.klipper import Klipper
 from armkin.errors import LinkError, PositionLostError, UsageError
 from armkin.model.build import build
@@ -237,37 +235,6 @@ def test_a_shutdown_after_the_last_line_is_told_as_such() -> None:
     with pytest.raises(LinkError, match="Klipper is in state shutdown: Printer is shutdown") as caught:
         one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
     assert "another program" not in str(caught.value)
-
-
-@pytest.mark.parametrize("after", [0.0, 0.4, 1.1, 30.0])
-def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(after: float) -> None:
-    class Killed(BaseException):
-        pass
-
-    def die() -> bool:
-        if port.now() > began + after:
-            raise Killed
-        return False
-
-    began = math.inf
-    port, one = opened(die)
-    moves = [{"joint": [0, 80, -80]}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
-    path = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
-    plan = one.lay(path.motion, np.array(one.counts()))
-    began = port.now()
-    if after < plan.duration:
-        with pytest.raises(Killed):
-            one.run([plan])
-    else:
-        one.run([plan])
-    for _ in range(500):
-        port.advance(0.02)
-    port.close()
-    again = KlipperMachine(port, ARM)
-    assert not again.prepare()
-    assert list(again.counts()) == pins(port)
-    os.unlink(record_path(port.name))
-    assert KlipperMachine(port, ARM).position() == "lost"
 
 
 def test_printer_cfg_is_compared() -> None:

@@ -71,7 +71,7 @@ def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Stream
         file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))
         words = ["send", THREE_DOF, "--batch", file, "--port", board.port, "--assume-home", "--json"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = process(*words, *(["--blend", blend] if blend else []), timeout=60 + 3 * plan.duration)
+        done = process(*words, *(["--blend", blend] if blend else []), timeout=240 + 3 * plan.duration)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         said: dict[str, Any] = done.json if done.code == 0 else {"waypoints": 0, "pulses": None}
         trace, axes = board.trace(), board.stats()["axes"]

@@ -1,10 +1,4 @@
-"""The kinds of boards, one file a kind: what stands behind `board: {kind: ...}`.
-
-firmware.py  armkin's own firmware
-grbl.py      GRBL, grblHAL, FluidNC
-feetech.py   bus servos
-klipper.py   Klipper
-"""
+"""The kinds of boards, one file a kind, found by its name: what stands behind `board: {kind: ...}`."""
 
 from __future__ import annotations
 
