@@ -106,18 +106,10 @@ def on(kind: str, at: Array | None = None) -> Kind:
     seen: list[list[float]] = []
     board = board_of(arm)
     port: Any = board.simulated()
-    if kind in BOARDS:
-        axes = configure(arm).axes
-        _watch(port.board, seen, lambda: [float(port.board.motors.counts()[axis]) for axis in axes])
-    else:
-        if kind == "feetech":
-            for k, count in enumerate(armkin.pulses(arm, arm.home if at is None else at), 1):
-                port.servos[k] = Servo(k, count)
-            _watch(port, seen, lambda: [port.servos[k].at for k in (1, 2, 3)])
-        elif kind == "klipper":
-            _watch(port, seen, lambda: [(port.at[a.section] - a.at_home) * a.steps for a in axes_of(arm)])
-        else:
-            _watch(port, seen, lambda: [float(port.steps[k]) for k in range(3)])
+    if kind == "feetech":
+        for k, count in enumerate(armkin.pulses(arm, arm.home if at is None else at), 1):
+            port.servos[k] = Servo(k, count)
+    watch(arm, kind, port, seen)
     machine = board.connect(port)
     machine.prepare(assume=None if kind == "feetech" else at)
 
@@ -131,8 +123,31 @@ def on(kind: str, at: Array | None = None) -> Kind:
     return Kind(arm, board, pins, tolerance, 12 if kind == "feetech" else 0, kind in BOARDS)
 
 
-def _watch(sim: Any, seen: list[list[float]], pins: Callable[[], list[float]]) -> None:
-    """Note the pins whenever simulated time has passed."""
+def watch(arm: armkin.Arm, kind: str, port: Any, seen: list[list[float]]) -> None:
+    """Note what the motors of a simulated board have counted whenever its time has passed."""
+    sim = port
+    if kind in BOARDS:
+        axes, sim = configure(arm).axes, port.board
+
+        def pins() -> list[float]:
+            return [float(sim.motors.counts()[axis]) for axis in axes]
+
+    elif arm.motors[0].kind == "bus":
+
+        def pins() -> list[float]:
+            return [port.servos[k].at for k in (1, 2, 3)]
+
+    elif kind == "klipper":
+        found = axes_of(arm)
+
+        def pins() -> list[float]:
+            return [(port.at[axis.section] - axis.at_home) * axis.steps for axis in found]
+
+    else:
+
+        def pins() -> list[float]:
+            return [float(port.steps[k]) for k in range(3)]
+
     advance = sim.advance
 
     def noted(seconds: float) -> None:

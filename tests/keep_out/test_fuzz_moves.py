@@ -1,6 +1,7 @@
-"""Random commands, options in any order: nothing that a board carries out goes through a keep-out.
+"""Random commands, options in any order, on arms that stay where they are left: nothing goes through a keep-out.
 
-What boards are given is sampled with the scene that this file reads, not with what the command made of it.
+Every kind of board, examples/board_plugin's among them. What boards are given, and what their motors then count, is
+held against the scene that this file reads, not against what the command made of it.
 `python tests/keep_out/test_fuzz_moves.py 2000 7` asks more of them, from another seed.
 """
 
@@ -8,20 +9,35 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
+import yaml
 
 sys.path.append(str(Path(__file__).parents[1]))
 
 import armkin
+from armkin import installed_kinds
+from armkin.board.backend.board import Board
 from armkin.board.backend.starting import Laid
-from armkin.keep_out.guard import guard
+from armkin.board.firmware.protocol import State
+from armkin.board.kinds import board_of
+from armkin.board.kinds.firmware import FirmwareBoard
+from armkin.board.kinds.klipper import KlipperBoard
+from armkin.board.sim.board import SimBoard
+from armkin.board.sim.port import SimPort
+from armkin.board.stopping import Stop
+from armkin.board_kinds import BOARDS
+from armkin.keep_out.guard import Guard, guard
 from armkin.motion.trajectory import Trajectory
-from command_line import run
+from command_line import ROOT, Result, run
+from starting_elsewhere import KINDS, watch
 
-KINDS = ["three_dof", "tests/robots/three_dof_grbl.yaml", "tests/robots/three_dof_klipper.yaml"]
 SCENE = """
 clearance: 2
 keep_out:
@@ -31,7 +47,148 @@ keep_out:
     name: table
   - capsule: {from: [150, 300, 0], to: [150, 300, 500], radius: 40}
 """
-DEEP = 0.01  # mm
+DEEP = 0.01  # mm of a trajectory
+CLEARANCE = 2.0  # mm: what steps and servos may take of it, so that no body is ever touched
+SWITCHES = (-121, 121, -121)  # degrees: a degree beyond the limits
+GRIPPERS = {
+    "grbl": "{kind: spindle, open: 0, closed: 200}",
+    "feetech": "{kind: bus, id: 6, counts: 4096, zero: 2048, open: 60, closed: 0}",
+}
+OURS = "uno_cnc_shield"
+STOPPED = 128  # and the signal, of which there is none here
+BUSES = ("feetech", "dynamixel")
+
+
+def _robot(kind: str) -> str:
+    """three_dof on a kind of board: with switches, or a gripper, where that kind has them."""
+    data = yaml.safe_load(KINDS["feetech" if kind == "dynamixel" else kind])
+    data["board"] = {**data["board"], "kind": kind}
+    if kind == OURS:
+        for joint, at in zip(data["joints"], SWITCHES, strict=True):
+            way, axis = int(np.sign(at)), joint["drive"]["axis"]
+            joint["homing"] = {
+                "switch": axis,
+                "at": at,
+                "direction": way,
+                "normally": "closed",
+                "speed": 40,
+                "backoff": 3,
+            }
+    if kind in GRIPPERS:
+        data["gripper"] = yaml.safe_load(GRIPPERS[kind])
+    return str(yaml.safe_dump(data, sort_keys=False))
+
+
+def _pressed(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
+    """Levels of the switches of the arm on X, Y and Z: as `homing.switches`, for one motor a joint, and quick."""
+    turns = [(float(arm.home[k]), 1 / float(arm.motor_gain[k, k]), np.deg2rad(SWITCHES[k])) for k in range(3)]
+
+    def level(number: int, net: Sequence[int]) -> bool:
+        if number >= 3:
+            return True
+        home, turn, at = turns[number]
+        return bool((home + turn * net[number] - at) * at >= 0)
+
+    return level
+
+
+class Arms:
+    """Arms on simulated boards that outlive each command, as real ones do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.scene = folder / "scene.yaml"
+        self.scene.write_text(SCENE)
+        self.given: list[Trajectory] = []
+        self.moving: Any = None  # the port of the command that is carried out
+        self.made = 0.0  # [rad] how far it moved a joint
+        self.until = np.inf  # [s] of a board's time, when somebody presses Ctrl-C
+        self.files, self.ports, self.seen = dict[str, Path](), dict[str, Any](), dict[str, list[list[float]]]()
+        self.arms = dict[str, armkin.Arm]()
+        for number, kind in enumerate((OURS, "grbl", "klipper", *BUSES), 20):
+            file = folder / f"{kind}.yaml"
+            file.write_text(_robot(kind))
+            arm = armkin.load(file, scene=self.scene)
+            port: Any = SimPort(SimBoard(BOARDS[OURS], _pressed(arm))) if kind == OURS else board_of(arm).simulated()
+            port.simulated, port.name, port.step = False, f"COM{number}", 0.005
+            self.seen[kind] = []
+            watch(arm, kind, port, self.seen[kind])
+            self.files[kind], self.ports[kind], self.arms[kind] = file, port, arm
+        self.held: Guard = guard(arm)
+
+    def begin(self) -> None:
+        """Every arm stands in its home pose, known: no motion, and before it counts mean nothing."""
+        for kind, robot in self.files.items():
+            assume = [] if kind in BUSES else ["--assume-home"]
+            words = ["send", robot, "home", "--scene", self.scene, *assume, "--port", self.ports[kind].name]
+            assert run(*words).code == 0
+
+    def open(self, board: Board, name: str, baud: int | None = None, *, reset: bool = True) -> Any:
+        """In place of `Board.open`."""
+        return next(port for port in self.ports.values() if port.name == name)
+
+    def stops(self, stop: Stop) -> bool:
+        """In place of `Stop`: whether somebody has pressed Ctrl-C."""
+        return any(port.now() > self.until for port in self.ports.values() if port is self.moving)
+
+    def ask(self, kind: str, name: str, *words: object, stdin: bytes = b"", until: float = np.inf) -> Result:
+        """A command on the arm of a kind, held after some seconds; what it did is held against the scene."""
+        self.given.clear()
+        self.seen[kind].clear()
+        self.moving, self.made = self.ports[kind], 0.0
+        self.until = self.moving.now() + until
+        if name == "home":
+            self.search()
+        told = run(name, *words, "--port", self.moving.name, stdin=stdin)
+        line = f"{kind}: armkin {name} {' '.join(map(str, words))}: {told.code} {told.err}"
+        assert told.code in ((0, 2, 3) if until == np.inf else (0, 3, STOPPED)), line
+        for one in self.given:
+            apart = self.held.least(one.q(np.linspace(0.0, one.duration, 1500)))[0]
+            assert apart.min() >= min(apart[0], 0.0) - DEEP, line
+        if self.seen[kind]:
+            counts = np.unique(np.array(self.seen[kind]), axis=0)
+            q = np.asarray(armkin.joints(self.arms[kind], counts))
+            assert self.held.least(q)[0].min() >= -CLEARANCE, line
+            self.made = float(np.ptp(q, axis=0).max())
+        return told
+
+    def search(self) -> None:
+        """What is counted before the last switch is found is a search, which nobody proves."""
+        seen, board = self.seen[OURS], self.ports[OURS].board
+        self.noted = noted = getattr(self, "noted", board.advance)
+
+        def advance(seconds: float) -> None:
+            noted(seconds)
+            if board.motors.state == State.HOMING:
+                seen.clear()
+
+        board.advance = advance
+
+
+@contextmanager
+def arms() -> Iterator[Arms]:
+    """The arms, with the plug-in found as if it was installed."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        offered = folder / "packages/armkin_dynamixel-0.dist-info"
+        offered.mkdir(parents=True)
+        (offered / "METADATA").write_text("Metadata-Version: 2.1\nName: armkin-dynamixel\nVersion: 0\n")
+        (offered / "entry_points.txt").write_text("[armkin.boards]\ndynamixel = armkin_dynamixel\n")
+        packages = [str(offered.parent), str(ROOT / "examples/board_plugin/src"), *sys.path]
+        stack.enter_context(mock.patch.object(sys, "path", packages))
+        installed_kinds._offered.cache_clear()
+        stack.callback(installed_kinds._offered.cache_clear)
+        stack.enter_context(mock.patch("tempfile.tempdir", str(folder)))
+        found, checked = Arms(folder), Laid.__post_init__
+
+        def note(laid: Laid) -> None:
+            checked(laid)
+            found.given.append(laid.trajectory)
+
+        stack.enter_context(mock.patch.object(Laid, "__post_init__", note))
+        stack.enter_context(mock.patch.object(Stop, "__call__", lambda stop: found.stops(stop)))
+        for one in (Board, FirmwareBoard, KlipperBoard):
+            stack.enter_context(mock.patch.object(one, "open", lambda *words, **more: found.open(*words, **more)))
+        yield found
 
 
 def _joints(rng: np.random.Generator) -> list[str]:
@@ -43,74 +200,122 @@ def _tip(rng: np.random.Generator) -> list[str]:
     return [f"{x:.2f}" for x in (r * np.cos(turn), r * np.sin(turn), rng.uniform(-50, 500))]
 
 
-def _command(rng: np.random.Generator) -> tuple[str, list[list[str]], bytes]:
+def _motion(rng: np.random.Generator, folder: Path) -> tuple[str, list[list[str]], bytes]:
     """A command, its words in groups that may stand in any order, and what it is given on stdin."""
-    kind = rng.integers(6)
+    kind = rng.integers(7)
     speed = [["--speed", f"{rng.uniform(20, 100):.0f}"]] if rng.random() < 0.5 else []
+    rows = "\n".join(",".join(_joints(rng)) for _ in range(3))
     if kind == 0:
         return "send", [["--target", ",".join(_tip(rng))], *speed], b""
     if kind == 1:
-        return "send", [["--batch", "-"]], "\n".join(",".join(_joints(rng)) for _ in range(3)).encode()
+        return "send", [["--batch", "-"]], rows.encode()
     if kind == 2:
-        vias = [["--via", ",".join(_tip(rng))] for _ in range(3)]
-        blend = [["--blend", "10"]] if rng.random() < 0.5 else []
-        return "path", [[word for via in vias for word in via], *blend], b""
+        (folder / "rows.csv").write_text(rows)
+        return "send", [["--batch", str(folder / "rows.csv")], ["--blend", "5"], *speed], b""
     if kind == 3:
-        moves = "\n".join(f"  - joint: [{', '.join(_joints(rng))}]" for _ in range(3))
-        return "path", [["-"]], f"moves:\n{moves}\n".encode()
+        vias = [["--via", ",".join(_tip(rng))] for _ in range(3)]
+        return "path", [[word for via in vias for word in via], ["--blend", "10"]], b""
     if kind == 4:
+        moves = "\n".join(f"  - joint: [{', '.join(_joints(rng))}]" for _ in range(3))
+        (folder / "path.yaml").write_text(f"moves:\n{moves}\n")
+        return "send", [["--path", str(folder / "path.yaml")], *speed], b""
+    if kind == 5:
         joint, rate = rng.integers(1, 4), rng.uniform(10, 60) * rng.choice([-1, 1])
-        return "jog", [[f"q{joint}", f"{rate:.1f}"], ["--seconds", f"{rng.uniform(0.2, 9):.1f}"]], b""
+        return "jog", [[f"q{joint}", f"{rate:.1f}"], ["--seconds", f"{rng.uniform(0.2, 4):.1f}"]], b""
     return "send", [_joints(rng), *speed], b""
 
 
-def fuzz(count: int, seed: int) -> tuple[int, int]:
-    """Carry out commands; how many moved, and how many were refused. AssertionError for a hit."""
-    rng, moved, refused = np.random.default_rng(seed), 0, 0
-    given: list[Trajectory] = []
-    checked = Laid.__post_init__
+def _words(rng: np.random.Generator, robot: Path, groups: list[list[str]]) -> list[str]:
+    """Options in any order, the robot and what belongs behind it among them."""
+    options = groups + ([["--json"]] if rng.random() < 0.5 else [])
+    first = [] if options[0][0].startswith("--") else options.pop(0)
+    rng.shuffle(options)
+    place = rng.integers(len(options) + 1)
+    return [word for group in (*options[:place], [str(robot), *first], *options[place:]) for word in group]
 
-    def note(laid: Laid) -> None:
-        checked(laid)
-        given.append(laid.trajectory)
 
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(Laid, "__post_init__", note):
-        scene = Path(folder) / "scene.yaml"
-        scene.write_text(SCENE)
-        held = guard(armkin.load("three_dof", scene=scene))
-        home = np.deg2rad([0.0, 90.0, -90.0])
-        assert held.least(home[None])[0] > 0
-        for _ in range(count):
-            name, groups, stdin = _command(rng)
-            robot = KINDS[rng.integers(len(KINDS))]
-            options = [["--port", "sim"], ["--scene", str(scene)], *groups[1:]] + ([["--json"]] * int(rng.integers(2)))
-            if groups[0][0].startswith("--"):
-                options.append(groups.pop(0))
-            rng.shuffle(options)
-            first = groups[0] if groups and not groups[0][0].startswith("--") and groups[0] not in options else []
-            place = rng.integers(len(options) + 1)
-            flat = [word for group in (*options[:place], [robot, *first], *options[place:]) for word in group]
-            given.clear()
-            said = run(name, *flat, stdin=stdin)
-            words = f"armkin {name} {' '.join(flat)}: {said.code} {said.err}"
-            assert said.code in (0, 3), words
-            moved, refused = moved + (said.code == 0), refused + (said.code == 3)
-            assert given or said.code == 3 or name == "jog", words
-            for one in given:
-                q = one.q(np.linspace(0.0, one.duration, 1500))
-                assert held.least(q)[0].min() >= -DEEP, words
-            if name == "jog" and said.code == 0 and "--json" in flat:
-                end = np.deg2rad(said.json["joints"])
-                way = home + np.linspace(0.0, 1.0, 1500)[:, None] * (end - home)
-                assert held.least(way)[0].min() >= -DEEP, words
-    return moved, refused
+def fuzz(count: int, seed: int) -> Counter[str]:
+    """Carry out commands; how many of what came of them. AssertionError for a hit."""
+    rng, done = np.random.default_rng(seed), Counter[str]()
+    with arms() as found:
+        scene = ["--scene", str(found.scene)]
+        found.begin()
+        for number in range(count):
+            kind = list(found.files)[number % len(found.files)]
+            _one(found, kind, rng, scene, done)
+    return done
+
+
+def _one(found: Arms, kind: str, rng: np.random.Generator, scene: list[str], done: Counter[str]) -> None:
+    """A command on a kind's arm, and what belongs to it."""
+    robot, dice = found.files[kind], rng.random()
+    if dice < 0.12 and kind == OURS:
+        if found.ask(kind, "send", robot, "home", *scene).code == 0:
+            assert found.ask(kind, "home", robot, *scene).code == 0
+            done["home"] += 1
+        return
+    if dice < 0.12 and kind != "klipper":
+        name, words = ("relax", []) if kind in BUSES and dice < 0.06 else ("grip", [rng.choice(["open", "closed"])])
+        assume = ["--assume", "open"] * (kind == OURS and name == "grip" and not done["grip " + kind])
+        told = found.ask(kind, name, robot, *words, *assume)
+        assert told.code == (2 if (kind, name) == ("dynamixel", "grip") else 0), told.err
+        assert found.made < np.deg2rad(0.2)
+        done[f"{name} {kind}"] += 1
+        return
+    name, groups, stdin = _motion(rng, found.scene.parent)
+    if rng.random() < 0.08:  # without the scene that the port remembers
+        told = found.ask(kind, name, *_words(rng, robot, groups), stdin=stdin)
+        assert (told.code, "was last used with the scene" in told.err) == (2, True), told.err
+        assert not found.given or not found.seen[kind] or found.made < np.deg2rad(0.2)
+        done["without scene"] += 1
+        return
+    words = _words(rng, robot, [*groups, scene])
+    until = rng.uniform(0.1, 3.0) if rng.random() < 0.3 and name != "jog" else np.inf
+    told = found.ask(kind, name, *words, stdin=stdin, until=until)
+    assert told.code != 2, told.err
+    done[f"{told.code} {kind}"] += 1
+    if told.code == STOPPED and kind == OURS and not stdin:
+        told = found.ask(kind, name, *words, "--resume")
+        assert told.code == 0, told.err
+        done["resume"] += 1
 
 
 def test_no_command_takes_an_arm_through_a_keep_out() -> None:
-    moved, refused = fuzz(36, 1)
-    assert moved > 8
-    assert refused > 8
+    done = fuzz(15, 2)
+    for kind in (OURS, "grbl", "klipper", *BUSES):
+        assert sum(done[f"{code} {kind}"] for code in (0, 3, STOPPED)), done
+    assert sum(done[key] for key in done if key.startswith("3 ")) > 1, done
+    assert sum(done[key] for key in done if key.startswith("0 ")) > 4, done
+
+
+def test_grip_home_and_a_motion_that_is_gone_on_with() -> None:
+    with arms() as found:
+        robot, scene = found.files[OURS], ["--scene", found.scene]
+        found.begin()
+        assert found.ask(OURS, "grip", robot, "closed", "--assume", "open").code == 0
+        assert found.made == 0.0
+        assert found.ask(OURS, "send", robot, -60, 80, -80, *scene, until=0.6).code == STOPPED
+        assert 0.05 < found.made < 1.0
+        assert found.ask(OURS, "send", robot, -60, 80, -80, *scene, "--resume").code == 0
+        assert found.made > 0.5
+        assert found.ask(OURS, "jog", robot, "q2", -60, "--seconds", 1, *scene).code == 0
+
+
+def test_after_the_search_for_switches_the_move_is_proved() -> None:
+    with arms() as found:
+        robot, port = found.files[OURS], found.ports[OURS].name
+        found.begin()
+        post = found.scene.with_name("post.yaml")
+        post.write_text("keep_out:\n  - capsule: {from: [0, -190, 0], to: [0, -190, 600], radius: 30}\n    name: post")
+        found.given.clear()
+        told = run("home", robot, "--scene", post, "--port", port)
+        assert (told.code, "would hit post" in told.err, found.given) == (3, True, []), told.err
+        stands = np.rad2deg(armkin.joints(found.arms[OURS], found.seen[OURS][-1]))
+        assert np.abs(stands - SWITCHES).max() < 1.5  # where the search ended
+        told = found.ask(OURS, "home", robot, "--scene", found.scene)
+        assert (told.code, "the move after it is" in told.err) == (0, True)
+        assert found.made > 2.0  # q1 comes back from its switch
 
 
 if __name__ == "__main__":
-    print("moved {}, refused {}: no hit".format(*fuzz(int(sys.argv[1]), int(sys.argv[2]))))
+    print("no hit:", dict(fuzz(int(sys.argv[1]), int(sys.argv[2]))))
