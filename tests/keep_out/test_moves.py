@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import armkin
+from armkin.board.firmware import jogging
+from armkin.formula.arrays import Array
 from command_line import run
 
 TABLE = "keep_out:\n  - box: {min: [300, -400, 0], max: [700, 400, 180]}\n    name: table\n"
@@ -44,6 +48,26 @@ def test_a_jog_stands_before_the_hit(robot: str, table: str) -> None:
         arm = armkin.load(robot, scene=table)
         assert armkin.clearance(arm, np.deg2rad(answer["joints"])).mm >= 0.0
     assert free.json["joints"][1] < 70.0  # it went until the table was near
+
+
+def test_a_jog_of_coupled_motors_is_looked_at_as_whole_counts_make_it(
+    table: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = armkin.load("tests/robots/differential_wrist.yaml", scene=table)
+    goals: list[Array] = []
+
+    def noted(arm: armkin.Arm, q: Array, goal: Array) -> tuple[float, None]:
+        goals.append(goal - q)
+        return 1.0, None
+
+    monkeypatch.setattr(jogging, "free_way", noted)
+    configuration = SimpleNamespace(axes=range(7))
+    machine: Any = SimpleNamespace(
+        arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=configuration
+    )
+    rates = jogging.rates(machine, 4, 0.4)  # deg/s of J5
+    assert jogging.free_seconds(machine, 4, rates) == np.inf
+    assert goals[0] @ arm.motor_gain.T == pytest.approx([60 * rates[k] for k in range(7)], abs=1e-6)
 
 
 def test_ignoring_is_told_and_lasts_for_one_command(table: str) -> None:

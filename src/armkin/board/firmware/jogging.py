@@ -58,18 +58,20 @@ def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
     return found
 
 
-def free_seconds(machine: Machine, joint: int, rate: float) -> float:
-    """How long a joint may be told to jog at a rate [rad/s | mm/s] so that it stands before it hits anything.
+def free_seconds(machine: Machine, joint: int, rates: dict[int, int]) -> float:
+    """How long a joint's motors may be told to jog at rates (see `rates`) so that it stands before it hits anything.
 
-    Raises NoSolutionError if it could not stand before. inf where nothing is in the way, or nobody knows.
+    Whole counts a second turn the other joints of coupled motors a little, too. Raises NoSolutionError if it could not
+    stand before. inf where nothing is in the way, or nobody knows.
     """
     arm = machine.arm
     if not arm.keep_out or machine.position() == "lost":
         return math.inf
     q = machine.joints()
-    goal = q.copy()
-    goal[joint] += rate * _LONGEST
-    goal[joint] = np.clip(goal[joint], *sorted((q[joint], (arm.lower, arm.upper)[rate > 0][joint])))
+    each = np.linalg.pinv(arm.motor_gain) @ [rates[axis] for axis in machine.configuration.axes]  # [rad/s | mm/s]
+    rate = float(each[joint])
+    room = max(float((arm.lower, arm.upper)[rate > 0][joint] - q[joint]) / rate, 0.0)
+    goal = q + min(room, _LONGEST) * each
     free, why = free_way(arm, q, goal)
     if why is None:
         return math.inf

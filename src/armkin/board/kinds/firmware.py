@@ -146,7 +146,7 @@ class FirmwareBoard(Board):
     def jog(self, joint: int, rate: float, seconds: float, more: Callable[[], bool] | None = None) -> None:
         """Move one joint [rad/s | mm/s] for a time; the board stops it at its limits, if it knows where it stands."""
         rates = jogging.rates(self.machine, joint, self._shown(joint, rate))
-        free = jogging.free_seconds(self.machine, joint, rate)
+        free = jogging.free_seconds(self.machine, joint, rates)
         jogging.jog(self.machine, rates, min(seconds, free), more or (lambda: True))
 
     def _shown(self, joint: int, rate: float) -> float:
