@@ -25,7 +25,8 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
     arm = armkin.load(THREE_DOF)
     file = folder / "path.yaml"
     file.write_text(json.dumps(moves))
-    assume = [] if any(net(board)) else ["--assume-home"]
+    axes = board.stats()["axes"]
+    assume = [] if any(axes[name]["positive"] or axes[name]["negative"] for name in "XYZ") else ["--assume-home"]
     there = patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
     assert there.code == 0, there.err
     before, begin = net(board), 0

@@ -111,7 +111,7 @@ def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
 
 
 def test_waypoints_are_streamed_without_a_stop() -> None:
-    # A frame carries 0.2 s of motion as a mean, and every 0.04 s the board's time waits for a host that gets no processor.
+    # A frame carries 0.2 s of motion as a mean; every 0.04 s the board's time waits for a host without a processor.
     got = waypoints_on_pins.stream(60, patience=0.04)
     assert got.good, got
     assert got.processor < got.seconds  # it keeps up, on a machine that has time for it
