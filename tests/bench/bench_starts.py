@@ -5,7 +5,7 @@
 Prints, for each kind and after each place, how many were carried out, the tip's greatest distance from approach and
 path [mm], from the path's first point [mm], and from the plan's end [counts]; a path that cannot be driven from a
 place (a line from there leaves the limits) is printed as refused. A kind takes a minute. --pins: by the command line
-on the emulated Uno, too, a quarter of an hour; --place 1 is a fifth of it.
+on the emulated Uno, too, about a quarter of an hour; --place 1 is a fifth of it.
 """
 
 from __future__ import annotations
