@@ -8,8 +8,8 @@
 #define UNIT_FACTOR 2  // 256 cycles are 2/125 ms
 #define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 32  // a power of two
-#define FRAME_MAX 146
-#define RECEIVE 160  // bytes: a whole frame, and a question
+#define FRAME_MAX 152
+#define RECEIVE 167  // bytes: a whole frame, and a question
 #define MIN_INTERVAL 448  // cycles between ticks: 35.7 kHz
 
 // axis, STEP port and bit, DIR port and bit

@@ -127,8 +127,7 @@ static uint32_t distance(int32_t a, int32_t b) {
 
 // What 5/4 of max_accel makes of an axis's velocity; in units 2^8 as great where `time` is.
 static int32_t budget(uint8_t axis, uint16_t time) {
-    const uint16_t low = limits.jump[axis], high = limits.jump[axis] >> 16;  // a small chip is quick with 16 by 16 bits
-    return ((uint32_t)low * time >> 8) + ((uint32_t)high * time << 8);
+    return limits.jump[axis] * (uint8_t)(time >> 8) + (limits.jump[axis] * (uint8_t)time >> 8);
 }
 
 // What rounding may make of two velocities: whole cycles of an interval, too.
@@ -170,8 +169,7 @@ static bool jumps(uint8_t axis, int32_t to, struct room room, uint16_t between, 
 }
 
 // An axis's velocities in the next segment: does it jump there, or change within, by more than its budget?
-// Inlined: calls within calls would take stack.
-static inline __attribute__((always_inline)) bool accelerates(uint8_t axis, int32_t first, int32_t last, const struct pace *pace) {
+static bool accelerates(uint8_t axis, int32_t first, int32_t last, const struct pace *pace) {
     if (limits.jump[axis] >= JUMP_MAX) {
         motion.plan_speed[axis] = last;
         return false;

@@ -19,7 +19,6 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.left = s->ticks;
     dda.interval = (uint32_t)interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
-    dda.grow = (int32_t)s->bend * (s->back & QUICK ? 128 : 4);
     if (dda.back & LAST) {
         dda_rest();
     }
@@ -39,4 +38,13 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.back = back;
     dda_direction(back);
     return true;
+}
+
+__attribute__((noinline)) void dda_bend(void) {
+    const int16_t bend = dda.now->bend;
+    if (!bend) {  // at the highest rates there is none, and no time
+        return;
+    }
+    const int32_t more = dda.back & QUICK ? (int32_t)bend * 128 : (int32_t)bend * 4;
+    dda.add = (int32_t)((uint32_t)dda.add + (uint32_t)more);  // behind the last tick it may turn round: nobody looks
 }

@@ -53,8 +53,7 @@ struct dda {
     uint16_t left;              // ticks of `now` still to compute
     uint32_t interval;          // to the next tick, as planned; 2^-16 cycle
     int32_t add;                // 2^-24 cycle a tick
-    int32_t grow;               // what `add` grows by with every block of ticks, or with each
-    fine_t phase[STEPPERS ? STEPPERS : 1], rate[STEPPERS ? STEPPERS : 1];
+    fine_t phase[STEPPERS + 1], rate[STEPPERS + 1];
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
     uint8_t overruns;
@@ -87,12 +86,15 @@ static inline void dda_rest(void) {
     dda.back = 0;
 }
 
+// After each block of ticks.
+void dda_bend(void);
+
 // Cycles to the next tick; dda_load() must have found a segment. Advances the plan to the tick after it.
 static inline uint16_t dda_interval(void) {
     uint16_t planned;
     DDA_ADVANCE(planned)
     if ((uint8_t)dda.left % BLOCK == 0 || dda.back & QUICK) {
-        dda.add = (int32_t)((uint32_t)dda.add + (uint32_t)dda.grow);  // behind the last tick it may turn round: nobody looks
+        dda_bend();
     }
     if (dda.stretch == 256) {
         return planned;
