@@ -214,14 +214,14 @@ export class Chip {
 
   /** What goes on beside the processor up to a cycle: PIO, and the DMA and timers that the clock has. */
   #pass(to) {
-    const { clock, pio } = this;
+    const { clock } = this;
+    const [one, other] = this.pio;
     while (this.cycle < to) {
-      const busy = pio[0].next <= to || pio[1].next <= to;
-      this.cycle = busy ? Math.min(to, this.cycle + BESIDE) : to;
-      for (const block of pio) {
-        if (block.next <= this.cycle) {
-          block.run(this.cycle);
-        }
+      const next = Math.min(one.next, other.next); // until then only the processor and the DMA go on
+      this.cycle = next > to ? to : Math.min(to, Math.max(this.cycle + BESIDE, next));
+      if (next <= this.cycle) {
+        one.run(this.cycle);
+        other.run(this.cycle);
       }
       const nanos = this.cycle * NANOS;
       if (clock.nextAlarm && clock.nextAlarm.nanos / NANOS <= this.cycle) {

@@ -7,7 +7,7 @@ export const TX_STALL = 1 << 24;
 export const TX_OVER = 1 << 16;
 export const RX_UNDER = 1 << 8;
 export const RX_STALL = 1 << 0;
-const ones = (bits) => (bits >= 32 ? 0xffffffff : (2 ** bits - 1) >>> 0);
+const ones = (bits) => (bits >= 32 ? 0xffffffff : (1 << bits) - 1);
 const field = (word, at, bits) => (word >>> at) & ones(bits);
 
 function reversed(x) {
@@ -59,7 +59,8 @@ export class Machine {
 
   /** In 1/256 system cycle (3.5.5). */
   get period() {
-    return (field(this.clkdiv, 16, 16) || 65536) * 256 + (field(this.clkdiv, 16, 16) ? field(this.clkdiv, 8, 8) : 0);
+    const { clkdiv } = this;
+    return clkdiv >>> 16 ? clkdiv >>> 8 : 65536 * 256;
   }
 
   /** One cycle. */
@@ -85,8 +86,11 @@ export class Machine {
   get idle() {
     const opcode = this.block.instructions[this.pc];
     const counts = (opcode & 0xe0e0) === 0x0040 || (opcode & 0xe0e0) === 0x0080;
+    if (!counts) {
+      return 0;
+    }
     const alone = !this.stalled && this.forced === null && this.delay === 0 && (opcode & 0x1f) === this.pc;
-    if (!counts || !alone || opcode & 0x1f00) {
+    if (!alone || opcode & 0x1f00) {
       return 0;
     }
     return opcode & 0x40 ? this.x : this.y;

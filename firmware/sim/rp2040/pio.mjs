@@ -8,6 +8,8 @@ const CTRL = 0x00, FSTAT = 0x04, FDEBUG = 0x08, FLEVEL = 0x0c, TXF0 = 0x10, RXF0
 const PADOUT = 0x3c, PADOE = 0x40, CFGINFO = 0x44, INSTR_MEM0 = 0x48, SM0 = 0xc8, INTR = 0x128, INTE = 0x12c;
 const DREQ_TX = [0, 8]; // of each block's first machine; RX four later (2.5.3.1)
 
+const turned = (bits, by) => (bits << (by & 31)) | (by & 31 ? bits >>> (32 - (by & 31)) : 0);
+
 export class Pio extends BasePeripheral {
   /** chip: where time is (chip.cycle); firstIrq: of the processor. */
   constructor(rp2040, chip, number, firstIrq) {
@@ -59,7 +61,8 @@ export class Pio extends BasePeripheral {
   }
 
   #schedule() {
-    this.next = Math.floor(Math.min(...this.due) / 256);
+    const [a, b, c, d] = this.due;
+    this.next = Math.floor(Math.min(a, b, c, d) / 256);
   }
 
   /** A machine that slept goes on with the next of its clock's cycles. */
@@ -88,15 +91,14 @@ export class Pio extends BasePeripheral {
   }
 
   write(value, base, count, directions) {
-    let mask = 0;
-    let bits = 0;
-    for (let i = 0; i < count; i++) { // pins go round behind 31 (3.5.6)
-      const pin = 1 << ((base + i) & 31);
-      mask |= pin;
-      bits |= (value >>> i) & 1 ? pin : 0;
+    const low = count >= 32 ? -1 : (1 << count) - 1;
+    const mask = turned(low, base); // pins go round behind 31 (3.5.6)
+    const bits = turned(value & low, base);
+    if (directions) {
+      this.pinDirections = (this.pinDirections & ~mask) | bits;
+    } else {
+      this.pinValues = (this.pinValues & ~mask) | bits;
     }
-    const name = directions ? 'pinDirections' : 'pinValues';
-    this[name] = (this[name] & ~mask) | bits;
   }
 
   take(machine) {
@@ -123,7 +125,10 @@ export class Pio extends BasePeripheral {
     if (changed) {
       this.shownDirections = this.pinDirections;
       this.shownValues = this.pinValues;
-      this.rp2040.gpio.forEach((pin, i) => (changed >>> i) & 1 && pin.checkForUpdates());
+      const { gpio } = this.rp2040;
+      for (let left = changed & 0x3fffffff; left; left &= left - 1) {
+        gpio[31 - Math.clz32(left & -left)]?.checkForUpdates();
+      }
     }
   }
 
