@@ -188,7 +188,8 @@ def judged(plan: armkin.PathPlan, counts: Array) -> Result:
     ways = [plan.motion] if plan.approach is None else [plan.approach, plan.motion]
     way = np.concatenate([armkin.fk(arm, one.q(np.linspace(0, one.duration, 2000)))[:, :3, 3] for one in ways])
     first = armkin.fk(arm, plan.motion.start)[:3, 3]
-    begins = float(np.linalg.norm(tips - first, axis=1).min())
+    # of every step: the arm rests at the path's start for one row of them
+    begins = float(np.linalg.norm(armkin.fk(arm, armkin.joints(arm, moved))[:, :3, 3] - first, axis=1).min())
     return Result(
         float(distance(tips, way).max()), begins, int(np.abs(counts[-1] - armkin.pulses(arm, plan.motion.end)).max())
     )
