@@ -15,8 +15,6 @@ COUNTED = {
 
 # And those whose guard EVA does not follow, as it relates two variables.
 GUARDED = {
-    # jump < JUMP_MAX has been asked before: a budget is in 0 ... 2^31 - 2^15, and `change >> 8` in 0 ... 2^24
-    "const int32_t left = budget(axis, windows) - (int32_t)(change >> 8), most = limits.jump[axis];",
     # both ends of a segment have one sign, so `change` has 31 bits, and `left` 23 below 0
     "return left < most ? left * 256 : budget(axis, 0xFFFF);",
     # a difference of more than INT32_MAX has returned before

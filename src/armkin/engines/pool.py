@@ -29,7 +29,7 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
     try:
         while True:
             while len(waiting) < AHEAD * workers and (some := next(source, waiting)) is not waiting:
-                waiting.append((some, pool.submit(_done, some)))  # type: ignore[arg-type]
+                waiting.append((some, _submitted(pool, some)))  # type: ignore[arg-type]
             if not waiting:
                 return
             try:
@@ -41,7 +41,7 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
                     raise ClusterError(why) from None
                 pool.shutdown(wait=True, cancel_futures=True)
                 pool = _pool(workers, work, job)
-                waiting = deque((chunk, pool.submit(_done, chunk)) for chunk, _ in waiting)
+                waiting = deque((chunk, _submitted(pool, chunk)) for chunk, _ in waiting)
                 continue
             lost = 0
             waiting.popleft()
@@ -54,6 +54,16 @@ def _pool(workers: int, work: Callable[[Any, Any], Any], job: Any) -> ProcessPoo
     # new interpreters: a copy of this one would have its threads' locks without the threads
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, context, _begin, (work, job))
+
+
+def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
+    """A chunk given to the pool; of one that is broken already, a future that says so, as those given before do."""
+    try:
+        return pool.submit(_done, chunk)
+    except BrokenProcessPool as error:
+        lost: Future[Any] = Future()
+        lost.set_exception(error)
+        return lost
 
 
 def _begin(work: Callable[[Any, Any], Any], job: Any) -> None:
