@@ -14,21 +14,18 @@ enum { QUICK_INTERVAL = MIN_INTERVAL + MIN_INTERVAL / 4 };  // a tick that count
 #define RECIPROCAL (1UL << (VELOCITY_BITS - 15))
 _Static_assert(RECIPROCAL / MIN_INTERVAL < 1UL << 16, "the reciprocal of an interval has 16 bits");
 
-// A segment's time: in 2^-16 of 50 ms from 32 cycles, and a longer one's in 2^-8 of 50 ms from 256 cycles.
-#define FRACTION ((uint32_t)((1ULL << 35) / (CLOCK / 20)))
+// A segment's time in 1/256 of 50 ms, from units of 256 cycles.
 #define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
-_Static_assert(FRACTION < 65536, "16 bits, as a small chip multiplies");
-enum { LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
+enum { LONGEST = 255, LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
 
 // Velocities are rounded down in two places.
-enum { CYCLES = 2 * VELOCITY_BITS - 67 };  // of a velocity, that whole cycles of its intervals make: 2^-9, or 2^-7
-static const int32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
+static const uint32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
 
 // What is the same for all axes of a segment.
 struct pace {
     uint16_t first, last;  // RECIPROCAL / interval
-    uint16_t time;         // 2^-16 of 50 ms, at most 50 ms
-    uint16_t windows;      // of a longer one: 2^-8 of 50 ms; else 0
+    uint32_t time;         // 1/256 of 50 ms
+    uint8_t window;        // the same, rounded up, at most 255
 };
 
 static enum error check_axis(uint8_t i, int32_t start) {
@@ -109,15 +106,9 @@ static enum error read_head(const uint8_t *p, bool wide, struct segment *s, stru
     if (s->add) {
         pace->last = RECIPROCAL / (uint32_t)last;
     }
-    const uint32_t cycles = (uint32_t)s->ticks * (((uint32_t)s->interval + (uint32_t)last) >> 1);
-    pace->windows = 0;
-    if (cycles < CLOCK / 20) {
-        pace->time = (cycles >> 5) * FRACTION >> 14;
-    } else {
-        const uint32_t windows = ((cycles >> 16) * WINDOW >> 8) + ((cycles >> 8 & 0xFF) * WINDOW >> 16);
-        pace->time = 0xFFFF;
-        pace->windows = windows < 0xFFFF ? windows : 0xFFFF;
-    }
+    const uint32_t units = motion_units(s);
+    pace->time = units < 65536 ? units * WINDOW >> 16 : ((units >> 8) * WINDOW >> 16) << 8;
+    pace->window = pace->time < LONGEST ? pace->time + 1 : LONGEST;
     return OK;
 }
 
@@ -125,74 +116,22 @@ static uint32_t distance(int32_t a, int32_t b) {
     return a > b ? (uint32_t)a - (uint32_t)b : (uint32_t)b - (uint32_t)a;
 }
 
-// What 5/4 of max_accel makes of an axis's velocity; in units 2^8 as great where `time` is.
-static int32_t budget(uint8_t axis, uint16_t time) {
-    return limits.jump[axis] * (uint8_t)(time >> 8) + (limits.jump[axis] * (uint8_t)time >> 8);
+static uint8_t longer(uint8_t a, uint8_t b) {
+    return a > b ? a : b;
 }
 
-// What rounding may make of two velocities: whole cycles of an interval, too.
-static int32_t rounding(int32_t from, int32_t to) {
-    return ROUNDING + ((distance(from, 0) + distance(to, 0)) >> CYCLES);
+static bool jumps(uint8_t axis, int32_t from, int32_t to, uint8_t window) {
+    const uint32_t change = distance(from, to), jump = limits.jump[axis];
+    return change > ROUNDING && jump < JUMP_MAX && change > jump * window + ROUNDING;
 }
 
-// What a change within a segment of more than 50 ms leaves of the budget of 50 ms; negative: it is too great.
-static int32_t left_of_long(uint8_t axis, uint32_t change, uint16_t windows) {
-    if (windows == 0xFFFF) {
-        return 0;
+// Within a segment, too, the velocity may change by no more than 5/4 of what max_accel allows.
+static bool bends(uint8_t axis, int32_t from, int32_t to, const struct pace *pace) {
+    if (pace->time < LONGEST) {
+        return jumps(axis, from, to, pace->window);
     }
-    const int32_t left = budget(axis, windows) - (int32_t)(change >> 8), most = limits.jump[axis];
-    return left < most ? left * 256 : budget(axis, 0xFFFF);
-}
-
-// What half a segment leaves of its budget, for changes up and down; in four units of velocity, so that sums of them fit.
-struct room {
-    int32_t up, down;
-};
-
-// A jump to a segment with this room; `between` the middles of both lies that time. There, too, the change is within the budget; what it was
-// beyond that is kept, each way, and at most rounding's: so the velocities in the middles of any two segments differ by no more than the budget
-// of the time between, and rounding once, however short the segments are.
-static bool jumps(uint8_t axis, int32_t to, struct room room, uint16_t between, int32_t slack) {
-    const uint32_t jump = distance(motion.plan_speed[axis], to);
-    if (jump > INT32_MAX || jump > (uint32_t)budget(axis, between) + slack) {
-        return true;
-    }
-    int32_t *const taken = motion.plan_taken[axis];
-    if (taken[0] == STOOD) {  // rest is as long as the segment beside it
-        taken[0] = taken[1] = -(budget(axis, motion.plan_time) >> 3);
-    }
-    const int32_t change = (to - motion.plan_speed[axis]) >> 2;
-    const int32_t up = taken[0] - room.up + change, down = taken[1] - room.down - change;
-    taken[0] = (up > 0 ? up : 0) - room.up;
-    taken[1] = (down > 0 ? down : 0) - room.down;
-    return up > slack >> 2 || down > slack >> 2;
-}
-
-// An axis's velocities in the next segment: does it jump there, or change within, by more than its budget?
-static bool accelerates(uint8_t axis, int32_t first, int32_t last, const struct pace *pace) {
-    if (limits.jump[axis] >= JUMP_MAX) {
-        motion.plan_speed[axis] = last;
-        return false;
-    }
-    const uint32_t change = distance(first, last);
-    const int32_t slack = rounding(motion.plan_speed[axis], last), whole = budget(axis, pace->time);
-    struct room room = {whole >> 3, whole >> 3};
-    if (pace->windows && change) {
-        const int32_t left = left_of_long(axis, change, pace->windows);
-        *(last > first ? &room.up : &room.down) = left >> 3;
-        if (left < 0) {
-            return true;
-        }
-    } else if (change > (uint32_t)whole + slack) {
-        return true;
-    } else {
-        const int32_t half = (last - first) >> 3;
-        room.up -= half;
-        room.down += half;
-    }
-    const bool refused = jumps(axis, first, room, (motion.plan_time >> 1) + (pace->time >> 1), slack);
-    motion.plan_speed[axis] = last;
-    return refused;
+    const uint32_t windows = (pace->time >> 8) + 1;
+    return windows <= LONGEST && limits.jump[axis] < JUMP_MAX && distance(from, to) >> 8 > limits.jump[axis] * windows;
 }
 
 // A rate of the frame; the direction where it has one, else the one that the axis had.
@@ -219,7 +158,12 @@ static enum error check_rate(uint8_t axis, axes_t bit, const struct segment *s, 
         first = -first;
         last = -last;
     }
-    return accelerates(axis, first, last, pace) ? E_ACCEL : OK;
+    if (jumps(axis, motion.plan_speed[axis], first, longer(motion.plan_window, pace->window)) ||
+        (s->add && bends(axis, first, last, pace))) {
+        return E_ACCEL;
+    }
+    motion.plan_speed[axis] = last;
+    return OK;
 }
 
 // One axis of a segment from the frame into its slot; the plan goes on to its end.
@@ -264,20 +208,16 @@ static enum error check_rows(uint8_t *detail) {
 
 static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, const struct pace *pace, uint8_t *detail) {
     axes_t bit = 1;
-    if (!motion.plan_time) {
-        motion.plan_time = pace->time;
-    }
     for (uint8_t i = 0; i < AXES; i++, mask >>= 1, bit <<= 1) {
         enum error error = OK;
         if (mask & 1) {
             error = read_axis(p, i, bit, s, pace);
             p += 2;
-        } else {
-            if (motion.plan_speed[i]) {  // it was moving: from now on it stands
-                error = accelerates(i, 0, 0, pace) ? E_ACCEL : OK;
-            } else {
-                motion.plan_taken[i][0] = STOOD;
+        } else if (motion.plan_speed[i] || motion.plan_fraction.back & bit) {  // it was moving: from now on it stands
+            if (jumps(i, motion.plan_speed[i], 0, longer(motion.plan_window, pace->window))) {
+                error = E_ACCEL;
             }
+            motion.plan_speed[i] = 0;
             s->back |= motion.plan_fraction.back & bit;
         }
         if (error) {
@@ -285,7 +225,7 @@ static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, 
             return error;
         }
     }
-    motion.plan_time = pace->time;
+    motion.plan_window = pace->window;
     return OK;
 }
 
@@ -316,9 +256,7 @@ static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, 
 static enum error check_end(const uint8_t *ends, uint16_t mask, bool end, uint8_t *detail) {
     for (uint8_t i = 0; i < AXES; i++) {
         *detail = i;
-        const uint16_t time = motion.plan_time;
-        if (end && motion.plan_speed[i] && limits.jump[i] < JUMP_MAX &&
-            jumps(i, 0, (struct room){budget(i, time) >> 3, budget(i, time) >> 3}, time, rounding(motion.plan_speed[i], 0))) {
+        if (end && jumps(i, motion.plan_speed[i], 0, motion.plan_window)) {
             return E_ACCEL;
         }
         if (mask >> i & 1) {

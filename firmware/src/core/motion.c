@@ -192,8 +192,7 @@ struct segment *motion_slot(uint8_t ahead) {
 
 static void plan_rest(void) {
     memset(motion.plan_speed, 0, sizeof motion.plan_speed);
-    memset(motion.plan_taken, STOOD & 0xFF, sizeof motion.plan_taken);
-    motion.plan_time = 0;
+    motion.plan_window = 0;
     at_rest(&motion.plan_fraction);
 }
 

@@ -13,16 +13,13 @@ struct fraction {
     axes_t back;
 };
 
-enum { STOOD = 0x7F7F7F7F };  // in plan_taken: the axis is at rest
-
 struct motion {
     uint8_t state;
     // at the end of the queue:
     int32_t plan[AXES];
     struct fraction plan_fraction;
     int32_t plan_speed[AXES];  // VELOCITY units; 0 at rest
-    int32_t plan_taken[AXES][2];  // of the budget for accelerations, up and down: see batch.c
-    uint16_t plan_time;           // of the last segment, there
+    uint8_t plan_window;       // the last segment's, see batch.c
     bool ended;                // it ends with END
     uint8_t gentle;            // eighths of the accelerations that a hold leaves out
 

@@ -16,12 +16,10 @@ enum error inputs_ready(bool moving) { return moving ? E_BUSY : OK; }
 enum error inputs_blocking(const struct segment *s, uint8_t *detail) { (void)s; *detail = 0; return OK; }
 
 // A plan within the limits that every image keeps to, under way or at rest.
-static void any_plan(bool stood) {
+static void any_plan(void) {
     for (uint8_t i = 0; i < AXES; i++) {
         motion.plan[i] = Frama_C_interval(-(1 << 30), 1 << 30);
         motion.plan_speed[i] = Frama_C_interval(-0x7FFFFFFF, 0x7FFFFFFF);
-        motion.plan_taken[i][0] = stood ? STOOD : Frama_C_interval(-(1 << 29), 1 << 29);
-        motion.plan_taken[i][1] = Frama_C_interval(-(1 << 29), 1 << 29);
         motion.plan_fraction.phase[i] = Frama_C_interval(0, PHASE_MASK);
         limits.top[i] = Frama_C_interval(0, 0x7FFFFFFF);
         limits.jump[i] = Frama_C_interval(1, JUMP_MAX);
@@ -29,14 +27,14 @@ static void any_plan(bool stood) {
         memory.image.axis[i].upper = Frama_C_interval(-(1 << 30), 1 << 30);
     }
     motion.plan_fraction.back = Frama_C_interval(0, ALL_AXES);
-    motion.plan_time = Frama_C_interval(0, 65535);
+    motion.plan_window = Frama_C_interval(0, 255);
 }
 
-static void one_segment(bool stood) {
+static void one_segment(void) {
     uint8_t p[WIDE_SIZE], rate[2];
     Frama_C_make_unknown((char *)p, sizeof p);
     Frama_C_make_unknown((char *)rate, sizeof rate);
-    any_plan(stood);
+    any_plan();
     struct segment *s = &queue[0];
     struct pace pace;
     const uint8_t i = Frama_C_interval(0, AXES - 1);
@@ -75,8 +73,7 @@ static void line(void) {
 
 int main(void) {
     dda.stretch = Frama_C_interval(256, 65535);
-    one_segment(true);
-    one_segment(false);
+    one_segment();
     ticks();
     line();
     return 0;

@@ -51,15 +51,11 @@ class Batches:
             rate = given.get(axis, 0)
             if rate == -STEP:
                 raise RefusedError(Error.STEPS, axis)
-            if axis in given:
-                speed.check(axis, rate)
-            else:
-                speed.stand(axis)
+            speed.check(axis, rate)
             rates[axis] = rate
             plan[axis] += s.ticks * rate
             image, after = self._setup.image.axes[axis], plan[axis] >> 23
             if axis in given and not within(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
-        speed.end()
         self._rows.check([p >> 23 for p in plan], known)
         return replace(s, rates=tuple(rates))
