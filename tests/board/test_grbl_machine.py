@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 from collections.abc import Callable
 from typing import Any
@@ -28,7 +29,8 @@ FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
 
 
 def board(**more: Any) -> Grbl:
-    found = Grbl(axes=4, settings={**FITS, **more.pop("settings", {})}, **more)
+    name = f"machine-{os.getpid()}"  # its record is no other worker's
+    found = Grbl(4, name, {**FITS, **more.pop("settings", {})}, **more)
     found.simulated = False  # so that nobody vouches for the position by itself
     return found
 
@@ -80,7 +82,7 @@ def test_the_position_outlives_the_command_but_no_reset() -> None:
 
 
 def test_settings_that_do_not_fit_are_refused_and_setup_writes_them() -> None:
-    port = Grbl(axes=4)
+    port = Grbl(4, f"machine-{os.getpid()}")
     port.simulated = False
     one = machine(port)
     with pytest.raises(LinkError, match=r"GRBL's settings do not fit three_dof: \$100 .* is 250.*, and 2 more"):
