@@ -11,16 +11,8 @@
 #include "../src/core/link.h"
 #include "../src/core/motion.h"
 #include "../src/core/protocol.h"
+#include "chance.h"
 #include "host.h"
-
-static uint64_t state = 1;
-
-static uint32_t rnd(uint32_t below) {  // xorshift: rand() is slow
-    state ^= state << 13;
-    state ^= state >> 7;
-    state ^= state << 17;
-    return (state >> 16) % below;
-}
 
 static size_t wire_of(const uint8_t *payload, size_t length, uint8_t *wire) {
     uint8_t data[300];
@@ -291,7 +283,7 @@ static void damaged_payloads(uint32_t count) {
 
 int main(int argc, char **argv) {
     const uint32_t frames = argc > 1 ? strtoul(argv[1], NULL, 0) : 1000000;
-    state = argc > 2 ? strtoul(argv[2], NULL, 0) : 0x9E3779B97F4A7C15ULL;
+    chance_seed(argc > 2 ? strtoul(argv[2], NULL, 0) : 0x9E3779B97F4A7C15ULL);
     random_frames(frames);
     printf("fuzz: %u random frames, nothing happened\n", frames);
     damaged_frames(frames);

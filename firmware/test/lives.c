@@ -12,30 +12,15 @@
 #include "../src/core/inputs.h"
 #include "../src/core/motion.h"
 #include "../src/core/protocol.h"
+#include "chance.h"
 #include "host.h"
-
-static uint64_t state = 1;
-
-static uint32_t rnd(uint32_t below) {
-    state ^= state << 13;
-    state ^= state >> 7;
-    state ^= state << 17;
-    return (state >> 16) % below;
-}
-
-static int32_t between(int32_t low, int32_t high) {
-    return low + (int32_t)rnd((uint32_t)(high - low) + 1);
-}
+#include "images.h"
 
 static struct image image;
 static int32_t edge[SWITCHES ? SWITCHES : 1];  // pins of the axis: at or beyond it the switch is pressed
 static bool below[SWITCHES ? SWITCHES : 1], loose[SWITCHES ? SWITCHES : 1];  // loose: a switch that follows no axis
 static uint32_t moved, homed, stopped, refused, cut;
 static uint32_t nonce = 1;
-
-static uint8_t axis_of(uint8_t n) {
-    return n % STEPPERS;
-}
 
 static bool closed(uint8_t n) {
     return image.guard[n].flags & CLOSED;
@@ -74,100 +59,8 @@ static void hello(void) {
     ask(payload, sizeof payload);
 }
 
-static uint16_t image_length(void) {
-    return offsetof(struct image, row) + (image.rows <= ROWS ? image.rows : ROWS) * sizeof image.row[0];
-}
-
-// What PROTOCOL.md, section 4, allows, here and there at its ends.
-static void sound_image(void) {
-    image = host_image();
-    image.flags = rnd(8);
-    image.step_high = rnd(2) ? STEP_HIGH_MAX : rnd(STEP_HIGH_MAX);
-    image.step_low = rnd(STEP_LOW_MAX + 1);
-    image.dir_setup = rnd(DIR_SETUP_MAX + 1);
-    image.wake = rnd(3);
-    for (uint8_t i = 0; i < AXES; i++) {
-        struct axis_config *axis = &image.axis[i];
-        axis->flags = USED | (rnd(2) ? INVERT : 0);
-        axis->max_accel = rnd(8) ? 100000 + rnd(300000) : (1UL << 24) - 1;
-        if (i < STEPPERS) {
-            axis->lower = rnd(8) ? between(-4000, -200) : -(1 << 30);
-            axis->upper = rnd(8) ? between(200, 4000) : 1 << 30;
-            axis->home = rnd(2) ? 0 : axis->lower;
-            if (rnd(8) == 0) {
-                *axis = (struct axis_config){0};  // unused
-            }
-        }
-    }
-    for (uint8_t n = 0; n < SWITCHES; n++) {
-        const uint8_t i = axis_of(n);
-        if (image.axis[i].flags && rnd(3)) {
-            image.guard[n].flags = USED | (rnd(2) ? CLOSED : 0);
-            image.guard[n].weight[i] = below[n] ? -1 - (int8_t)rnd(127) : 1 + (int8_t)rnd(127);
-            const uint8_t other = rnd(STEPPERS);
-            if (other != i && image.axis[other].flags && rnd(4) == 0) {
-                image.guard[n].weight[other] = between(-3, 3);
-            }
-        }
-    }
-    image.rows = rnd(ROWS + 1);
-    for (uint8_t r = 0; r < image.rows; r++) {
-        image.row[r].lower = -between(0, 200000);
-        image.row[r].upper = between(0, 200000);
-        for (uint8_t i = 0; i < STEPPERS; i++) {
-            const bool small = image.axis[i].flags && image.axis[i].upper <= 4000 && image.axis[i].lower >= -4000;
-            image.row[r].weight[i] = small && rnd(2) ? between(-100, 100) : 0;
-        }
-    }
-}
-
-// One fault; each must be refused.
-static void spoil_image(void) {
-    struct axis_config *axis = &image.axis[rnd(AXES)], *stepper = &image.axis[rnd(STEPPERS)], *servo = &image.axis[AXES - 1];
-    const struct axis_config sound = {USED, -100, 100, 0, 1000, 1000};
-    switch (rnd(SWITCHES ? 21 : 18)) {
-        case 0: image.layout = rnd(2) ? 1 : 3; break;
-        case 1: image.axes += rnd(2) ? 1 : -1; break;
-        case 2: image.rows = ROWS + 1; break;
-        case 3: image.flags |= 8 << rnd(5); break;
-        case 4: image.step_high = between(STEP_HIGH_MAX + 1, 255); break;
-        case 5: image.step_low = between(STEP_LOW_MAX + 1, 255); break;
-        case 6: image.dir_setup = between(DIR_SETUP_MAX + 1, 255); break;
-        case 7: axis->flags |= 4 << rnd(6); break;
-        case 8: *stepper = sound; stepper->lower = -(1 << 30) - 1; break;
-        case 9: *stepper = sound; stepper->upper = (1 << 30) + 1; break;
-        case 10: *stepper = sound; stepper->home = -101; break;
-        case 11: *stepper = sound; stepper->home = 101; break;
-        case 12: *stepper = sound; stepper->max_rate = 0; break;
-        case 13: *stepper = sound; stepper->max_accel = rnd(2) ? 0 : 1UL << 24; break;
-        case 14: servo->lower = 399; break;
-        case 15: servo->upper = 2601; break;
-        case 16:
-            image.rows = 1;
-            memset(&image.row[0], 0, sizeof image.row[0]);
-            image.row[0].lower = 1;
-            break;
-        case 17:  // a weight of an axis that is not used, or too great
-            image.rows = 1;
-            memset(&image.row[0], 0, sizeof image.row[0]);
-            image.row[0].weight[0] = 32767;
-            image.axis[0] = rnd(2) ? (struct axis_config){0} : (struct axis_config){USED, -(1 << 30), 100, 0, 1000, 1000};
-            for (uint8_t n = 0; n < SWITCHES; n++) {
-                image.guard[n].weight[0] = 0;
-                image.guard[n].flags &= ~USED;
-                memset(image.guard[n].weight, 0, sizeof image.guard[n].weight);
-            }
-            break;
-        case 18: image.guard[rnd(SWITCHES)].flags |= 4 << rnd(6); break;
-        case 19: image.guard[rnd(SWITCHES)].flags ^= USED; break;
-        default:
-            image.axis[0] = (struct axis_config){0};
-            image.guard[0] = (struct guard_config){.flags = USED, .weight = {1}};
-    }
-}
-
 static enum error configure(void) {
-    const uint16_t length = image_length();
+    const uint16_t length = image_length(&image);
     uint8_t body[250];
     const uint16_t piece = between(20, FRAME_MAX - 9);
     for (uint16_t at = 0; at < length; at += piece) {
@@ -369,9 +262,9 @@ static void live(void) {
     }
     followed = 0;
     hello();
-    sound_image();
+    image = sound_image(below);
     if (rnd(3) == 0) {
-        spoil_image();
+        spoil_image(&image);
         CHECK(configure() == E_CONFIG_BAD && !memory.config);
         return;
     }
@@ -430,7 +323,7 @@ static void live(void) {
 
 int main(int argc, char **argv) {
     const uint32_t lives = argc > 1 ? strtoul(argv[1], NULL, 0) : 1000;
-    state = argc > 2 ? strtoul(argv[2], NULL, 0) : 0x9E3779B97F4A7C15ULL;
+    chance_seed(argc > 2 ? strtoul(argv[2], NULL, 0) : 0x9E3779B97F4A7C15ULL);
     for (uint32_t n = 0; n < lives; n++) {
         live();
     }
