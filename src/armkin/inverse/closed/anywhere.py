@@ -43,16 +43,13 @@ from armkin.inverse.closed.subproblems import (
 )
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.closed.wrist import Wrist, meeting_point
-from armkin.inverse.numeric.tolerances import BLURRED, EXACT, LOOSE, NEAR, NO_SIZE
+from armkin.inverse.numeric.tolerances import EXACT, LOOSE, LOOSE_DOUBLE, NEAR, NO_SIZE
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-
-# squared length across joint b [1 or reaches] below which the joint may be free: of a double root of joint c, and of
-# one of fourth order, rounding leaves the root and the fourth root
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
@@ -127,7 +124,7 @@ class _Ends:
         v = pose.turn_back(self.La, v)
         second, _ = rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
-        free = (across < LOOSE) | (doubt.edge & (across < BLURRED))
+        free = (across < LOOSE) | (doubt.edge & (across < LOOSE_DOUBLE))
         if prefer[1] is not None and np.any(free):
             second = Pair(np.where(free, prefer[1].c, second.c), np.where(free, prefer[1].s, second.s))
         return [first, second, last], doubt | Doubt(free, free)
