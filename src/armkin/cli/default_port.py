@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,17 +13,25 @@ from armkin.errors import UsageError
 if TYPE_CHECKING:
     from armkin.board.backend.board import Board
 
-PortName = Annotated[
-    str | None,
-    typer.Option(
+
+def port_option(help: str) -> Any:
+    """`--port`, for commands that take another help than `PortName`'s."""
+    return typer.Option(
         "--port",
         "-p",
         metavar="PORT",
         envvar="ARMKIN_PORT",
         show_envvar=False,
         autocompletion=completion.ports,
-        help="Device, COM port, pyserial URL, or sim: a board in this process. "
-        "[default: ARMKIN_PORT, else the only board that answers]",
+        help=help,
+    )
+
+
+PortName = Annotated[
+    str | None,
+    port_option(
+        "Device, COM port, pyserial URL, or sim: a board in this process. "
+        "[default: ARMKIN_PORT, else the only board that answers]"
     ),
 ]
 

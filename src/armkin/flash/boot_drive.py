@@ -9,7 +9,7 @@ import os
 import string
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -35,10 +35,10 @@ def mounted() -> Iterator[Path]:
     return filter(is_boot_drive, places)
 
 
-def appearing(stop: Callable[[], bool] = lambda: False, seconds: float = _APPEARS) -> Path:
+def appearing(seconds: float = _APPEARS) -> Path:
     """The boot drive, once it is mounted. Raises LinkError if none is within `seconds`, or several are."""
     end = time.monotonic() + seconds
-    while time.monotonic() < end and not stop():
+    while time.monotonic() < end:
         found = list(mounted())
         if len(found) == 1:
             return found[0]

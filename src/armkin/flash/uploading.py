@@ -40,9 +40,7 @@ class Flashed(NamedTuple):
     firmware: str | None  # version, as the board says it
 
 
-def upload(
-    image: Image, port: str, tick: Tick = lambda done: None, stop: Callable[[], bool] = lambda: False
-) -> Flashed:
+def upload(image: Image, port: str, tick: Tick = lambda done: None) -> Flashed:
     """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
 
     tick: is told the bytes written so far. Raises LinkError, saying what was written: a boot loader stays where it is,
@@ -50,7 +48,7 @@ def upload(
     """
     chip = BOARDS[image.kind].chip
     if chip not in _LOADERS:
-        return _to_boot_drive(image, port, tick, stop)
+        return _to_boot_drive(image, port, tick)
     flash = intel_hex.read(image.data.decode("ascii"))
     loader, link, baud = _loader(chip, image.kind, port)
     program = avrdude.program()
@@ -65,7 +63,7 @@ def upload(
         except LinkError as error:
             raise _cut(str(error), "some") from None
         tick(len(flash))
-    return Flashed(port, len(flash), "avrdude" if program else "armkin", _asked(image.kind, port, stop))
+    return Flashed(port, len(flash), "avrdude" if program else "armkin", _asked(image.kind, port))
 
 
 def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
@@ -121,28 +119,28 @@ def _cut(reason: str, done: str) -> LinkError:
     )
 
 
-def _to_boot_drive(image: Image, port: str, tick: Tick, stop: Callable[[], bool]) -> Flashed:
+def _to_boot_drive(image: Image, port: str, tick: Tick) -> Flashed:
     folder = Path(port)
     if not folder.is_dir():
         SerialPort(port, _TO_BOOT_DRIVE).close()
-        folder = boot_drive.appearing(stop)
+        folder = boot_drive.appearing()
     before = {found.device for found in list_ports()}
     boot_drive.write(folder, image.path.name, image.data)
     tick(len(image.data))
     end = time.monotonic() + _RESTART
-    while time.monotonic() < end and not stop():
+    while time.monotonic() < end:
         new = [found.device for found in list_ports() if found.device == port or found.device not in before]
         if new:
-            return Flashed(new[0], len(image.data), "UF2", _asked(image.kind, new[0], stop))
+            return Flashed(new[0], len(image.data), "UF2", _asked(image.kind, new[0]))
         time.sleep(0.1)
     return Flashed(None, len(image.data), "UF2", None)
 
 
-def _asked(kind: str, port: str, stop: Callable[[], bool]) -> str:
+def _asked(kind: str, port: str) -> str:
     """The firmware's version, of the board that was meant. Raises LinkError for another one, or none."""
     link = SerialPort(port)
     try:
-        info = Session(link, stop).open()
+        info = Session(link).open()
     finally:
         link.close()
     if info.board != BOARDS[kind].number:

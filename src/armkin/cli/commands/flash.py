@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import completion, inputs, output, render
+from armkin.cli.default_port import port_option
 from armkin.cli.options import Json
 from armkin.errors import UsageError
 
@@ -26,14 +27,8 @@ def flash(
     ] = None,
     port: Annotated[
         str | None,
-        typer.Option(
-            "--port",
-            "-p",
-            metavar="PORT",
-            envvar="ARMKIN_PORT",
-            show_envvar=False,
-            autocompletion=completion.ports,
-            help="Device or COM port; a Pico: also its boot drive's folder. [default: ARMKIN_PORT, else the only one]",
+        port_option(
+            "Device or COM port; a Pico: also its boot drive's folder. [default: ARMKIN_PORT, else the only one]"
         ),
     ] = None,
     json: Json = False,
