@@ -13,6 +13,7 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.reachability import place as places
 from command_line import ROOT, run
+from interrupted import interrupted
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof", "planar_3dof", "so101", "stanford"])
@@ -99,17 +100,8 @@ def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch
     monkeypatch.setattr(places, "SOLVES", 40)
     words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
     done = run(*words, "--out", whole)
-    work, answered = places.work, 0
-
-    def stops(*given: object) -> object:
-        nonlocal answered
-        answered += 1
-        if answered == 5:
-            raise KeyboardInterrupt
-        return work(*given)  # type: ignore[arg-type]
-
     with monkeypatch.context() as patch:
-        patch.setattr(places, "work", stops)
+        patch.setattr(places, "work", interrupted(places.work, 5))
         assert run(*words, "--out", out).code == 130
     other = run("place", "three_dof", path, "--step", 100, "--out", out)
     assert other.code == 2

@@ -14,6 +14,7 @@ from armkin.reachability import map as maps
 from armkin.reachability.answers import TURN, Question, answered
 from armkin.reachability.cells import Grid
 from command_line import ROOT, Result, run
+from interrupted import interrupted
 
 ARMS = (
     "ur5e",
@@ -118,17 +119,8 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
     one, two, three = (tmp_path / f"{name}.{end}" for name in "abc")
     assert reach("--out", one).code == 0
     assert reach("--out", two, "--workers", 2).code == 0
-    work, done = maps.work, 0
-
-    def stops(*words: object) -> object:
-        nonlocal done
-        done += 1
-        if done == 4:
-            raise KeyboardInterrupt
-        return work(*words)  # type: ignore[arg-type]
-
     with monkeypatch.context() as patch:
-        patch.setattr(maps, "work", stops)
+        patch.setattr(maps, "work", interrupted(maps.work, 4))
         assert reach("--out", three).code == 130
     assert (tmp_path / f"c.{end}.parts" / "00000002").exists()
     other = run("reach", "puma560", "--grid", 200, "--out", three)

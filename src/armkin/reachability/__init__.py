@@ -12,6 +12,7 @@ cells.py     rings of cells about joint 1's axis, and the orientations in each
 answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
 map.py       `reach`: all rings, in chunks, by any engine
 place.py     `place`: where to put an arm for given targets; place_file.py: its columns
+keeping.py   chunks of both, answered by an engine and kept beside a file
 standing.py  an arm at a place, among what stands with the targets
 """
 

@@ -16,10 +16,11 @@ from armkin.columns import npz
 from armkin.columns.formats import format_of
 from armkin.columns.parts import Parts
 from armkin.columns.table import Table
-from armkin.engines.run import Engine, in_order
+from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.files import check, whole
 from armkin.formula.arrays import Array
+from armkin.reachability import keeping
 from armkin.reachability.answers import TURN, Question, answered
 from armkin.reachability.cells import Grid
 
@@ -166,32 +167,15 @@ class _Run:
         kept: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
         keep = self.parts is None or cells <= KEEP
-        if self.parts is not None and len(all_chunks) > 1:
-            self.parts.begin()
-        try:
-            for number, table in in_order(self.engine, work, self.question, self._missing(all_chunks, kept, keep)):
-                if self.parts is not None and self.parts.held:
-                    self.parts.keep(number, {}, npz.encoded(table))
-                self._count(all_chunks[number], table)
+        with keeping.holding(self.parts, len(all_chunks)):
+            for number, columns in keeping.tables(self.engine, work, self.question, all_chunks, self.parts):
+                self._count(all_chunks[number], columns)
                 if keep:
-                    kept[number] = table
+                    kept[number] = columns
             if self.out is not None:
                 self._write(len(all_chunks), kept)
-        finally:
-            if self.parts is not None:
-                self.parts.leave()
         tables = [kept[number] for number in sorted(kept)]
         return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keep else {}
-
-    def _missing(self, all_chunks: list[Chunk], kept: dict[int, Table], keep: bool) -> Iterator[Chunk]:
-        for chunk in all_chunks:
-            if self.parts is None or not self.parts.held or self.parts.about(chunk.number) is None:
-                yield chunk
-                continue
-            table = _table(self.parts.read(chunk.number))
-            self._count(chunk, table)
-            if keep:
-                kept[chunk.number] = table
 
     def _count(self, chunk: Chunk, table: Table) -> None:
         grid = self.question.grid
@@ -212,7 +196,7 @@ class _Run:
         def tables() -> Iterator[Any]:
             for number in range(count):
                 data = parts.read(number) if parts.held else npz.encoded(kept[number])
-                yield io.BytesIO(data if format.name == "npz" else format.encoded(_table(data)))
+                yield io.BytesIO(data if format.name == "npz" else format.encoded(keeping.table(data)))
 
         with whole(self.out, "wb") as file:
             if format.name == "csv":
@@ -229,8 +213,3 @@ def _asked(question: Question) -> dict[str, Any]:
     asked = {("grid" if name == "step" else name): getattr(grid, name) for name in names}
     arm_is = {"robot file": arm.sha256, "scene": arm.scene_sha256, "joints": arm.n, "reach": arm.reach}
     return {"command": "reach", **arm_is, **asked, "measures": question.measures}
-
-
-def _table(data: bytes) -> Table:
-    with np.load(io.BytesIO(data)) as archive:
-        return dict(archive)

@@ -9,7 +9,6 @@ The robot's own keep-outs move with it; those of a scene stand with the targets.
 
 from __future__ import annotations
 
-import io
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -20,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin import files
-from armkin.columns import npz
 from armkin.columns.parts import Parts, digest
-from armkin.engines.run import Engine, in_order
+from armkin.columns.table import Table
+from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solutions import Status
@@ -30,6 +29,7 @@ from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, read_targets
 from armkin.model.rotation import rotation_about
+from armkin.reachability import keeping
 from armkin.reachability.answers import TURN, arc, inside, limit_margin
 from armkin.reachability.cells import STRAIGHT
 from armkin.reachability.standing import Around, apart, free
@@ -153,7 +153,14 @@ def each(
     for i, (one, (axes, _)) in enumerate(zip(asked, grids, strict=True)):
         at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         work_list += [Chunk(len(work_list) + k, i, part) for k, part in enumerate(_blocks(one, at))]
-    counts = _Run(asked, settings, out, engine, progress).done(work_list)
+    counts: dict[int, NDArray[np.int64]] = {}
+    parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.at) for chunk in work_list)
+    with keeping.holding(parts, len(work_list)):
+        for number, columns in keeping.tables(engine, work, asked, work_list, parts):
+            counts[number] = np.asarray(columns["reached"])
+            done += len(work_list[number].at)
+            if progress is not None:
+                progress(done, total)
     found = []
     for i, (one, (axes, inner)) in enumerate(zip(asked, grids, strict=True)):
         mine = [counts[chunk.number] for chunk in work_list if chunk.which == i]
@@ -173,51 +180,13 @@ def _question(arm: Arm, targets: ArrayLike, settings: dict[str, Any], scene: str
     return Question(arm, task, read_targets(task, targets).values, yaws, settings["yaw"], settings["z"], around)
 
 
-class _Run:
-    """Chunks that are answered, kept beside the file until it stands, and the file."""
-
-    def __init__(
-        self,
-        questions: list[Question],
-        settings: dict[str, Any],
-        out: str | os.PathLike[str] | None,
-        engine: Engine,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        self.questions, self.engine, self.progress = questions, engine, progress
-        self.parts: Parts | None = None
-        if out is None:
-            return
-        files.check(os.fspath(out))
-        robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes())] for one in questions]
-        self.parts = Parts(os.fspath(out), {"command": "place", "robots, scene and targets": robots, **settings})
-
-    def done(self, chunks: list[Chunk]) -> dict[int, NDArray[np.int64]]:
-        """Counts (P, K) of all chunks, by their number."""
-        counts: dict[int, NDArray[np.int64]] = {}
-        if self.parts is not None and len(chunks) > 1:
-            self.parts.begin()
-        try:
-            total = sum(len(chunk.at) for chunk in chunks)
-            missing = [chunk for chunk in chunks if not self._kept(chunk, counts)]
-            for chunk, found in zip(missing, in_order(self.engine, work, self.questions, missing), strict=True):
-                counts[chunk.number] = found
-                if self.parts is not None and self.parts.held:
-                    self.parts.keep(chunk.number, {}, npz.encoded({"reached": found.ravel()}))
-                if self.progress is not None:
-                    self.progress(sum(map(len, counts.values())), total)
-        finally:
-            if self.parts is not None:
-                self.parts.leave()
-        return counts
-
-    def _kept(self, chunk: Chunk, counts: dict[int, NDArray[np.int64]]) -> bool:
-        """Whether an earlier run has answered a chunk."""
-        if self.parts is None or not self.parts.held or self.parts.about(chunk.number) is None:
-            return False
-        with np.load(io.BytesIO(self.parts.read(chunk.number))) as archive:
-            counts[chunk.number] = archive["reached"].reshape(len(chunk.at), -1)
-        return True
+def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.PathLike[str] | None) -> Parts | None:
+    """What is answered, kept beside the file until it stands."""
+    if out is None:
+        return None
+    files.check(os.fspath(out))
+    robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes())] for one in questions]
+    return Parts(os.fspath(out), {"command": "place", "robots, scene and targets": robots, **settings})
 
 
 def positions_of(task: Task, targets: Array) -> Array:
@@ -255,9 +224,10 @@ def _blocks(question: Question, at: Array) -> Iterator[Array]:
         yield at[start : start + count]
 
 
-def work(questions: list[Question], chunk: Chunk) -> NDArray[np.int64]:
-    """How many targets are reached from each position and yaw: (P, K)."""
-    return np.concatenate([_counted(questions[chunk.which], at) for at in chunk.at])
+def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
+    """How many targets are reached from each position and yaw: (P K,)."""
+    counts = [_counted(questions[chunk.which], at).ravel() for at in chunk.at]
+    return chunk.number, {"reached": np.concatenate(counts)}
 
 
 def _counted(question: Question, at: Array) -> NDArray[np.int64]:

@@ -1,0 +1,75 @@
+"""Chunks that an engine answers, kept beside the file that they become: run again after a kill, it goes on."""
+
+from __future__ import annotations
+
+import io
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from armkin.columns import npz
+from armkin.columns.parts import Parts
+from armkin.columns.table import Table
+from armkin.engines.run import Engine, in_order
+
+
+class Numbered(Protocol):
+    """A piece of the work."""
+
+    @property
+    def number(self) -> int:
+        """Its place among all, from 0."""
+
+
+Chunk = TypeVar("Chunk", bound=Numbered)
+
+
+@contextmanager
+def holding(parts: Parts | None, count: int) -> Iterator[None]:
+    """Hold the parts of a file that is made of `count` chunks: one alone is not worth it."""
+    if parts is not None and count > 1:
+        parts.begin()
+    try:
+        yield
+    finally:
+        if parts is not None:
+            parts.leave()
+
+
+def tables(
+    engine: Engine,
+    work: Callable[[Any, Chunk], tuple[int, Table]],
+    job: Any,
+    chunks: Iterable[Chunk],
+    parts: Parts | None,
+) -> Iterator[tuple[int, Table]]:
+    """Number and columns of all chunks, in any order: those that an earlier run has kept, and the others, kept now."""
+    kept: deque[int] = deque()
+
+    def missing() -> Iterator[Chunk]:
+        for chunk in chunks:
+            if parts is not None and parts.held and parts.about(chunk.number) is not None:
+                kept.append(chunk.number)
+            else:
+                yield chunk
+
+    def read() -> Iterator[tuple[int, Table]]:
+        while parts is not None and kept:
+            number = kept.popleft()
+            yield number, table(parts.read(number))
+
+    for number, columns in in_order(engine, work, job, missing()):
+        if parts is not None and parts.held:
+            parts.keep(number, {}, npz.encoded(columns))
+        yield number, columns
+        yield from read()
+    yield from read()
+
+
+def table(data: bytes) -> Table:
+    """Columns as they were kept."""
+    with np.load(io.BytesIO(data)) as archive:
+        return dict(archive)
