@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bare_host import WIDE, BareHost, Batch, batches, image_for
-from emulator import BUILD, FIRMWARE, PICO, EmulatedBoard, Trace, make
+from emulator import BUILD, FIRMWARE, PICO, EmulatedBoard, Trace, build_simulator, make
 from measure import counts_at_home
 from measure_pico import ready
 from numpy.typing import NDArray
@@ -112,9 +112,11 @@ def expected(wave: list[list[int]], axis: int) -> dict[str, Any]:
 @pytest.mark.parametrize("board", [uno, pico])
 def test_the_analyser_prints_what_the_emulated_pins_did(board: Any) -> None:
     make("-C", str(FIRMWARE / "analyser"))
+    build_simulator(PICO)  # the analyser runs in it, whichever board made the waveform
     wave = waveform(*board())
     command = ["node", str(Path(__file__).with_name("analyser_runner.mjs")), str(BUILD / "analyser.uf2")]
-    done = subprocess.run(command, input=json.dumps(wave), capture_output=True, text=True, check=True)
+    done = subprocess.run(command, input=json.dumps(wave), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
     table = json.loads(done.stdout.splitlines()[-1])
     assert table["lost"] == 0
     for axis, name in enumerate(SEEN):
