@@ -126,12 +126,21 @@ def test_a_board_without_a_boot_loader_is_told() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_session_opens_while_the_real_boot_loader_listens(kind: str, loaders: dict[str, Path]) -> None:
-    """A byte that comes meanwhile keeps the Mega's there until 5 s of silence: armkin never reached such a board."""
+@pytest.mark.parametrize("last", [b"", b"\x1b"])
+def test_a_session_opens_while_the_real_boot_loader_listens(kind: str, last: bytes, loaders: dict[str, Path]) -> None:
+    """A byte that comes meanwhile keeps the Mega's there until 5 s of silence: armkin never reached such a board.
+
+    last: a byte after every greeting. 0x1b begins a message of the Mega's boot loader, which then takes the next four
+    bytes for that message's head; one greeting in 256 ends so by chance, and what told the loader to leave was lost.
+    """
     from armkin.board.firmware.session import Session
     from armkin.board.ports import SerialPort
 
+    class Port(SerialPort):
+        def write(self, data: bytes) -> None:
+            super().write(data + last)
+
     with EmulatedBoard(kind, elf=build_firmware(kind), loader=loaders[BOARDS[kind].chip], speed="max") as board:
-        port = SerialPort(board.port)
+        port = Port(board.port)
         assert Session(port).open().board == BOARDS[kind].number
         port.close()

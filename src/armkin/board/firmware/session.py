@@ -25,6 +25,7 @@ _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
 _LISTENS = 0.2  # [s] after the opening: by then a Mega's boot loader listens
 _TRIES = 0.5  # [s] in which a board that nothing has reset, or a Mega, answers
+_AGAIN = 1.8  # [s] after the opening: by then every boot loader that nobody spoke to has left
 _BOOT = 5.0  # [s] that a board may take to answer after its port was opened
 _KEPT = 1000  # bytes of what is no board's
 _PROBES = 8
@@ -58,15 +59,16 @@ class Session:
 
         Raises LinkError if nothing answers, or something else than this protocol.
         """
-        begin, heard, left = self.port.now(), bytearray(), False
+        begin, heard, nonce, leave = self.port.now(), bytearray(), _nonce(), [_LISTENS, _AGAIN]
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
-            if since > _LISTENS and not left:
+            if leave and since > leave[0]:
                 leave_boot_loader(self.port)
-                left = True
-            if since < _TRIES or since > 1.8:
-                info = self._hello(0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
+                del leave[0]
+                nonce = _nonce()  # a new session: a board counts those words as damaged frames
+            if since < _TRIES or since > _AGAIN:
+                info = self._hello(nonce, 0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
                 if info is not None:
                     return info
             else:
@@ -74,22 +76,19 @@ class Session:
             if self._stop():
                 raise StoppedError
             if since > _BOOT:
-                raise LinkError(
-                    f"{_no_board(self.port, bytes(heard), self.line.splitter.bad > 0)}\n"
-                    "(make -C firmware flash PORT=...); armkin ports lists the other ports"
-                )
+                raise _no_board(self.port, bytes(heard), self.line.splitter.bad > 0)
 
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""
         for attempt in range(40):
-            info = self._hello(0.2 if attempt % 4 == 3 else 0.05)  # a busy computer's answers come late
+            info = self._hello(_nonce(), 0.2 if attempt % 4 == 3 else 0.05)  # a busy computer's answers come late
             if info is not None:
                 return info
         raise _silent(self.port)
 
-    def _hello(self, timeout: float) -> Info | None:
-        # the low half is the session's digest, and 0 means none
-        nonce, self._tag = secrets.randbits(16) << 16 | 1 + secrets.randbelow(65535), (self._tag + 1) & 255
+    def _hello(self, nonce: int, timeout: float) -> Info | None:
+        """Greet the board. A repeated nonce changes nothing there: the answer to the one before serves as well."""
+        self._tag = (self._tag + 1) & 255
         self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)))
         end = self.port.now() + timeout
         while self.port.now() < end:
@@ -281,6 +280,11 @@ class Session:
             yield self.under_way + self.queued / 1000
 
 
+def _nonce() -> int:
+    """A new session's number. Its low half is the session's digest, and 0 means none."""
+    return secrets.randbits(16) << 16 | 1 + secrets.randbelow(65535)
+
+
 def _moved(before: Status | None, reply: Ack | Status) -> bool:
     """Whether a status tells other counts than the one before."""
     return isinstance(reply, Status) and before is not None and reply.page == 0 and reply.counts != before.counts
@@ -293,14 +297,16 @@ def _silent(port: Port) -> LinkError:
     )
 
 
-def _no_board(port: Port, heard: bytes, damaged: bool) -> str:
+def _no_board(port: Port, heard: bytes, damaged: bool) -> LinkError:
     """What to say of a port where this protocol is not spoken.
 
     heard: what came between two tries; damaged: whether something came that is no frame of the protocol.
     """
     where = f"{port.name} ({port.baud} baud)"
     if b"grbl" in heard.lower():
-        return f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
-    if heard or damaged:
-        return f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
-    return f"no board answers on {where}: is armkin's firmware flashed?"
+        why = f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
+    elif heard or damaged:
+        why = f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
+    else:
+        why = f"no board answers on {where}: is armkin's firmware flashed?"
+    return LinkError(f"{why}\n(armkin flash --port {port.name}); armkin ports lists the other ports")
