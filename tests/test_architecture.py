@@ -32,28 +32,32 @@ MAY_IMPORT: dict[str, str] = {
     "inverse/closed": "errors formula model forward inverse/tasks inverse/numeric",
     "inverse/elimination": "errors formula model inverse/numeric",
     "inverse/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/closed",
-    "inverse/singular": "formula model inverse/tasks inverse/numeric",
-    "inverse": "keep_out keep_out/shapes"
-    " errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
-    " inverse/branches inverse/singular",
+    "inverse/answers": "errors keep_out formula model forward inverse/tasks inverse/numeric inverse/branches",
+    "inverse/singular": "keep_out formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers",
+    "inverse/solvers": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination",
+    "inverse/run": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
+    " inverse/answers inverse/singular inverse/solvers",
+    "inverse": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
+    " inverse/branches inverse/answers inverse/singular inverse/solvers inverse/run",
     "engines": "errors",
-    "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse motors",
+    "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse"
+    " inverse/answers motors",
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
     "motion": "keep_out keep_out/shapes"
-    " errors formula model forward inverse/tasks inverse/branches inverse motors path_file",
+    " errors formula model forward inverse/tasks inverse/branches inverse/answers inverse motors path_file",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
-    " inverse inverse/tasks",
+    " inverse inverse/answers inverse/tasks",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "keep_out keep_out/shapes"
     " errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
-    " inverse/elimination inverse/branches",
-    "export/js": "errors formula model forward inverse inverse/tasks inverse/closed inverse/numeric inverse/elimination"
-    " inverse/branches keep_out motors export/c",
+    " inverse/elimination inverse/branches inverse/solvers",
+    "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
+    " inverse/elimination inverse/branches keep_out motors export/c",
     "compiled": "keep_out keep_out/shapes"
     " errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
-    " export/c",
+    " inverse/answers inverse/singular inverse/solvers inverse/run export/c",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
     "board/ports": "errors",
     "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion board/ports"
@@ -68,7 +72,7 @@ MAY_IMPORT: dict[str, str] = {
     "flash": "errors board_kinds board/ports board/firmware",
     "board": "keep_out keep_out/shapes errors signals formula model forward motors motion board/ports board/backend",
     "teach": "keep_out keep_out/shapes"
-    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches motors"
+    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches inverse/solvers motors"
     " motion path_file reachability view board board/ports board/backend board/kinds board/sim"
     " export/js",
 }

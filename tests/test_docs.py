@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.errors import UsageError
-from armkin.inverse import recognise
+from armkin.inverse.solvers import recognise
 from armkin.robot_file import catalogue
 from slow import SLOW
 from test_architecture import MAY_IMPORT
@@ -46,12 +46,12 @@ def test_links_between_pages_lead_somewhere() -> None:
 def test_the_solvers_table_has_every_class_in_its_order() -> None:
     files = re.findall(r"\| `(inverse/[a-z_/]+)\.py` \|", SOLVER.read_text())
     order = [_module(function) for function in recognise._CLASSES]
-    assert [{"inverse/elimination/method": "inverse/general"}.get(name, name) for name in files] == order
+    assert [{"inverse/elimination/method": "inverse/solvers/general"}.get(name, name) for name in files] == order
 
 
 def _module(function: object) -> str:
     name = str(getattr(function, "__module__", "")).removeprefix("armkin.").replace(".", "/")
-    return "inverse/tool_axis" if name == "inverse/recognise" else name
+    return "inverse/solvers/tool_axis" if name == "inverse/solvers/recognise" else name
 
 
 def test_the_methods_of_the_shipped_robots_are_on_the_page() -> None:

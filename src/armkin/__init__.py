@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from armkin.forward import frames as frames
     from armkin.forward import jacobian as jacobian
     from armkin.forward import manipulability as manipulability
+    from armkin.inverse.answers.closest import Closest as Closest
+    from armkin.inverse.answers.closest import closest as closest
+    from armkin.inverse.answers.solutions import Solutions as Solutions
+    from armkin.inverse.answers.solutions import Status as Status
     from armkin.inverse.branches.turns import turns as turns
-    from armkin.inverse.closest import Closest as Closest
-    from armkin.inverse.closest import closest as closest
-    from armkin.inverse.recognise import method as method
-    from armkin.inverse.solutions import Solutions as Solutions
-    from armkin.inverse.solutions import Status as Status
     from armkin.inverse.solve import ik as ik
+    from armkin.inverse.solvers.recognise import method as method
     from armkin.keep_out.clearance import Clearance as Clearance
     from armkin.keep_out.clearance import clearance as clearance
     from armkin.keep_out.loading import load as load
@@ -76,11 +76,11 @@ _HOME = {
     "jacobian": "forward",
     "manipulability": "forward",
     "turns": "inverse.branches.turns",
-    "Closest": "inverse.closest",
-    "closest": "inverse.closest",
-    "method": "inverse.recognise",
-    "Solutions": "inverse.solutions",
-    "Status": "inverse.solutions",
+    "Closest": "inverse.answers.closest",
+    "closest": "inverse.answers.closest",
+    "method": "inverse.solvers.recognise",
+    "Solutions": "inverse.answers.solutions",
+    "Status": "inverse.answers.solutions",
     "ik": "inverse.solve",
     "Clearance": "keep_out.clearance",
     "clearance": "keep_out.clearance",

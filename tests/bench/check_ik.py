@@ -32,7 +32,7 @@ from test_nearly_special import OFF, moved
 
 import armkin
 from armkin.errors import UsageError
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 
 HEAD = "method | poses | lost | branches | mm | deg | twice | us/pose"

@@ -15,7 +15,7 @@ import pytest
 
 import armkin
 from armkin.compiled import toolchain
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
 ROBOTS = Path(__file__).parents[2] / "robots"

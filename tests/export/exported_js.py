@@ -12,7 +12,7 @@ import numpy as np
 
 import armkin
 from armkin.export.js.program import module
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual

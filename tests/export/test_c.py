@@ -14,7 +14,7 @@ from exported import Exported, agreement, postures
 
 import armkin
 from armkin.export.c.program import identifier, program
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.build import build
 from armkin.robot_file import parse

@@ -11,7 +11,7 @@ from exported_js import ask, differences, goals_of
 import armkin
 from armkin.errors import UsageError
 from armkin.export.js.program import module
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import nearest_rotation
 

@@ -12,7 +12,7 @@ from truth import Array, Bool
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 STEP = 0.08  # [rad]
 

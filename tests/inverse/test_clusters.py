@@ -5,9 +5,9 @@ import pytest
 
 import armkin
 from armkin.formula.arrays import Array
-from armkin.inverse.clusters import means
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLUSTER
+from armkin.inverse.singular.clusters import means
 from armkin.model.arm import Arm
 
 

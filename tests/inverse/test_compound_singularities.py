@@ -14,7 +14,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.inverse.closed import anywhere
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 
 def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:

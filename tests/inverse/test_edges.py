@@ -15,7 +15,7 @@ from oracle import distance, forward, goal, missing, screws
 import armkin
 from armkin import Status
 from armkin.errors import UsageError
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 QUARTER = np.pi / 2

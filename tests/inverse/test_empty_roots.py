@@ -11,7 +11,7 @@ from oracle import goal
 import armkin
 from armkin.inverse.elimination import method, roots
 from armkin.inverse.numeric.tolerances import ALONE
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.rotation import inverse
 
 

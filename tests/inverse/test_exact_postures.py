@@ -11,7 +11,7 @@ from oracle import distance, goal
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 POSTURES = exact_postures.read()
 REACH = 0.1  # [rad, reaches] how far a component reaches that is no manifold: docs/solution.md

@@ -11,7 +11,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 
 @pytest.mark.parametrize("q", [[180, 180, 180, 180, -90, 0], [0, 180, 0, 0, 90, 90]])

@@ -10,7 +10,7 @@ import pytest
 from test_every_branch import shipped
 
 import armkin
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
 

@@ -10,7 +10,7 @@ from test_every_branch import NAMES, shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 
 @pytest.mark.parametrize("name", NAMES)

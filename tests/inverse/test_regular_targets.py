@@ -10,10 +10,10 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse import regular_targets
-from armkin.inverse.batch import Goals
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.recognise import solver
+from armkin.inverse.singular import regular_targets
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 
 NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma560", "ur5e", "irb2400", "stanford"]

@@ -9,7 +9,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.errors import UsageError
-from armkin.inverse.target_rounding import printed
+from armkin.inverse.answers.rounding import printed
 from armkin.inverse.tasks.task import LABELS
 from armkin.model.units import targets_out
 from command_line import run

@@ -12,9 +12,9 @@ from oracle import goal
 from test_every_branch import NAMES, shipped
 
 import armkin
-from armkin.inverse import one_target
 from armkin.inverse.branches.turns import nearest_copy, nearest_number
-from armkin.inverse.recognise import solver
+from armkin.inverse.run import single as one_target
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 
 CLOSED = [name for name in NAMES if solver(shipped(name)[0], None)[1].pairs]

@@ -10,7 +10,7 @@ from oracle import goal
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 
 
 def gantry(pattern: str, axes: str) -> Case:

@@ -18,9 +18,9 @@ from test_every_branch import NAMES, shipped
 import armkin
 from armkin import Status
 from armkin.errors import UsageError
-from armkin.inverse import singularities
-from armkin.inverse.batch import Goals
-from armkin.inverse.recognise import solver
+from armkin.inverse.answers.batch import Goals
+from armkin.inverse.singular import components
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import from_links
 
 
@@ -188,13 +188,13 @@ def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
 def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does one of an arm a thousand times as long: the closed form's own answers are accepted."""
     asked: list[int] = []
-    examine = singularities.examine
+    examine = components.examine
 
     def counted(goals: Goals, q: np.ndarray, *rest: object) -> object:
         asked.append(len(q))
         return examine(goals, q, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(singularities, "examine", counted)
+    monkeypatch.setattr(components, "examine", counted)
     arm = shipped("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
     link = arm.link.copy()

@@ -11,9 +11,9 @@ from test_every_branch import shipped
 import armkin
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.inverse.recognise import solver
+from armkin.inverse.run.workers import shared
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.inverse.workers import shared
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from oracle import Goal, Screws
 
 import armkin
 from armkin import Status
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 from armkin.model.rotation import rpy
 

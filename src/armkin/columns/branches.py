@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from armkin.columns.table import Table, Words
 from armkin.forward import fk
 from armkin.inverse import choose
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.numeric.tolerances import EQUAL
-from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.tasks.residuals import residual
 from armkin.model import limits, units
 from armkin.model.lock import unlock

@@ -18,14 +18,16 @@ from armkin.compiled.results import Results
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
-from armkin.inverse import near_itself, solve, target_rounding
+from armkin.inverse import solve
+from armkin.inverse.answers import rounding as target_rounding
+from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.numeric.tolerances import FAR, SOLUTION
-from armkin.inverse.recognise import solver
-from armkin.inverse.solutions import Solutions
+from armkin.inverse.run.workers import check, shared
+from armkin.inverse.singular import near_itself
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import distance, read_targets
-from armkin.inverse.workers import check, shared
 from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.answers.solutions import Solutions, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.solutions import Solutions
+from armkin.inverse.answers.solutions import Solutions
 
 ROOM = 24  # columns that a large result has room for from the start: to grow it would take its memory twice
 MOVABLE = 32_000_000  # [bytes] results up to this grow by a copy instead: allocators reuse the memory given back

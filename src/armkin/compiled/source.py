@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from armkin.export.c import elimination, formulas, keep_outs, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_and_js_code import number
-from armkin.inverse.near_itself import room
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, THERE
+from armkin.inverse.singular.near_itself import room
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach

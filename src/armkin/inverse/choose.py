@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
+from armkin.inverse.answers.closest import Closest
+from armkin.inverse.answers.closest import closest_each as nearest_poses
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
-from armkin.inverse.closest import Closest
-from armkin.inverse.closest import closest_each as nearest_poses
 from armkin.inverse.numeric.tolerances import EQUAL, HELD
-from armkin.inverse.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
 from armkin.keep_out.clearance import said as hits_said

@@ -17,21 +17,24 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
-from armkin.inverse import chunks, free_postures, legal_postures, near_itself, one_target, target_rounding
-from armkin.inverse.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers import rounding as target_rounding
+from armkin.inverse.answers.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
-from armkin.inverse.doubtful import examined
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
-from armkin.inverse.recognise import solver
-from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.run import chunks
+from armkin.inverse.run import single as one_target
+from armkin.inverse.run.edges import examined
+from armkin.inverse.run.workers import check, shared
+from armkin.inverse.singular import free_postures, legal_postures, near_itself
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, around, distance, read_targets, shaped
-from armkin.inverse.workers import check, shared
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:

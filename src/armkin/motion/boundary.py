@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.solutions import Status
+from armkin.inverse.answers.solutions import Status
 from armkin.motion.branch_chains import Chain
 from armkin.motion.linked_branches import ENDS, Columns, change, chord_bound, levers, turns_of
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.solutions import Status
+from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
 from armkin.motion.free import hit_samples as motion_hits
 from armkin.motion.linked_branches import ENDS, Columns, Int, turns_of

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 
 if TYPE_CHECKING:

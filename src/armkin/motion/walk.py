@@ -13,8 +13,8 @@ import numpy as np
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.names import find
-from armkin.inverse.solutions import Status
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of

@@ -24,7 +24,7 @@ from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.solutions import Status
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, read_targets

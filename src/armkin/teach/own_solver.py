@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.model import units
 from armkin.model.arm import actual
 from armkin.motors import pulse_range

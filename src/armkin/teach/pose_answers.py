@@ -11,7 +11,8 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.inverse import choose, recognise
+from armkin.inverse import choose
+from armkin.inverse.solvers import recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import hits

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from armkin.columns.table import Table
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
-    from armkin.inverse.closest import Closest as NearestPose
-    from armkin.inverse.solutions import Solutions
+    from armkin.inverse.answers.closest import Closest as NearestPose
+    from armkin.inverse.answers.solutions import Solutions
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -146,7 +146,7 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
 
 def _rounding(arm: Arm, task: Task, values: Array) -> Array:
     """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with."""
-    from armkin.inverse import target_rounding
+    from armkin.inverse.answers import rounding as target_rounding
 
     return target_rounding.printed(units.label_units(task.labels), values, arm.reach)
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
-from armkin.inverse import tool_axis
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
 from armkin.inverse.elimination.method import Elimination, _shaken
 from armkin.inverse.numeric.tolerances import SHAKES
+from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _by_fours(rows: Array) -> Array:
 
 
 def _with_virtual_joint() -> str:
-    """`arm_candidates` of five joints and the tool's axis, by way of the pose that `armkin.inverse.tool_axis` makes."""
+    """`arm_candidates` of five joints and the tool's axis, by way of the pose that `solvers.tool_axis` makes."""
     code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k}]" for k in range(6)])
     lines = [*code.lines, *(f"goal[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
     return part("virtual_joint").replace("@lines@", "\n    ".join(lines))

@@ -13,10 +13,10 @@ from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
-from armkin.inverse import general
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.numeric.tolerances import HAIR
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers import general
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.arm import actual
 

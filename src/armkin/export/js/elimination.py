@@ -11,10 +11,10 @@ import numpy as np
 
 from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays
 from armkin.formula import c_and_js_code, recording
-from armkin.inverse import tool_axis
 from armkin.inverse.elimination.merge import _WEIGHTS
 from armkin.inverse.elimination.method import Elimination
 from armkin.inverse.numeric.tolerances import SHAKES
+from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from armkin.export.c.program import has_form, plain_form, why_no_form
 from armkin.export.js import elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.recognise import solver
+from armkin.inverse.solvers.recognise import solver
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual
 from armkin.model.units import radian_or_reach

@@ -14,7 +14,7 @@ class Rows(NamedTuple):
     """What a solver that works row by row returns for targets.
 
     q: (N, B, n) branches [rad | mm], nan past a target's last one.  doubt: (N,) targets to be examined by
-    `armkin.inverse.singularities`.  complete: (N,) every isolated branch is there.  lost: (N,) singular postures may
+    `inverse.singular.components`.  complete: (N,) every isolated branch is there.  lost: (N,) singular postures may
     be missing.  guesses: (N, G, n) postures that may be close to these.
     """
 

@@ -40,7 +40,7 @@ TOUCHING = 1e-4  # complex roots this close to the real line may be a double roo
 
 # ---- classes of arms
 EXACT = 1e-12  # axes parallel or meeting to this count as exactly so
-NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.nearly_special`
+NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.solvers.nearly_special`
 STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
 

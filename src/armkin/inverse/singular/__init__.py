@@ -1,4 +1,16 @@
 """What a solution is at a singular posture: docs/solution.md.
 
-local_structure.py  the residual along the direction that a posture loses, and the component that it lies on
+local_structure.py     the residual along the direction that a posture loses, and the component that it lies on
+components.py          candidates of targets on an edge: which are one, isolated, a boundary or a self-motion manifold
+regular_targets.py     most such targets, which are regular, at once
+fold_singularities.py  postures at which two roots meet
+clusters.py            what rounding makes of one root of third or fourth order
+valleys.py             whether two roots are points of one curved valley
+self_motions.py        whether joints can move while the target is kept, and what lies on one self-motion
+null_directions.py     the directions that a posture loses
+corners.py             postures in which self-motions meet, replaced by one of each
+circuits.py            the connected pieces of a self-motion of three joints or more
+legal_postures.py      edges of which only other postures than those listed are within limits
+free_postures.py       self-motions beside keep-outs: by their nearest free posture
+near_itself.py         `near` where it solves its target itself
 """

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.batch import Batch, Goals
+from armkin.inverse.answers.batch import Batch, Goals
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SOLUTION, WEAK
-from armkin.inverse.solutions import Status
 from armkin.keep_out.clearance import clear
 from armkin.model.units import radian_or_reach
 

@@ -1,7 +1,7 @@
 """Self-motions: whether the joints can move while the target is kept, and which postures lie on one.
 
 A posture is pushed along each direction that its Jacobian loses, and pulled back onto the target. What then lies on
-a self-motion that is listed already is dropped: `armkin.inverse.singularities` lists one posture of each.
+a self-motion that is listed already is dropped: `armkin.inverse.singular.components` lists one posture of each.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, valleys
-from armkin.inverse.null_directions import null_directions
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     BESIDE,
@@ -31,6 +29,8 @@ from armkin.inverse.numeric.tolerances import (
     TURNED,
     WEAK,
 )
+from armkin.inverse.singular import circuits, valleys
+from armkin.inverse.singular.null_directions import null_directions
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 

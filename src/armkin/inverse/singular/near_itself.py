@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import position
-from armkin.inverse.batch import Batch, Goals, named, wider
+from armkin.inverse.answers.batch import Batch, Goals, named, wider
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import HAIR, SOLUTION, THERE
-from armkin.inverse.solutions import Status
 from armkin.model import limits
 from armkin.model.units import radian_or_reach
 

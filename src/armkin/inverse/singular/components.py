@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import circuits, clusters, corners, self_motions, valleys
-from armkin.inverse.batch import Goals
+from armkin.inverse.answers.batch import Goals
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
@@ -35,8 +35,8 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     TURNED,
 )
+from armkin.inverse.singular import circuits, clusters, corners, self_motions, valleys
 from armkin.inverse.singular.local_structure import local_structure, members
-from armkin.inverse.solutions import Status
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 Of the targets that a closed form doubts, most are neither singular nor out of reach: two of their branches lie some
 1e-4 rad apart. This tells them from the others all at once, from the Jacobian at every candidate and the posture
-between every two neighbours; what it cannot tell is left to `armkin.inverse.singularities`, whose criteria these are.
+between every two neighbours; what it cannot tell is left to `singular.components`, whose criteria these are.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import fold_singularities, self_motions
-from armkin.inverse.batch import Goals
-from armkin.inverse.fold_singularities import Linear
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import (
@@ -34,6 +32,8 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
+from armkin.inverse.singular import fold_singularities, self_motions
+from armkin.inverse.singular.fold_singularities import Linear
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach

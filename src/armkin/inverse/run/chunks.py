@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.forward import position
-from armkin.inverse import near_itself
-from armkin.inverse.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.turns import nearest_copy
 from armkin.inverse.closed.candidates import Recorded, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.doubtful import Doubts, as_doubts, decided
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
-from armkin.inverse.solutions import Status
+from armkin.inverse.run.edges import Doubts, as_doubts, decided
+from armkin.inverse.run.workers import shared
+from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
-from armkin.inverse.workers import shared
 from armkin.model.limits import SLACK
 
 if TYPE_CHECKING:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import singularities
-from armkin.inverse.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.closest import thorough
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.turns import nearest_row
-from armkin.inverse.closest import thorough
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, OFF_LIMITS, ON_MANIFOLD, SOLUTION
-from armkin.inverse.solutions import Status
+from armkin.inverse.singular import components
 from armkin.model.units import radian_or_reach
 
 
@@ -53,7 +53,7 @@ def listed(goals: Goals, out: Batch) -> Batch:
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = singularities.examine(beside, q[None], label, np.zeros((1, len(q)), bool), no_more)
+        found = components.examine(beside, q[None], label, np.zeros((1, len(q)), bool), no_more)
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue

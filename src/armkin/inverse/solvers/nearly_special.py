@@ -20,7 +20,6 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
-from armkin.inverse import general
 from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
@@ -37,6 +36,7 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     STEADY,
 )
+from armkin.inverse.solvers import general
 from armkin.inverse.tasks.fitting import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
@@ -63,7 +63,7 @@ class _Corrected(NamedTuple):
 def recognise(arm: Arm, task: Task) -> Geometry | None:
     """Arms that a closed form would fit if their axes moved by `NEAR`, or `NEARLY_PARALLEL` if nothing else fits."""
     if task.orientation == "axis":
-        return None  # see `armkin.inverse.tool_axis`
+        return None  # see `armkin.inverse.solvers.tool_axis`
     wide, narrow = (planar, elbow), (three_joints, spherical, three_parallel)
     classes = [*((module, NEARLY_PARALLEL) for module in wide), *((module, NEAR) for module in narrow)]
     found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse import regular_targets, singularities
-from armkin.inverse.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.solutions import Status
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
 from armkin.inverse.numeric.tolerances import ACCEPTED, SAME
-from armkin.inverse.solutions import Status
+from armkin.inverse.singular import components, regular_targets
 
 AT_ONCE = 256  # targets examined together
 
@@ -127,7 +127,7 @@ def examined(
 
     candidates: joint values (K, M, n) for some of the doubtful ones, and which depend on `near` (K, M); others: more
     of them, for targets and preferred values, and whether branches seem lost or an elimination did not settle them;
-    unsettled: (N,), see `singularities.examine`.
+    unsettled: (N,), see `components.examine`.
     """
     for start in range(0, len(doubtful), AT_ONCE):
         rows = doubtful[start : start + AT_ONCE]
@@ -140,7 +140,7 @@ def examined(
             return others(some.target[which], some.near[which], lost | incomplete[which])
 
         label = np.arange(q.shape[1]) % max(columns, 1)
-        seen = singularities.examine(some, q, label, loose, more, None if unsettled is None else unsettled[rows])
+        seen = components.examine(some, q, label, loose, more, None if unsettled is None else unsettled[rows])
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)

@@ -11,10 +11,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from armkin.errors import UsageError
-from armkin.inverse import general, nearly_special, tool_axis
 from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import RANK
+from armkin.inverse.solvers import general, nearly_special, tool_axis
 from armkin.inverse.tasks.fitting import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import actual

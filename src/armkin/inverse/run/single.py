@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.forward import point_numbers
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
-from armkin.inverse.near_itself import room
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
-from armkin.inverse.recognise import solver
-from armkin.inverse.solutions import Solutions, Status
+from armkin.inverse.singular.near_itself import room
+from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
 from armkin.model.arm import actual
 from armkin.model.limits import SLACK

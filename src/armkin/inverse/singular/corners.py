@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.inverse.batch import Goals
-from armkin.inverse.null_directions import null_directions
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, ONE_CROSSING, SOLUTION
-from armkin.inverse.self_motions import STEP, follow, on_surface
+from armkin.inverse.singular.null_directions import null_directions
+from armkin.inverse.singular.self_motions import STEP, follow, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 

@@ -1,0 +1,7 @@
+"""Which class an arm belongs to, and the classes that are no closed form of their own.
+
+recognise.py       the classes, in the order in which they are asked
+nearly_special.py  all but one of the closed forms: its branches, corrected on the true arm
+tool_axis.py       five joints, the tool's position and z axis: a class for poses and a virtual joint
+general.py         every other arm of up to six joints
+"""
