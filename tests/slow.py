@@ -13,6 +13,13 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_standard_input_without_end_is_refused",
     ),
     "attacks/test_signals.py": (),
+    "cli/test_begin.py": (
+        "test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again",
+        "test_the_file_is_corrected_and_its_comments_stay",
+        "test_bus_servos_are_put_to_their_zeros_by_hand",
+        "test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board",
+    ),
+    "firmware/test_first_hour.py": (),
     "firmware/test_flash.py": (),
     "board/test_board_sim.py": ("test_mutated_frames_move_nothing_that_was_not_sent",),
     "board/test_conformance.py": (),

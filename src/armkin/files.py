@@ -37,14 +37,14 @@ def forget() -> None:
 
 
 @contextmanager
-def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Iterator[IO[Any]]:
+def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w", *, corrects: bool = False) -> Iterator[IO[Any]]:
     """Open a file for writing that takes its name only when all of it is written.
 
     The text (UTF-8) or bytes go to a temporary file in the same folder, which is renamed at the end and
     removed if the block raises; a file of that name stays as it was until then. What is not a regular
     file (a pipe, /dev/null) is written as it stands, and so is what stdout or stderr are redirected to.
-    Raises FileError, also for a full disk; UsageError for a robot file, a file that the command reads, and a
-    file that may not be written.
+    corrects: the file is a robot file that somebody was asked about. Raises FileError, also for a full disk or a
+    file that may not be written; else UsageError for a robot file, and for a file that the command reads.
     """
     name = os.fspath(path)
     if "\0" in name:
@@ -57,7 +57,7 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w") -> Itera
                 yield file
             return
         if there is not None:
-            _check_replaceable(name, real, there)
+            _check_replaceable(name, real, there, corrects=corrects)
         import tempfile  # needed for writing alone: it takes a millisecond
 
         handle, temporary = tempfile.mkstemp(prefix=".armkin-", suffix=".part", dir=os.path.dirname(real))
@@ -101,9 +101,11 @@ def _is_stream(there: os.stat_result) -> bool:
     return False
 
 
-def _check_replaceable(name: str, real: str, there: os.stat_result) -> None:
+def _check_replaceable(name: str, real: str, there: os.stat_result, *, corrects: bool = False) -> None:
     if not there.st_mode & 0o222:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
+    if corrects:
+        return
     with open(real, "rb") as file:
         head = file.read(_HEAD)
     if all(re.search(key, head) for key in _ROBOT):

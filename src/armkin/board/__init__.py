@@ -1,5 +1,6 @@
 """Trajectory -> motors that turn.
 
+first_hour.py  directions, zeros, limits and the first move of an arm on its board
 opening.py    a board of any kind by its port's name
 planner.py    plans one after another, rows as they come, where the arm stands
 path_run.py   a planned path, part by part, the gripper between

@@ -137,6 +137,19 @@ def board_of(arm: Arm, *, rehearsal: bool = False) -> Board:
     return kinds.board_of(arm, rehearsal=rehearsal)
 
 
+def rehearsed(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
+    """The arm for a port: on `sim` alone with motors and rates that its file does not state, which are named."""
+    if port != SIM:
+        return arm
+    from armkin.board.backend.assumptions import assumed
+
+    arm, made_up = assumed(arm)
+    if made_up and not quiet:
+        words = "; ".join(made_up)
+        output.note(f"assumed for the simulation alone, as {arm.path or arm.name} does not say: {words}")
+    return arm
+
+
 def simulated(assume: str | None) -> str:
     """What to say of a board in this process, which knows no position before."""
     return AT_HOME if assume in (None, "home") else "the simulated board forgets all at the end"

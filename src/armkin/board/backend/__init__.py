@@ -6,6 +6,7 @@ job.py           a trajectory for a board that is sent positions, not segments
 servo_arm.py     an arm of bus servos of any make
 stepper_arm.py   an arm of steppers on a board that obeys every program
 record.py        what armkin last left on a board that other programs write to
+assumptions.py   motors and rates made up for a simulation, where the file has none
 missing_keys.py  what a robot file lacks for its board
 
 A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory

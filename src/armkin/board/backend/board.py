@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -149,16 +149,9 @@ class Board(ABC):
 
     def answers(self, name: str, baud: int | None = None, stop: Never = lambda: False, *, reset: bool = True) -> bool:
         """Whether such a board answers at a port. Nothing moves."""
-        try:
-            link = self.open(name, baud, reset=reset)
-        except LinkError:
-            return False
-        try:
+        with suppress(LinkError), closing(self.open(name, baud, reset=reset)) as link:
             return self.replies(link, stop)
-        except LinkError:
-            return False
-        finally:
-            link.close()
+        return False
 
     # Connected
 
@@ -198,6 +191,10 @@ class Board(ABC):
         note: of `recall`, the motion that is gone on with; None: all of it.
         """
         yield parts, 0, lambda seconds: None
+
+    def forget(self) -> None:
+        """Let the board take the robot file as it is now: what it believed of another one is lost."""
+        return
 
     def go_home(self) -> None:
         """Move to the home pose from where the arm stands."""

@@ -309,4 +309,4 @@ def _no_board(port: Port, heard: bytes, damaged: bool) -> LinkError:
         why = f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
     else:
         why = f"no board answers on {where}: is armkin's firmware flashed?"
-    return LinkError(f"{why}\n(armkin flash --port {port.name}); armkin ports lists the other ports")
+    return LinkError(f"{why}\n(armkin flash); armkin ports lists the other ports")

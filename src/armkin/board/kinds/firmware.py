@@ -118,6 +118,11 @@ class FirmwareBoard(Board):
         """Take the newest status that has come while the arm moves."""
         self.machine.heard()
 
+    def forget(self) -> None:
+        """Write the configuration if the board has another one: all positions are lost with it."""
+        if not self.machine.configured:
+            self.machine.configure()
+
     def stopped(self, error: StoppedError) -> None:
         """Take the status of the arm at rest."""
         if error.status is not None:

@@ -14,6 +14,7 @@ COMMANDS = {
     "jog": "Move one joint at a constant speed, for a short time.",
     "ports": "Serial ports of this computer, Arduinos first.",
     "setup": "A board's settings against the robot file.",
+    "begin": "The first hour of an arm on its board, guided.",
     "flash": "armkin's firmware onto a board.",
     "relax": "Switch bus servos off, to move the arm by hand and read it.",
     "zero": "Record where the zero of bus servos is.",

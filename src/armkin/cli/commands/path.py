@@ -187,6 +187,7 @@ def _carried_out(
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
+    arm = board_link.rehearsed(arm, link.port)
     board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed(arm, link.assume)
     simulated = board_link.simulated(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:

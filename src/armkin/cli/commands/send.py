@@ -134,6 +134,8 @@ def send(
     arm = keep_outs.marked(arm, ignore_keep_out)
     if accel is not None:
         arm = _accelerated(arm, number(accel, "--accel"))
+    if not dry_run:
+        arm = board_link.rehearsed(arm, port)
     try:
         board = board_link.board_of(arm, rehearsal=rehearsal)
     except UsageError as error:

@@ -1,0 +1,68 @@
+"""What a robot file does not say of motors and rates, made up: for a board in this process alone.
+
+A table from a paper or a URDF has no drives. A simulated arm moves all the same; a real one never does on such figures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.model.units import DEGREE
+from armkin.motion.plan import missing_rates
+from armkin.motors import undriven
+from armkin.robot_file import Motor
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+_STEPPER = {"full_steps": 200, "microsteps": 16}
+_GEAR = 20.0  # of a turning joint: 0.006 degrees a step
+_LEAD = 8.0  # mm a turn of a sliding one
+_RATES = {"max_speed": (30.0, 50.0), "max_accel": (60.0, 100.0)}  # deg, mm
+
+
+def assumed(arm: Arm) -> tuple[Arm, list[str]]:
+    """The arm with motors and rates where it has none, and in words what was made up; nothing: the same arm.
+
+    >>> import armkin
+    >>> assumed(armkin.load("puma560"))[1][1]
+    'max_speed of q1, q2, q3, q4, q5, q6: 30 deg/s'
+    """
+    said = []
+    if bare := undriven(arm):
+        arm = _driven(arm, bare)
+        said.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
+        if any(arm.prismatic[arm.joint_names.index(name)] for name in bare):
+            said[-1] += f" (slides: {_LEAD:g} mm a turn)"
+    for key, names in missing_rates(arm).items():
+        values = getattr(arm, key).copy()
+        for name in names:
+            j = arm.joint_names.index(name)
+            values[j] = _RATES[key][1] if arm.prismatic[j] else _RATES[key][0] * DEGREE
+        turning, sliding = (
+            [n for n in names if arm.prismatic[arm.joint_names.index(n)] == slides] for slides in (False, True)
+        )
+        per = "s" if key == "max_speed" else "s2"
+        for group, value, unit in ((turning, _RATES[key][0], "deg"), (sliding, _RATES[key][1], "mm")):
+            if group:
+                said.append(f"{key} of {', '.join(group)}: {value:g} {unit}/{per}")
+        arm = replace(arm, **{key: values})
+    return arm, said
+
+
+def _driven(arm: Arm, bare: list[str]) -> Arm:
+    """The arm with a stepper for each of these joints."""
+    motors, gain = list(arm.motors), [*arm.motor_gain]
+    for name in bare:
+        j = arm.joint_names.index(name)
+        slides = bool(arm.prismatic[j])
+        chain = {"lead": _LEAD} if slides else {"gear": _GEAR}
+        motors.append(Motor.model_validate({"name": name, "joints": {name: 1.0}, **_STEPPER, **chain}))
+        row = np.zeros(arm.n)
+        row[j] = motors[-1].pulses_per_unit() / (1.0 if slides else DEGREE)
+        gain.append(row)
+    bias = np.concatenate([arm.motor_bias, np.zeros(len(bare))])
+    return replace(arm, motors=tuple(motors), motor_gain=np.array(gain), motor_bias=bias)

@@ -1,0 +1,165 @@
+"""`armkin begin`."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armkin.cli import board_link, inputs, keep_outs, output
+from armkin.cli.board_link import Baud, NoReset
+from armkin.cli.default_port import PortName
+from armkin.cli.keep_outs import NoScene
+from armkin.cli.keys import Keys, keys
+from armkin.cli.options import Out, Robot, Scene
+from armkin.errors import ArmkinError, FileError, UsageError
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from armkin.board.backend import Backend
+    from armkin.board.backend.board import Board
+    from armkin.board.first_hour import Found
+    from armkin.model.arm import Arm
+
+
+def begin(
+    robot: Robot,
+    port: PortName = None,
+    scene: Scene = None,
+    no_scene: NoScene = False,
+    out: Out = None,
+    baud: Baud = None,
+    no_reset: NoReset = False,
+) -> None:
+    """The first hour of an arm on its board, guided.
+
+    Which way each joint turns, where zero is, how far it may go, a first move that comes back home. Before that move a
+    joint moves only while a key is held, at a tenth of its speed, 2 degrees or mm where its direction is asked. At the
+    end the robot file is corrected, shown as a diff first; --out writes another file instead. With --port sim what an
+    imported table does not say of motors is assumed, and named.
+    """
+    from armkin.board import first_hour
+    from armkin.robot_file.catalogue import locate, shipped
+
+    path = locate(robot)
+    if out is None and shipped(robot) is not None and path == str(shipped(robot)):
+        raise UsageError(f"{robot} is a shipped robot, which stays as it is: add --out MINE.yaml")
+    if out is not None and Path(out).exists():
+        raise FileError(f"{out} is there already; give another name", file=out)
+    link = board_link.Link(port, baud, None, resume=False, reset=not no_reset, no_scene=no_scene)
+    session = _Session(robot, path, scene, link)
+    found = first_hour.Found()
+    with keys() as person:
+        try:
+            session.run(found, person)
+        except ArmkinError:
+            session.write(found, out, person)
+            raise
+        session.write(found, out, person)
+    if found.at_home is False:
+        output.warn(
+            "the check was not passed: full_steps, microsteps, gear or pulley of a joint that comes back wrong, "
+            "its max_accel, or its motor's current"
+        )
+
+
+class _Session:
+    """A robot file on its board, opened again whenever it was corrected."""
+
+    def __init__(self, robot: str, path: str, scene: str | None, link: board_link.Link) -> None:
+        self.path, self.scene, self.link, self.port = path, scene, link, link.port
+        inputs.load(robot, scene)  # what is wrong with the files is told first
+        self.text = _read(path)
+        self.told = False
+
+    def run(self, found: Found, person: Keys) -> None:
+        """All steps, in their order."""
+        from armkin.board import first_hour
+
+        board, arm = self._board(found)
+        with self._open(board) as machine:
+            self.port = machine.port.name  # the one that was found is asked again
+            keep_outs.check_start(machine, arm, self.link.no_scene)
+            found.inverted |= first_hour.directions(board, person)
+        board, arm = self._board(found)
+        with self._open(board):
+            found.zeros = first_hour.zeros(board, person, forget=bool(found.inverted))
+            if not found.zeros:
+                found.limits = first_hour.limits(board, person)
+                found.at_home = first_hour.first_move(board, person)
+                return
+        board, arm = self._board(found)
+        with self._open(board):
+            found.limits = first_hour.limits(board, person)
+            found.at_home = first_hour.first_move(board, person)
+
+    def _open(self, board: Board) -> AbstractContextManager[Backend]:
+        return board_link.backend(board, self.port, self.link.baud, reset=self.link.reset)
+
+    def _board(self, found: Found) -> tuple[Board, Arm]:
+        """The board of the file as it is corrected so far."""
+        from armkin.keep_out.loading import checked
+        from armkin.robot_file import parse
+        from armkin.robot_file.scene import read
+
+        file = parse(self.corrected(found), self.path)
+        arm = checked(file, None if self.scene is None else read(self.scene))
+        if not self.told:
+            keep_outs.marked(arm, ignore=False)
+        arm = board_link.rehearsed(arm, self.port, quiet=self.told)
+        self.told = True
+        return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
+
+    def corrected(self, found: Found) -> str:
+        """The file's text with what was found."""
+        from armkin.robot_file import parse
+        from armkin.robot_file.edit import replaced
+        from armkin.robot_file.writing import flow
+
+        file = parse(self.text, self.path)
+        motors = file.motor_list()
+        where: dict[tuple[str | int, ...], str] = {}
+        names = [joint.name for joint in file.joints]
+        for k in range(len(motors)):
+            at = ("motors", k) if file.motors else ("joints", names.index(motors[k].name), "drive")
+            if k in found.inverted:
+                where[*at, "invert"] = flow(not motors[k].invert)
+            if k in found.zeros:
+                where[*at, "zero"] = flow(found.zeros[k])
+        for j, pair in found.limits.items():
+            where["joints", j, "limits"] = flow(list(pair))
+        return replaced(self.text, where)
+
+    def write(self, found: Found, out: str | None, person: Keys) -> None:
+        """The corrected file, shown as a diff and asked for first."""
+        from armkin.files import whole
+        from armkin.robot_file import parse
+
+        made = self.corrected(found)
+        target = out or self.path
+        if made == self.text:
+            output.note(f"nothing to correct in {self.path}")
+            return
+        parse(made, target)  # nothing is written that no command would take
+        difference = difflib.unified_diff(
+            self.text.splitlines(keepends=True), made.splitlines(keepends=True), self.path, target, n=1
+        )
+        with output.destination(None) as write:
+            write("".join(difference))
+        if person.ask(f"Write this to {target}? y yes, n no", "yn") == "n":
+            output.note("nothing was written")
+            return
+        if _read(self.path) != self.text:
+            raise FileError(f"{self.path} has changed meanwhile: nothing was written", file=self.path)
+        with whole(target, corrects=out is None) as file:
+            file.write(made)
+        output.note(f"wrote {target}")
+
+
+def _read(path: str) -> str:
+    try:
+        return Path(path).read_bytes().decode("utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(f"{path}: cannot read the robot file: {reason}", file=path) from None

@@ -1,0 +1,115 @@
+"""Keys of a terminal, one at a time, and whether one is held: a terminal tells of a held key by sending it again."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from armkin.cli import output
+from armkin.errors import UsageError
+
+_BEGINS = 0.8  # [s] after which a held key is sent again at the latest, on every system's default
+_AGAIN = 0.25  # [s] in which the next one comes then
+_POLL = 0.01  # [s] that one look takes
+_ARROWS = {"[C": "+", "[A": "+", "[D": "-", "[B": "-", "OC": "+", "OA": "+", "OD": "-", "OB": "-"}
+_ARROWS_WINDOWS = {"M": "+", "H": "+", "K": "-", "P": "-"}
+
+
+class Keys:
+    """Somebody at a terminal."""
+
+    def __init__(self, poll: Callable[[float], str]) -> None:
+        """poll: the next key that comes within so many seconds, else an empty text."""
+        self._poll = poll
+
+    def say(self, text: str) -> None:
+        """A line to read."""
+        output.note(text)
+
+    def key(self) -> str:
+        """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
+        while True:
+            if found := self._poll(0.5):
+                return found
+
+    def ask(self, question: str, answers: str) -> str:
+        """One of some keys; what was pressed before the question is none."""
+        self._quiet()
+        output.note(f"{question} [{'/'.join(answers)}]")
+        while (found := self.key().lower()) not in answers:
+            pass
+        return found
+
+    def held(self, key: str) -> Callable[[], bool] | None:
+        """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
+        if self._poll(_BEGINS) != key:
+            return None
+        last = time.monotonic()
+
+        def more() -> bool:
+            nonlocal last
+            found = self._poll(_POLL)
+            if found == key:
+                last = time.monotonic()
+            return found in ("", key) and time.monotonic() - last < _AGAIN
+
+        return more
+
+    def _quiet(self) -> None:
+        """Wait until no key comes: one that was held until now answers nothing."""
+        while self._poll(_AGAIN):
+            pass
+
+
+@contextmanager
+def keys() -> Iterator[Keys]:
+    """The keys of the terminal, without Enter; Ctrl-C stays a signal. Raises UsageError if there is none."""
+    if not (sys.stdin is not None and sys.stdin.isatty()):
+        raise UsageError("begin asks at a terminal, and standard input is none: run it in one")
+    if sys.platform == "win32":
+        yield Keys(_windows)
+        return
+    import termios
+    import tty
+
+    before = termios.tcgetattr(sys.stdin)
+    try:
+        tty.setcbreak(sys.stdin)
+        yield Keys(_posix)
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, before)
+
+
+def _posix(seconds: float) -> str:
+    import os
+    import select
+
+    if not select.select([sys.stdin], [], [], seconds)[0]:
+        return ""
+    read = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+    if not read:
+        raise UsageError("the terminal is gone: nothing was written")
+    if read == "\x1b":
+        follows = bool(select.select([sys.stdin], [], [], 0)[0])
+        return _ARROWS.get(os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if follows else "", "\x1b")
+    return {"\r": "\n", "=": "+", "_": "-"}.get(read, read)
+
+
+def _windows(seconds: float) -> str:
+    if sys.platform != "win32":
+        return ""
+    import msvcrt
+
+    end = time.monotonic() + seconds
+    while not msvcrt.kbhit():
+        if time.monotonic() >= end:
+            return ""
+        time.sleep(0.002)
+    read = msvcrt.getwch()
+    if read in "\0\xe0":
+        return _ARROWS_WINDOWS.get(msvcrt.getwch(), "\x1b")
+    if read == "\x03":
+        raise KeyboardInterrupt
+    return {"\r": "\n", "=": "+", "_": "-"}.get(read, read)

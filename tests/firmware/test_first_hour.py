@@ -1,0 +1,43 @@
+"""`armkin begin` on the compiled firmware: a board that was just flashed knows nothing."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from emulator import EmulatedBoard
+
+import armkin
+from command_line import ROOT, run
+from person import ENTER, Person, seen
+
+
+def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.yaml"
+    shutil.copy(ROOT / "robots/three_dof.yaml", path)
+    path.chmod(0o644)
+    keys = [*seen("y"), *seen("n"), *seen("y")]  # directions
+    keys += ["2", "-", ENTER]  # zeros: the second joint is taken back a little
+    keys += [ENTER, "y", "y", "y"]  # limits; the first move; check; write
+    person = Person(keys, looks=20)
+
+    @contextmanager
+    def keys_of() -> Iterator[Person]:
+        yield person
+
+    monkeypatch.setattr("armkin.cli.commands.begin.keys", keys_of)
+    with EmulatedBoard("uno_cnc_shield", speed="max") as board:
+        done = run("begin", path, "--port", board.port)
+        assert done.code == 0, done.err
+        assert not person.keys
+        assert armkin.load(path).motors[1].invert
+        steps = board.net()
+        assert steps["X"] > 0
+        found = run("status", path, "--port", board.port, "--json")
+        assert found.json["position"] in ("known", "retained")
+        assert found.json["pulses"] == [0, 0, 0], "home, by the corrected file"
