@@ -292,3 +292,25 @@ def test_a_tick_that_is_brought_too_late_is_told_and_ends_in_a_hold(board: Emula
     host.run(0.1)
     status = ended(host, Error.OVERRUN, 0xFF)
     assert 8000 * 0.2 < status.counts[0] < 8000 * 0.3
+
+
+def test_1200_baud_on_the_usb_lead_to_the_boot_drive_from_rest_alone() -> None:
+    """What `armkin flash` does to a Pico that runs armkin; datasheet 2.8.3: reset_to_usb_boot."""
+    with EmulatedBoard(PICO, speed="step", trace=True, by="usb", driver="drv8825") as board:
+        board.run(0.1)  # the host sets the device up
+        for rate in (115200, 250000):
+            board.control(f"line-coding {rate}")
+            board.run(0.01)
+            assert board.stats()["state"] == "running"
+        host = under_way(board)
+        board.control("line-coding 1200")
+        host.run(0.01)
+        assert board.stats()["state"] == "running", "an arm that moves is not left alone"
+        host.run(3.0)
+        assert board.stats()["state"] == "running", "and what was refused is not done later"
+        board.control("line-coding 1200")
+        board.run(0.01)
+        assert board.stats()["state"] == "boot drive"
+        board.control("reset power")
+        board.run(0.1)
+        assert board.stats()["state"] == "running"

@@ -16,6 +16,22 @@ const BESIDE = 8; // cycles that the DMA may be behind the PIO
 const CHIP_RESET = 0x40064;
 const DMA_ABORT = 0x444;
 
+/**
+ * What the program may ask of the boot ROM (datasheet 2.8.3): a table of one function, reset_to_usb_boot, whose code is
+ * UB, and the function that looks for a code in it. Pairs of address and word.
+ */
+const USB_BOOT = 0x130;
+const ROM = [
+  [0x14, 0x110], // where the table is
+  [0x18, 0x101], // and the function
+  [0x100, 0x428a8802], // ldrh r2, [r0]; cmp r2, r1
+  [0x104, 0x8840d101], // bne over the next two; ldrh r0, [r0, #2]
+  [0x108, 0x20004770], // bx lr; movs r0, #0
+  [0x10c, 0x00004770], // bx lr
+  [0x110, ((USB_BOOT | 1) << 16) | 0x4255], // UB
+  [USB_BOOT, 0xe7fee7fe], // b .
+];
+
 /** The flash that a UF2 file describes (https://github.com/microsoft/uf2), after the checks of the boot ROM's loader. */
 export function readUf2(file) {
   const blocks = [];
@@ -137,7 +153,11 @@ export class Chip {
 
   /** What the boot ROM does with a flash that is there (datasheet 2.8.1): the first 256 bytes, if their checksum holds, run in RAM. */
   #bootRom() {
-    const { core, flash, sram } = this.rp2040;
+    const { core, flash, sram, bootrom } = this.rp2040;
+    ROM.forEach(([at, word]) => {
+      bootrom[at / 4] = word;
+    });
+    this.bootDrive = false;
     const block = flash.subarray(0, 256);
     this.booted = bootChecksum(block.subarray(0, 252)) === Buffer.from(block).readUInt32LE(252);
     if (this.booted) {
@@ -186,6 +206,10 @@ export class Chip {
   #runTo(end) {
     const { clock, rp2040 } = this;
     const { core } = rp2040;
+    if (this.booted && core.PC === USB_BOOT) {
+      this.booted = false;
+      this.bootDrive = true;
+    }
     if (!this.booted) {
       this.cycle = end;
       clock.nanosCounter = end * NANOS;

@@ -64,7 +64,7 @@ export class Commands {
       const { chip, pins, line, since } = this;
       const asleep = (chip.slept - since.slept) / Math.max(1, chip.cycle - since.cycle);
       return {
-        board: 'pico6', mcu: 'rp2040', clock_hz: CLOCK_HZ, state: chip.booted ? 'running' : 'no boot block', seconds: chip.cycle / CLOCK_HZ,
+        board: 'pico6', mcu: 'rp2040', clock_hz: CLOCK_HZ, state: chip.booted ? 'running' : chip.bootDrive ? 'boot drive' : 'no boot block', seconds: chip.cycle / CLOCK_HZ,
         resets: chip.resets, last_reset: chip.lastReset, asleep, ...pins.stats(), uart: line.stats(), usb: this.usb.stats(), line: line.ways,
       };
     },
@@ -175,6 +175,11 @@ export class Commands {
     /** Every interrupt comes so much later than it would. */
     'hold-off'([time]) {
       this.chip.heldOff = cycles(time);
+    },
+
+    /** The host opens the USB's port at another rate. */
+    'line-coding'([rate]) {
+      this.usb.lineCoding(Number(rate));
     },
 
     /** The program runs in a circle from here on. */

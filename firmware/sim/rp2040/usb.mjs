@@ -53,6 +53,24 @@ export class Usb {
     };
   }
 
+  /** SET_LINE_CODING: 8 data bits, no parity, one stop bit (USB CDC PSTN 1.2, 6.3.10). */
+  lineCoding(rate) {
+    const data = new Uint8Array(7);
+    new DataView(data.buffer).setUint32(0, rate, true);
+    data[6] = 8;
+    const usb = this.controller;
+    const read = usb.onEndpointRead;
+    usb.onEndpointRead = (endpoint, length) => {
+      if (endpoint === 0) {
+        usb.onEndpointRead = read;
+        usb.endpointReadDone(0, data, 0);
+      } else {
+        read(endpoint, length);
+      }
+    };
+    usb.sendSetupPacket(Uint8Array.from([0x21, 0x20, 0, 0, 0, 0, 7, 0]));
+  }
+
   #take(length) {
     this.busy = Math.max(this.busy, this.chip.cycle) + duration(length);
     return this.busy;

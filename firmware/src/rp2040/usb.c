@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "../chip.h"
+#include "../core/motion.h"
 #include "pico.h"
 #include "usb_words.h"
 
@@ -34,6 +35,9 @@ enum { BULK = 2U << 26, INTERRUPT = 3U << 26 };                                 
 enum { ON_BUFFER = 1 << 4, ON_RESET = 1 << 12, ON_SETUP = 1 << 16 };                              // interrupts
 enum { WAS_RESET = 1 << 19, WAS_SETUP = 1 << 17 };                                                // SIE_STATUS
 
+#define ROM16(at) (*(volatile const uint16_t *)(uintptr_t)(at))
+enum { BOOT_DRIVE_BAUD = 1200 };
+
 enum { RING = 4096, RING_MASK = RING - 1 };
 static uint8_t ring[RING];
 static volatile uint16_t ring_head, ring_tail;
@@ -41,7 +45,8 @@ static volatile uint16_t ring_head, ring_tail;
 static volatile bool configured, sending, receiving;
 static bool in_data1, out_data1;  // which packet of a pair is next
 static uint8_t new_address;
-static bool takes_line_coding;
+static bool takes_line_coding, baud_was_set;
+static volatile bool to_boot_drive;  // asked for by 1200 baud
 static const uint8_t *answer;  // what is left to send on endpoint 0
 static uint16_t answer_left;
 static bool answer_data1;
@@ -188,6 +193,10 @@ static void setup_received(void) {
     }
 }
 
+static uint32_t line_baud(void) {
+    return line_coding[0] | line_coding[1] << 8 | line_coding[2] << 16 | (uint32_t)line_coding[3] << 24;
+}
+
 static void control_sent(void) {
     if (new_address) {
         REG(USB_ADDRESS) = new_address;
@@ -196,12 +205,16 @@ static void control_sent(void) {
         answer_on();
     } else if (REG(BUFFER_IN(0)) & LENGTH) {
         hand_over(BUFFER_OUT(0), DATA1);  // the host says that it has it all
+    } else {
+        to_boot_drive = baud_was_set && line_baud() == BOOT_DRIVE_BAUD;
     }
+    baud_was_set = false;
 }
 
 static void control_received(void) {
     if (takes_line_coding) {
         takes_line_coding = false;
+        baud_was_set = true;
         for (uint8_t i = 0; i < sizeof line_coding; i++) {
             line_coding[i] = AT(CONTROL_AT)[i];
         }
@@ -258,8 +271,23 @@ void usb_interrupt(void) {
     awake = true;
 }
 
+// The ROM starts anew as the drive that takes UF2 files; its functions are found by two letters (DS 2.8.3).
+static void become_boot_drive(void) {
+    typedef void *find(const uint16_t *table, uint32_t code);
+    typedef void usb_boot(uint32_t lamp, uint32_t without);
+    const uint16_t *const table = (const uint16_t *)(uintptr_t)ROM16(0x14);
+    usb_boot *const start = (usb_boot *)((find *)(uintptr_t)ROM16(0x18))(table, 'U' | 'B' << 8);
+    start(0, 0);
+}
+
 uint8_t usb_get(const uint8_t **bytes) {
     static uint16_t given;  // they may be written over now
+    if (to_boot_drive) {
+        to_boot_drive = false;
+        if (motion.state == IDLE) {  // a moving arm does not stop for it
+            become_boot_drive();
+        }
+    }
     if (given) {
         ring_tail = (ring_tail + given) & RING_MASK;
         given = 0;

@@ -50,13 +50,17 @@ def port_name(given: str | None, board: Board, baud: int | None, *, reset: bool 
     return only(found, board.called, board.hint)
 
 
-def only(found: Sequence[str], called: str, hint: str = "armkin ports lists them") -> str:
-    """The one port that was found. Raises UsageError if there are none or several."""
+def only(found: Sequence[str], called: str, hint: str = "armkin ports lists them", *, asked: bool = True) -> str:
+    """The one port that was found. Raises UsageError if there are none or several.
+
+    asked: whether a board answered there; else a port's adapter looks like one, and sim is none.
+    """
+    one, many = ("answers", "boards answer") if asked else ("is plugged in", "ports look like one")
     if len(found) == 1:
-        output.note(f"using {found[0]}, the only port where {called} answers")
+        output.note(f"using {found[0]}, the only port where {called} {one}")
         return found[0]
-    where = f"{len(found)} boards answer ({', '.join(found)})" if found else f"no port where {called} answers was found"
+    where = f"{len(found)} {many} ({', '.join(found)})" if found else f"no port where {called} {one} was found"
+    sim = "; sim is a board in this process" if asked else ""
     raise UsageError(
-        f"--port is missing, and {where}\n"
-        f"{hint}, ARMKIN_PORT names one for every command; sim is a board in this process"
+        f"--port is missing, and {where}\n{hint}, ARMKIN_PORT names one for every command{sim}",
     )

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import completion, inputs, output, render
-from armkin.cli.default_port import port_option
+from armkin.cli.default_port import only, port_option
 from armkin.cli.options import Json
 from armkin.errors import UsageError
 
@@ -81,10 +81,5 @@ def _only_port(kind: str) -> str:
     from armkin.board.ports import list_ports
 
     found = [port.device for port in list_ports() if port.board]
-    if len(found) != 1:
-        seen = f"{len(found)} ports look like one ({', '.join(found)})" if found else "no port looks like an Arduino"
-        raise UsageError(
-            f"--port is missing, and {seen}\narmkin ports lists them; a Pico: also the folder of its boot drive"
-        )
-    output.note(f"using {found[0]}, the only port that looks like a board for {kind}")
-    return found[0]
+    hint = "armkin ports lists them, a Pico's may be the folder of its boot drive"
+    return only(found, f"a board for {kind}", hint, asked=False)
