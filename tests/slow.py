@@ -45,6 +45,11 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "board/test_smooth.py": ("test_no_tick_is_faster_than_102_percent_however_short_the_ramp",),
     "board/test_board_plugin.py": (),
+    "inverse/test_position_first.py": (
+        "test_no_posture_of_a_grid_is_nearer",
+        "test_rows_are_minima_each_once_by_angle",
+        "test_a_batch_gives_what_each_row_alone_gives",
+    ),
     "board/test_starts.py": (
         "test_a_path_sent_from_elsewhere_is_on_its_way_from_the_first_step",
         "test_both_reports_of_a_false_start",

@@ -99,6 +99,13 @@ TaskName = Annotated[
         autocompletion=completion.tasks,
     ),
 ]
+PositionFirst = Annotated[
+    bool,
+    typer.Option(
+        "--position-first",
+        help="Of 4 or 5 joints asked for --task pose: the position exact, the rotation as near as it goes.",
+    ),
+]
 Lock = Annotated[
     list[str] | None,
     typer.Option(

@@ -11,19 +11,21 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
+from armkin.inverse import position_first
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
-from armkin.inverse.numeric.tolerances import EQUAL, HELD
+from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
+from armkin.inverse.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
 from armkin.keep_out.clearance import said as hits_said
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MOST_SWEEPS = 10_000  # combinations of swept values that are tried
+_RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first
 _THIN = 20  # branches of one target that are kept before those that no answer shows are dropped
 _MOST_ANSWERS = 16_384  # of one target and one swept value, 6.5 kB each, that are kept at once
 
@@ -50,6 +53,7 @@ class Request:
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
     ignore: bool = False  # keep-outs: a branch with hits is taken where none is free
+    position_first: bool = False  # the position exact, the rotation as near as it goes
     every: bool = True  # keep all branches; False: of the swept values' branches those that an answer shows
     ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
 
@@ -109,17 +113,23 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     found = [_Found() for _ in targets]
+    more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for held in _holds(request):
         one = _locked(arm, tuple(held.items()))
-        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)], rounding=rounding)
+        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)], **more)
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
         for i, answer in enumerate(_answers(request, held, s, near)):
             found[i].add(int(s.status[i]), answer, wanted)
             if not request.every and len(found[i].branches) > _THIN:
-                found[i].thin_out()
+                found[i].thin_out(request)
     return [one.answer(request) for one in found]
+
+
+def check_position_first(request: Request) -> None:
+    """Raise UsageError where position first is not for this arm, its held joints apart, or task."""
+    position_first.check(locked(request), request.task)
 
 
 def combinations(request: Request) -> int:
@@ -153,7 +163,8 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
     held = [request.arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     for answer in answers:
         near = units.joints_in(request.arm, request.near_out)
-        branches = sorted((_nearer(request.arm, branch, near, held) for branch in answer.branches), key=_rank)
+        nearer = (_nearer(request.arm, branch, near, held) for branch in answer.branches)
+        branches = sorted(nearer, key=partial(_rank, request))
         names = tuple(dict.fromkeys(branch.name for branch in branches))
         wanted = set(names)
         if request.branch is not None:
@@ -181,7 +192,10 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     near = units.joints_in(arm, request.near_out)
     held = _in(arm, request.held)
     one = _locked(arm, tuple(held.items()))
-    found = nearest_poses(one, targets, request.task, near=near[_kept(arm, held)])
+    if request.position_first:
+        found = nearest_positions(one, targets, near[_kept(arm, held)])
+    else:
+        found = nearest_poses(one, targets, request.task, near=near[_kept(arm, held)])
     return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in found] if held else found
 
 
@@ -296,7 +310,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
 class _Found:
     """What the swept values of one target have come to so far."""
 
-    best: tuple[int, Answer] | None = None  # the least status, and the first answer with it
+    best: tuple[int, Answer] | None = None  # the best status, and the first answer with it
     names: dict[str, None] = field(default_factory=dict)  # in the order of coming
     last: tuple[str, ...] = ()  # those of the answer before
     free: set[str] = field(default_factory=set)
@@ -306,8 +320,9 @@ class _Found:
 
     def add(self, status: int, answer: Answer, wanted: set[str]) -> None:
         """Take the answer for one combination of values in."""
-        if self.best is None or status < self.best[0]:
-            self.best = status, answer._replace(branches=[])
+        rank = _RANKS.index(status)
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, answer._replace(branches=[])
         if answer.names != self.last:
             self.last = answer.names
             self.names.update(dict.fromkeys(answer.names))
@@ -316,10 +331,10 @@ class _Found:
         self.legal += answer.within_limits
         self.branches += [(branch, branch.name in wanted) for branch in answer.branches]
 
-    def thin_out(self) -> None:
+    def thin_out(self, request: Request) -> None:
         """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
         nearest: dict[tuple[str, bool, bool], tuple[Branch, bool]] = {}
-        for item in sorted(self.branches, key=lambda item: _rank(item[0])):
+        for item in sorted(self.branches, key=lambda item: _rank(request, item[0])):
             nearest.setdefault((item[0].name, item[0].within_limits, item[0].may_be_taken), item)
         # A branch's q is a row of the array of all targets, which shall go.
         self.branches = [(branch._replace(q=branch.q.copy()), named) for branch, named in nearest.values()]
@@ -328,13 +343,16 @@ class _Found:
         """One answer of all: the best status, the branches sorted."""
         assert self.best is not None
         first = self.best[1]
-        both = sorted(self.branches, key=lambda item: _rank(item[0]))
+        both = sorted(self.branches, key=lambda item: _rank(request, item[0]))
         best = _best(request, [branch for branch, _ in both], [named for _, named in both])
         refused = None
         if request.branch is not None and best is None:
             refused = _refused(request, [branch for branch, named in both if named])
+        status = first.status
+        if request.position_first and best is not None:
+            status = _status_of(request.arm, both[best][0])
         return Answer(
-            first.status,
+            status,
             first.method,
             first.why,
             first.complete and not request.swept,
@@ -348,9 +366,16 @@ class _Found:
         )
 
 
-def _rank(branch: Branch) -> tuple[bool, bool, float]:
+def _status_of(arm: Arm, branch: Branch) -> str:
+    """What position first says of its best row."""
+    missed = math.hypot(branch.residual_mm / arm.reach, math.radians(branch.residual_deg))
+    return (Status.EXACT if missed <= SOLUTION else Status.POSITION).name.lower()
+
+
+def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
     hit = branch.within_limits and bool(branch.hits)  # outside limits hits do not count
-    return not branch.within_limits, hit, round(branch.motion, EQUAL)
+    turned = round(branch.residual_deg, EQUAL) if request.position_first else 0.0
+    return not branch.within_limits, hit, turned, round(branch.motion, EQUAL)
 
 
 def _refused(request: Request, named: Sequence[Branch]) -> str:

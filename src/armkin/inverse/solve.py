@@ -27,6 +27,8 @@ from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
+from armkin.inverse.position_first import check as check_position_first
+from armkin.inverse.position_first import position_first as minima
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examined
@@ -52,6 +54,7 @@ def ik(
     examine: bool = True,
     workers: int = 1,
     rounding: ArrayLike | None = None,
+    position_first: bool = False,
 ) -> Solutions:
     """All real branches of inverse kinematics.
 
@@ -60,7 +63,9 @@ def ik(
     examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
     them: some of their branches may be missing; workers: threads that share a large batch, whose results are the same;
     rounding: () or (...) how far the targets' numbers may be off [reaches, rad], by default what the arrays show: near,
-    where it solves its target to within that, is a branch and the best one.
+    where it solves its target to within that, is a branch and the best one; position_first: arms of four or five joints
+    asked for task "pose" keep the position and come as near to the rotation as they can
+    (`armkin.inverse.position_first`).
     Raises UsageError if the task does not fit the arm or a target is malformed.
 
     >>> import armkin, numpy as np
@@ -71,6 +76,9 @@ def ik(
     """
     if workers != 1:
         check(workers)
+    if position_first:
+        check_position_first(arm, task)
+        return minima(arm, targets, near=near)
     values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
     if (
         rounding is None

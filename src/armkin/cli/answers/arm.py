@@ -86,7 +86,11 @@ class Ik(Head):
     target: Annotated[list[float], "as given [mm, deg]"]
     target_labels: Annotated[list[str], "names of its numbers"]
     near: Annotated[list[float], "the pose to stay close to [deg or mm]"]
-    status: Annotated[str, "exact, boundary, singular or unreachable: geometry alone, limits apart"]
+    status: Annotated[
+        str,
+        "exact, boundary, singular or unreachable: geometry alone, limits apart; with --position-first, of `best`, "
+        "exact or position; unreachable where none is within limits",
+    ]
     method: Annotated[str, "the class of solution used"]
     why: Annotated[str, "why that class applies"]
     complete: Annotated[bool, "every isolated real branch is guaranteed to be found"]
@@ -94,7 +98,9 @@ class Ik(Head):
     branch_count: Annotated[int, "found, listed or not"]
     branches_within_limits: int
     branches: Annotated[
-        list[Branch], "within limits first, of them those without hits, then by motion; all with --all-branches"
+        list[Branch],
+        "within limits first, of them those without hits, then (--position-first) by residual_deg, then by motion; all "
+        "with --all-branches",
     ]
     best: Annotated[int | None, "index of the default answer in `branches`"]
     closest: Annotated[Closest | None, "whenever `best` is null, but where every branch within limits hits something"]

@@ -19,6 +19,7 @@ from armkin.cli.options import (
     JsonLines,
     Lock,
     Near,
+    PositionFirst,
     Resume,
     RobotOrPipe,
     Scene,
@@ -54,6 +55,7 @@ def ik(
         typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits."),
     ] = False,
     task: TaskName = None,
+    position_first: PositionFirst = False,
     lock: Lock = None,
     sweep: Sweep = None,
     continuous: Annotated[
@@ -90,7 +92,12 @@ def ik(
         held=held,
         swept=lock_and_sweep.sweeps(arm, sweep, held),
         every=all_branches or continuous,
+        position_first=position_first,
     )
+    if position_first:
+        choose.check_position_first(request)
+    if position_first and compiled:
+        raise UsageError("--position-first has no compiled solver; leave --compiled away")
     if compiled and sweep:
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
@@ -115,6 +122,7 @@ def ik(
             "all_branches": all_branches,
             "turns": turns,
             "continuous": continuous,
+            "position_first": position_first,
             "compiled": compiled,
         }
         rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
@@ -182,7 +190,7 @@ class Questions:
         """The columns, and which rows have a best branch."""
         import numpy as np
 
-        if self.continuous or self.request.swept:
+        if self.continuous or self.request.swept or self.request.position_first:
             return self._table_of_objects(chunk)
         from armkin.columns import branches
 
@@ -355,19 +363,25 @@ def _text(arm: Arm, answer: Ik) -> str:
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])
         mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
-        note = "; ".join(filter(None, [f"outside limits: {bad}" if bad else "", render.hits_said(branch)]))
+        notes = [_turned(branch["residual_deg"]), f"outside limits: {bad}" if bad else "", render.hits_said(branch)]
+        note = "; ".join(filter(None, notes))
         rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
         for copy in branch.get("turns", ())[1:]:
             rows.append(["", "  or", *map(fixed, copy), "", ""])
     nearest = answer["closest"]
     if nearest and not answer["branches_within_limits"]:
         miss = f"{fixed(nearest['distance_mm'])} mm away"
-        if nearest["angle_deg"] > 1e-6:
-            miss += f", turned by {fixed(nearest['angle_deg'])} deg"
+        if turned := _turned(nearest["angle_deg"]):
+            miss += f", {turned}"
         rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
     last = len(headings) + 3
     table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
     return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
+
+
+def _turned(angle_deg: float) -> str:
+    """By how much a rotation is off the target's, where it is more than rounding."""
+    return f"turned by {fixed(angle_deg)} deg" if angle_deg > 1e-6 else ""
 
 
 def _summary(answer: Ik) -> str:

@@ -27,6 +27,7 @@ class Status(IntEnum):
     BOUNDARY = 1  # two branches merge: the target lies on the edge of what that posture reaches
     SINGULAR = 2  # a whole curve of joint values answers: some joints are free
     UNREACHABLE = 3
+    POSITION = 4  # position first: the tool's position is exact, its rotation the nearest there is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +41,8 @@ class Solutions:
     leaves free. complete: (...) every isolated real branch of this target is guaranteed to be
     there (never of a sliding arm's targets more than 20 reaches away). rounding: (...) how
     far the columns of a pose's rotation were from orthonormal; `target` holds the rotation next to it, which
-    the branches answer.
+    the branches answer. angle: (..., B) [rad] how far each row's rotation is off, of `ik(..., position_first=True)`
+    alone: rows are then sorted by it, and `status` tells of the first.
     """
 
     arm: Arm
@@ -58,6 +60,7 @@ class Solutions:
     why: str
     complete: NDArray[np.bool_]
     rounding: Array
+    angle: Array | None = None
 
     def __repr__(self) -> str:
         batch, sure = self.status.shape, "complete" if self.complete.all() else "not all proved complete"
@@ -70,6 +73,13 @@ class Solutions:
         total: Array = (np.abs(self.q - self.near[..., None, :]) * unit).sum(axis=-1)
         return total
 
+    @property
+    def _rank(self) -> Array:
+        """(..., B) what rows are sorted by: motion, or their place where they come sorted by angle."""
+        if self.angle is None:
+            return self.motion
+        return np.broadcast_to(np.arange(self.q.shape[-2], dtype=float), self.valid.shape)
+
     @cached_property
     def clear(self) -> NDArray[np.bool_]:
         """(..., B) branches that hit no keep-out, limits apart; all, where the arm has no keep-outs."""
@@ -78,7 +88,7 @@ class Solutions:
     @cached_property
     def order(self) -> NDArray[np.intp]:
         """(..., B) branches by rank: within limits first, of them free ones, then by motion, missing ones last."""
-        key = _rounded(np.where(self.valid, self.motion, np.inf))
+        key = _rounded(np.where(self.valid, self._rank, np.inf))
         by_motion = np.argsort(key, axis=-1, kind="stable")
         outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
         if self.arm.keep_out:
@@ -91,7 +101,7 @@ class Solutions:
     def best(self) -> NDArray[np.intp]:
         """(...) index of the branch within limits and free that moves the joints least, the first of several, or -1."""
         legal = self.within_limits & self.clear if self.arm.keep_out else self.within_limits
-        key = np.where(legal, self.motion, np.inf)
+        key = np.where(legal, self._rank, np.inf)
         if not key.shape[-1]:  # no target of the batch has a branch
             return np.full(self.status.shape, -1)
         index = np.argmin(_rounded(key), axis=-1)

@@ -22,6 +22,11 @@ DRIFT = 2e-3  # and those that it moves, but too slowly to be called free
 THERE = 1e-11  # [rad, reaches] a branch this close to `near` is there: `near` solves the target, too
 EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones
 
+# ---- position first: minima of the rotation angle at a position
+STATIONARY = 1e-10  # slope of 1 - cos(angle) [1/rad, 1/reach] at a minimum
+LEVEL_CURVATURE = 1e-6  # its curvature below which a minimum may be one of a curve of such
+ONE_MINIMUM = 1e-6  # [rad, reaches] minima this close, in angle and joints, are one
+
 # ---- how singular
 HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
 WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
