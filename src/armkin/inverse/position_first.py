@@ -47,8 +47,9 @@ from armkin.model.units import radian_or_reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-POOL = 16_384  # postures within limits, of which each target starts from those nearest to its position
-STARTS = 72  # of them
+POOL = 32_768  # postures within limits
+NEAREST = 1024  # of them, those nearest to a target's position
+STARTS = 144  # of these, those farthest from each other
 STEPS = 80  # of one start
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
@@ -207,13 +208,27 @@ def _seeds(arm: Arm, box: _Box, target: Array, near: Array) -> tuple[Array, NDAr
     pool, tips = _pool(arm)
     point = target[:, :3, 3]
     apart = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
-    nearest = np.argpartition(apart, STARTS, axis=1)[:, :STARTS]
+    nearest = pool[np.argpartition(apart, NEAREST, axis=1)[:, :NEAREST]]
     own = np.clip(near, arm.lower, arm.upper)[:, None]
-    starts = np.concatenate([own, pool[nearest]], axis=1).reshape(-1, arm.n)
+    starts = np.concatenate([own, _spread(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)
     q, missed = _to_position(arm, box, starts, point[row], 24)
     there = missed <= SOLUTION
     return q[there], row[there]
+
+
+def _spread(arm: Arm, q: Array) -> Array:
+    """STARTS of postures (N, K, n), each the one farthest from those taken before: small basins get one, too."""
+    u = q / arm.reach * np.pi
+    places = np.concatenate([np.where(arm.prismatic, u, np.cos(q)), np.where(arm.prismatic, 0.0, np.sin(q))], axis=2)
+    rows = np.arange(len(q))
+    taken = np.zeros((len(q), STARTS), int)
+    apart = np.full(q.shape[:2], np.inf)
+    for k in range(1, STARTS):
+        off = places - places[rows, taken[:, k - 1]][:, None]
+        apart = np.minimum(apart, np.einsum("nki,nki->nk", off, off))
+        taken[:, k] = apart.argmax(axis=1)
+    return np.asarray(q[rows[:, None], taken])
 
 
 def _to_position(arm: Arm, box: _Box, q: Array, point: Array, steps: int) -> tuple[Array, Array]:
@@ -229,11 +244,9 @@ def _to_position(arm: Arm, box: _Box, q: Array, point: Array, steps: int) -> tup
         active, c, J = active[going], c[going], J[going, :3] * box.unit / arm.reach
         if step == steps or not len(active):
             break
-        move = _least(J, c)
+        move, stuck = _least(J, c), np.zeros((len(c), arm.n), bool)
         for _ in range(2):  # joints that would go beyond a limit stay on it
-            stuck = ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
-            if not stuck.any():
-                break
+            stuck |= ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
             move = _least(np.where(stuck[:, None], 0.0, J), c)
         move *= np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), TINY))[:, None]
         q[active] = np.clip(q[active] + move * box.unit, box.lower, box.upper)
