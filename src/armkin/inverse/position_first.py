@@ -21,8 +21,9 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
-from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.answers.closest import Closest
+from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     EQUAL,
@@ -35,7 +36,6 @@ from armkin.inverse.numeric.tolerances import (
     WEAK,
 )
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets
