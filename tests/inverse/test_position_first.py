@@ -49,7 +49,7 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, grid: int) -> np.ndarray:
 @pytest.mark.parametrize("name", ARMS)
 def test_no_posture_of_a_grid_is_nearer(name: str) -> None:
     arm = armkin.load(name)
-    T = targets(arm, 36, 4)
+    T = targets(arm, 24, 4)
     s = armkin.ik(arm, T, "pose", position_first=True)
     assert s.angle is not None
     best = s.q[:, 0]
@@ -57,15 +57,15 @@ def test_no_posture_of_a_grid_is_nearer(name: str) -> None:
     assert np.abs(armkin.fk(arm, best)[:, :3, 3] - T[:, :3, 3]).max() <= 1e-9 * arm.reach
     assert ((best >= arm.lower - 1e-9) & (best <= arm.upper + 1e-9)).all()
     assert (s.angle[:, 0] <= by_brute_force(arm, T, 8) + 1e-8).all()
-    own = np.arange(36) % 3 == 2
+    own = np.arange(24) % 3 == 2
     assert (s.status[own] == Status.EXACT).all()
-    assert (s.status[~own] == Status.POSITION).sum() >= 22  # a turn about an axis may be one that the arm can make
+    assert (s.status[~own] == Status.POSITION).sum() >= 14  # a turn about an axis may be one that the arm can make
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_rows_are_minima_each_once_by_angle(name: str) -> None:
     arm = armkin.load(name)
-    T = targets(arm, 6, 5)
+    T = targets(arm, 3, 5)
     s = armkin.ik(arm, T, "pose", position_first=True)
     assert s.angle is not None
     for k in range(len(T)):

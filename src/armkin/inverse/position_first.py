@@ -9,6 +9,7 @@ postures at once.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -53,6 +54,7 @@ STARTS = 144  # of these, those farthest from each other
 STEPS = 80  # of one start
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
+Ik = Callable[..., Solutions]
 
 
 def check(arm: Arm, task: str | None) -> None:
@@ -63,12 +65,12 @@ def check(arm: Arm, task: str | None) -> None:
         raise UsageError(f"position first is for arms of 4 or 5 joints; {arm.name} has {arm.n}", joints=arm.n)
 
 
-def position_first(arm: Arm, targets: ArrayLike, *, near: ArrayLike | None = None) -> Solutions:
+def position_first(ik: Ik, arm: Arm, targets: ArrayLike, *, near: ArrayLike | None = None) -> Solutions:
     """The postures within limits at the targets' positions whose rotation is nearest: (..., 4, 4) -> rows.
 
     Rows are local minima of the rotation angle, sorted by it (`Solutions.angle`), then by motion from near, (n,) or
     (..., n); where there are keep-outs free ones come first. status tells of the first: exact if it solves the pose,
-    else position; unreachable where there is none.
+    else position; unreachable where there is none. ik: what finds exact answers, called as `armkin.ik` is.
     Raises UsageError for arms of other than 4 or 5 joints.
     """
     check(arm, "pose")
@@ -84,7 +86,7 @@ def position_first(arm: Arm, targets: ArrayLike, *, near: ArrayLike | None = Non
     found: list[Array] = []
     for start in range(0, len(goal), AT_ONCE):
         rows = slice(start, start + AT_ONCE)
-        found += _of_chunk(true, task, goal[rows], each[rows] * arm.ratio)
+        found += _of_chunk(ik, true, task, goal[rows], each[rows] * arm.ratio)
     if arm.keep_out:
         found = [minima[np.argsort(~clear(arm, minima / arm.ratio), kind="stable")] for minima in found]
     B = max(map(len, found), default=0)
@@ -127,13 +129,13 @@ def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
     return [replace(one, angle=float(np.linalg.norm(m[3:]))) for one, m in zip(found, missing, strict=True)]
 
 
-def _of_chunk(arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
+def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
     """The minima (B, n) of each of some targets, sorted."""
     box = _box(arm)
     q, row = _seeds(arm, box, target, near)
     state = _descend(arm, box, q, target[row])
     q, row = state.q[state.done], row[state.done]
-    exact = _exact(arm, target, near)
+    exact = _exact(ik, arm, target, near)
     out = []
     for k, goal in enumerate(target):
         some = np.concatenate([exact[k], nearest_row(arm, q[row == k], near[k][None])[0]])
@@ -141,10 +143,8 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
     return out
 
 
-def _exact(arm: Arm, target: Array, near: Array) -> list[Array]:
+def _exact(ik: Ik, arm: Arm, target: Array, near: Array) -> list[Array]:
     """The branches within limits that solve the poses, where the arm has a solver for them."""
-    from armkin.inverse.solve import ik
-
     try:
         solver(arm, "pose")
     except UsageError:

@@ -78,7 +78,7 @@ def ik(
         check(workers)
     if position_first:
         check_position_first(arm, task)
-        return minima(arm, targets, near=near)
+        return minima(ik, arm, targets, near=near)
     values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
     if (
         rounding is None
