@@ -40,7 +40,7 @@ _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
 _HELPERS = {"emulator", "measure", "bare_host"}
 _TOOLS = ("avr-gcc", "arm-none-eabi-gcc", "npm")
-_NO_COMPILER = "needs avr-gcc, simavr, arm-none-eabi-gcc and npm: install the packages of the README's apt-get lines"
+_NO_COMPILER = "needs avr-gcc, simavr, arm-none-eabi-gcc and npm: scripts/test installs them"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

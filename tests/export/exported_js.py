@@ -37,7 +37,7 @@ def ask(
 ) -> dict[str, Any]:
     """What the exported module says of postures (N, n): fk, jacobian, target, pulses, and ik of targets."""
     node = shutil.which("node")
-    assert node, "node runs the module; README.md names the package"
+    assert node, "node runs the module; scripts/test installs it"
     goals = goals_of(arm, q) if targets is None else targets
     close = np.broadcast_to(arm.home, q.shape) if near is None else near
     asked = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}

@@ -78,7 +78,7 @@ def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:
     ids=lambda words: " ".join(words[:3]),
 )
 def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path: Path) -> None:
-    assert shutil.which(compiler[0]), f"{compiler[0]} is not installed: see the README's line of system packages"
+    assert shutil.which(compiler[0]), f"{compiler[0]} is not installed: scripts/test installs it"
     single = "gcc" in compiler[0] and robot not in GENERAL
     if robot in GENERAL and compiler[0] == "avr-gcc":
         with pytest.raises(armkin.UsageError, match="needs double precision"):

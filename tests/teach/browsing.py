@@ -26,9 +26,7 @@ _OPTIONS = (
 def chromium(*options: str) -> Iterator[Browser]:
     """The browser; every start has a profile of its own."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
-    assert path, (
-        "no chromium: install the packages of README's apt-get line, or leave these tests out: -m 'not browser'"
-    )
+    assert path, "no chromium: scripts/test installs it; or leave these tests out: -m 'not browser'"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=path, headless=True, args=[*_OPTIONS, *options], timeout=120_000
