@@ -217,5 +217,5 @@ SLOW: dict[str, tuple[str, ...]] = {
     "test_examples.py": ("test_an_example_runs_from_any_folder",),
     "test_lowest_versions.py": (),
     "test_package.py": (),
-    "test_readme.py": ("test_commands_print_what_the_readme_shows",),
+    "test_readme.py": ("test_commands_print_what_the_page_shows",),
 }
