@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ import armkin
 from armkin.errors import UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
+from armkin.reachability import from_place, planning
 from armkin.reachability import place as places
+from armkin.reachability.standing import Around
 from command_line import ROOT, run
 from interrupted import interrupted
 
@@ -24,13 +27,13 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     yaw = np.radians(60.0)
     [found] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
-    question = places.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
+    question = from_place.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
     assert found.of == 4
     assert found.reached.max() > 0
     for _ in range(60):
         i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
         at = np.array([found.x[i], found.y[j]])
-        assert places._legal(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+        assert from_place.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
 
 
 def test_a_margin_is_the_distance_to_the_nearest_place_that_does_not_reach_all() -> None:
@@ -115,6 +118,70 @@ def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch
         assert {row.split(",")[0] for row in rows[1:]} == {"three_dof", "roarm_m2"}
 
 
+PATH = """
+moves:
+  - point: [0, 0, 300, 180, 0, 0]
+  - line: [400, 0, 300, 180, 0, 0]
+  - arc: {via: [300, 300, 300], to: [0, 300, 300, 180, 0, 0]}
+"""
+
+
+@pytest.mark.parametrize("name", ["three_dof", "ur5e"])
+def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Path) -> None:
+    """Each place against the planner, which proves what is between the targets; with a scene pose by pose."""
+    path = ROOT / "examples/pick_and_place.yaml" if name == "three_dof" else tmp_path / "path.yaml"
+    if name == "ur5e":
+        path.write_text(PATH)
+    arm = armkin.load(name)
+    arm = replace(arm, max_accel=np.where(np.isfinite(arm.max_accel), arm.max_accel, 5.0))
+    [found] = armkin.place(arm, path, step=arm.reach / 3, yaw=np.pi / 2)
+    assert found.planned
+    assert {one.refused for one in found.planned} == {""}
+    assert found.reached[found.best] == found.of
+    rng, file = np.random.default_rng(4), planning.path_of(path)
+    assert file is not None
+    whole = found.reached == found.of
+    for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0.6 * found.of))):
+        assert len(some)
+        for i, j, k in rng.permutation(some)[:3].tolist():
+            at = (float(found.x[i]), float(found.y[j]), 0.0)
+            asked = planning.plan(arm, Around(), (i, j, k), at, float(found.yaw[k]), file)
+            assert (asked.plan is not None) == whole[i, j, k], asked.refused
+
+
+def test_a_path_in_a_scene_is_asked_yaw_by_yaw_and_planned_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "FEW", 1)
+    path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
+    scene.write_text("keep_out:\n  - box: {min: [200, -600, 0], max: [230, 600, 900]}\n    name: wall\n")
+    path.write_text("moves:\n  - point: [420, -60, 170]\n  - line: [420, 60, 170]\n")
+    words = ("place", "three_dof", path, "--step", 150, "--yaw", 180, "--area", "-100,650,-150,150", "--json")
+    alone, found = run(*words).json["robots"][0], run(*words, "--scene", scene).json["robots"][0]
+    assert 0 < found["reach_all"] < alone["reach_all"]
+    assert found["best"]["reached"] == found["best"]["of"]
+    assert [one["refused"] for one in found["planned"]] == [None]
+
+
+def test_paths_that_say_nothing_of_a_place_are_told(tmp_path: Path) -> None:
+    for moves, said in (
+        ("- joint: home", "the path has no target of the tool"),
+        ("- line: [390, 80, 300]", "put a point before it"),
+        ("- point: [390, 80, 300]\n  - offset: {xyz: [0, 0, 9], frame: tool}", "offsets in the frame of targets"),
+    ):
+        path = tmp_path / "path.yaml"
+        path.write_text(f"moves:\n  {moves}\n")
+        done = run("place", "three_dof", path)
+        assert done.code == 2
+        assert said in done.err
+    path.write_text(PATH)
+    done = run("place", "ur5e", path, "--step", 500, "--yaw", 90)
+    assert done.code == 0
+    assert "the path is not planned from there: joints J1, J2, J3, J4, J5, J6 have no max_accel" in done.err
+    with pytest.raises(UsageError, match="a path to place an arm for"):
+        armkin.place(armkin.load("ur5e"), "path.svg")
+
+
 def test_bad_input_is_told(tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     for settings in ({"step": 0.0}, {"yaw": -1.0}, {"area": (1, 0, 0, 1)}, {"area": (0, 1)}, {"step": 0.001}):
@@ -122,4 +189,4 @@ def test_bad_input_is_told(tmp_path: Path) -> None:
             armkin.place(arm, [[600, 0, 200]], **settings)
     assert run("place", "three_dof").code == 2
     assert run("place", "three_dof", tmp_path / "none.csv").code == 1
-    assert "rows of a CSV file" in run("place", "three_dof", tmp_path / "path.yaml").err
+    assert "cannot read the path file" in run("place", "three_dof", tmp_path / "path.yaml").err

@@ -1,16 +1,20 @@
-"""Where to put arms: a floor coloured by how many targets each place reaches, with the best place marked."""
+"""Where to put arms: a floor coloured by how many targets each place reaches, with the arm drawn at its best."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from armkin.plot.canvas import INK, SOFT, flat, picture
+from armkin.reachability.standing import Around, standing
+from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
     from armkin.reachability.place import Place
+
+TARGETS = "#e2572b"
 
 
 def plot_place(found: Sequence[Place], out: str) -> None:
@@ -27,6 +31,7 @@ def plot_place(found: Sequence[Place], out: str) -> None:
             size = 0.15 * one.arm.reach
             axes.plot(*_heading(x, y, yaw, size), color="white", lw=3.5)
             axes.plot(*_heading(x, y, yaw, size), color=INK, lw=1.5)
+            _arm(axes, one)
             axes.plot([x], [y], "o", color=INK, mec="white", ms=8)
             bar = figure.colorbar(drawn, cax=figure.add_axes(((number + 0.83) * width, 0.15, 0.02 * width, 0.64)))
             bar.outline.set_visible(False)
@@ -34,6 +39,21 @@ def plot_place(found: Sequence[Place], out: str) -> None:
             text = f"best: {x:g}, {y:g} mm, {np.degrees(yaw):g} deg, {int(one.reached[one.best])} of {one.of}"
             figure.text(left, 0.95, one.arm.name, fontsize=12, va="top", color=INK)
             figure.text(left, 0.9, f"share of targets reached;  {text}", fontsize=8.5, va="top", color=SOFT)
+
+
+def _arm(axes: Any, place: Place) -> None:
+    """The targets, and the arm from above at its best place: on a target in the middle, paler on the first and last."""
+    count = len(place.postures)
+    at = (float(place.xyz[0]), float(place.xyz[1]), place.z)
+    stands = standing(place.arm, Around(), at, float(place.yaw[place.best[2]]))
+    few = len(place.positions) < 50
+    axes.plot(*place.positions[:, :2].T, ".", color=TARGETS, mec="white", mew=0.5 * few, ms=7 if few else 3)
+    middle = count // 2
+    for k in dict.fromkeys((0, count - 1, middle)) if count else ():
+        line = skeleton(stands, place.postures[k]).path
+        pale = 1.0 if k == middle else 0.45
+        axes.plot(*line[:, :2].T, color="white", lw=5.0, alpha=pale, solid_capstyle="round", solid_joinstyle="round")
+        axes.plot(*line[:, :2].T, color=INK, lw=2.4, alpha=pale, solid_capstyle="round", solid_joinstyle="round")
 
 
 def _heading(x: float, y: float, yaw: float, size: float) -> tuple[list[float], list[float]]:

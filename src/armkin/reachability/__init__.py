@@ -11,9 +11,10 @@ Where, with which orientations, by how many branches:
 cells.py     rings of cells about joint 1's axis, and the orientations in each
 answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
 map.py       `reach`: all rings, in chunks, by any engine
-place.py     `place`: where to put an arm for given targets; place_file.py: its columns
+place.py     `place`: where to put an arm for given targets or a path; place_file.py: its columns
+from_place.py  what an arm reaches from a place; standing.py: the arm there, among what stands with the targets
+carrying.py  which branches carry a way of the tool from a place; planning.py: the path's plan from the best ones
 keeping.py   chunks of both, answered by an engine and kept beside a file
-standing.py  an arm at a place, among what stands with the targets
 """
 
 from armkin.reachability.survey import Workspace, workspace

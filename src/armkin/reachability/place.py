@@ -4,6 +4,9 @@ A place is a position of the arm's frame (the one in which its targets are given
 plane of the targets' frame, and a yaw about its z axis. Where joint 1's axis is the frame's z axis, a yaw adds to joint
 1 alone: one solve a target and position answers all yaws as an arc. Other arms are asked yaw by yaw.
 
+A path is reached where one branch carries each of its ways between joint moves (`carrying`); the best places are then
+planned (`planning`).
+
 The robot's own keep-outs move with it; those of a scene stand with the targets.
 """
 
@@ -12,7 +15,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,22 +27,22 @@ from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.answers.solutions import Status
-from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import Task, read_targets
-from armkin.model.rotation import rotation_about
-from armkin.reachability import keeping
-from armkin.reachability.answers import TURN, arc, inside, limit_margin
+from armkin.inverse.tasks.task import read_targets
+from armkin.reachability import keeping, planning
+from armkin.reachability.answers import TURN, limit_margin
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.standing import Around, apart, free
+from armkin.reachability.from_place import Question, counted, free_from, positions_of
+from armkin.reachability.planning import Planned
+from armkin.reachability.standing import apart
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.path_file import PathFile
 
 MOST = 10**7  # places
 SOLVES = 40_000  # of a chunk
-BLOCK = 4_096  # targets solved at once
+FEW, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,9 @@ class Place:
 
     x (X,), y (Y,), yaw (K,): the places. reached: (X, Y, K) targets reached from each, of `of`. margin: (X, Y, K)
     distance to the nearest place of the grid, continued outside the area, at the same yaw, that does not reach all.
-    best: index of the best place; ties by margin, then by the least distance to a joint limit.
+    best: index of the best place; ties by margin, then by the least distance to a joint limit. positions: (N, 2 or 3)
+    of the targets; postures: (M, n) [rad | mm] for those of them that are reached from the best place. Of a path,
+    targets are points along it; planned: the best places, with their plans; unplanned: why there are none.
     """
 
     arm: Arm
@@ -60,6 +65,10 @@ class Place:
     margin: Array
     of: int
     best: tuple[int, int, int]
+    positions: Array
+    postures: Array
+    planned: tuple[Planned, ...] = ()
+    unplanned: str = ""
 
     @property
     def reach_all(self) -> int:
@@ -72,28 +81,6 @@ class Place:
         return np.array([self.x[self.best[0]], self.y[self.best[1]], self.z])
 
 
-class Question(NamedTuple):
-    """Targets of one arm, in the targets' frame."""
-
-    arm: Arm
-    task: Task
-    targets: Array
-    yaws: int
-    step: float  # [rad] of the yaw
-    z: float
-    around: Around = Around()
-
-    @property
-    def arcs(self) -> bool:
-        """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
-        arm, axis = self.arm, self.arm.link[0]
-        upright = np.abs(axis[:2, 2]).max() <= STRAIGHT and np.abs(axis[:2, 3]).max() <= STRAIGHT * arm.reach
-        free = not arm.keep_out and not self.around.keep_out
-        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and free
-        whole = abs(self.yaws * self.step - TURN) < STRAIGHT
-        return bool(upright) and plain and whole and arm.n == self.task.constraints
-
-
 class Chunk(NamedTuple):
     """Some positions (P, 2) [mm] of one arm."""
 
@@ -104,7 +91,7 @@ class Chunk(NamedTuple):
 
 def place(
     arms: Arm | Sequence[Arm],
-    targets: ArrayLike,
+    targets: ArrayLike | str | os.PathLike[str] | PathFile,
     *,
     area: Sequence[float] | None = None,
     step: float = 50.0,
@@ -116,8 +103,10 @@ def place(
     cluster: str | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> list[Place]:
-    """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task.
+    """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task, or carries a path.
 
+    targets: or a path file's name (.yaml) or model: a place counts only if one branch carries each way between joint
+    moves, and the best places are planned (`Place.planned`).
     area: x and y, each from and to [mm], by default the targets' box grown by the arm's reach; step [mm] and yaw [rad]
     of the places; z [mm] of all. scene: keep-outs that stand with the targets. out: what is finished stays beside that
     file until `armkin.reachability.place_file.write` has written it: after a kill it goes on. workers, cluster: see
@@ -136,7 +125,7 @@ def place(
 
 def each(
     arms: Sequence[Arm],
-    targets: Sequence[ArrayLike],
+    targets: Sequence[ArrayLike | str | os.PathLike[str] | PathFile],
     settings: dict[str, Any],
     scene: str | os.PathLike[str] | None,
     out: str | os.PathLike[str] | None,
@@ -147,7 +136,8 @@ def each(
     for name in ("step", "yaw"):
         if not (math.isfinite(settings[name]) and settings[name] > 0):
             raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
-    asked = [_question(arm, some, settings, scene) for arm, some in zip(arms, targets, strict=True)]
+    paths = [planning.path_of(some) for some in targets]
+    asked = [_question(arm, some, file, settings, scene) for arm, some, file in zip(arms, targets, paths, strict=True)]
     grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
     work_list: list[Chunk] = []
     for i, (one, (axes, _)) in enumerate(zip(asked, grids, strict=True)):
@@ -168,16 +158,54 @@ def each(
         margin, reached = _margins(every == len(one.targets), settings["step"])[inner], every[inner]
         x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(one.yaws) * settings["yaw"]
         best = _best(one, reached, margin, x, y, yaws)
-        found.append(Place(one.arm, x, y, yaws, one.z, reached, margin, len(one.targets), best))
+        where, none = positions_of(one.task, one.targets), np.zeros((0, one.arm.n))
+        place = Place(one.arm, x, y, yaws, one.z, reached, margin, len(one.targets), best, where, none)
+        file = paths[i]
+        place = place if file is None else _planned(one, place, file)
+        found.append(replace(place, postures=_postures(one, place)))
     return found
 
 
-def _question(arm: Arm, targets: ArrayLike, settings: dict[str, Any], scene: str | os.PathLike[str] | None) -> Question:
+def _postures(question: Question, place: Place) -> Array:
+    """For each target reached from the best place, the legal posture that is nearest to home."""
+    s, legal = free_from(question, place.xyz[:2], float(place.yaw[place.best[2]]))
+    row = np.flatnonzero(legal.any(axis=1))
+    return np.asarray(s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)]) if len(row) else place.postures
+
+
+def _planned(question: Question, place: Place, file: PathFile) -> Place:
+    """The same with the best places planned; one that cannot be planned does not reach all."""
+    if why := planning.unplanned(question.arm):
+        return replace(place, unplanned=why)
+    tried: list[Planned] = []
+    left = place.reached.copy()
+    while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
+        i, j, k = _best(question, left, place.margin, place.x, place.y, place.yaw)
+        at = (float(place.x[i]), float(place.y[j]), place.z)
+        tried.append(planning.plan(question.arm, question.around, (i, j, k), at, float(place.yaw[k]), file))
+        left[i, j, k] = -1
+        if tried[-1].plan is None:
+            place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
+    best = next((one.index for one in tried if one.plan is not None), None)
+    if best is None:
+        best = _best(question, place.reached, place.margin, place.x, place.y, place.yaw)
+    return replace(place, best=best, planned=tuple(tried))
+
+
+def _question(
+    arm: Arm, targets: Any, file: PathFile | None, settings: dict[str, Any], scene: str | os.PathLike[str] | None
+) -> Question:
     """What is asked of one arm: its own keep-outs apart from those of a scene."""
-    task = task_for(arm, None)
+    ways: tuple[int, ...] = ()
+    if file is None:
+        task = task_for(arm, None)
+    else:
+        task, each_way = planning.ways(arm, file)
+        targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
     arm, around = apart(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
-    return Question(arm, task, read_targets(task, targets).values, yaws, settings["yaw"], settings["z"], around)
+    values = read_targets(task, targets).values
+    return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways)
 
 
 def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.PathLike[str] | None) -> Parts | None:
@@ -185,13 +213,8 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     if out is None:
         return None
     files.check(os.fspath(out))
-    robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes())] for one in questions]
+    robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways] for one in questions]
     return Parts(os.fspath(out), {"command": "place", "robots, scene and targets": robots, **settings})
-
-
-def positions_of(task: Task, targets: Array) -> Array:
-    """Positions (N, 2 or 3) of targets."""
-    return targets[:, :3, 3] if task.orientation == "full" else targets[:, : task.position]
 
 
 def _axes(
@@ -226,67 +249,8 @@ def _blocks(question: Question, at: Array) -> Iterator[Array]:
 
 def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
-    counts = [_counted(questions[chunk.which], at).ravel() for at in chunk.at]
+    counts = [counted(questions[chunk.which], at).ravel() for at in chunk.at]
     return chunk.number, {"reached": np.concatenate(counts)}
-
-
-def _counted(question: Question, at: Array) -> NDArray[np.int64]:
-    """Of one position (2,): (1, K)."""
-    arm, K = question.arm, question.yaws
-    turns = np.arange(K) * question.step
-    if not question.arcs:
-        return np.array([[int(_legal(question, at, turn).sum()) for turn in turns]])
-    goals = _seen(question, at, 0.0)
-    near = np.linalg.norm(positions_of(question.task, goals), axis=1) <= 2 * arm.reach + np.linalg.norm(arm.base[:3, 3])
-    legal = np.zeros((len(goals), K), bool)
-    if near.all():
-        s = ik(arm, goals)
-        sense = -1 if arm.link[0][2, 2] > 0 else 1
-        allowed = s.valid & inside(arm, s.q, range(1, arm.n))
-        first, length = arc(arm, s.q[:, :, 0], 0, K, sense)
-        places = (np.arange(K) - first[:, :, None]) % K < np.where(allowed, length, 0)[:, :, None]
-        legal = np.asarray(places.any(axis=1))
-        for row in np.flatnonzero((s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)).tolist():
-            one = question._replace(targets=question.targets[row : row + 1])
-            legal[row] = [bool(_legal(one, at, turn)[0]) for turn in turns]
-    else:
-        rows = np.flatnonzero(near)
-        some = question._replace(targets=question.targets[rows])
-        return _counted(some, at) if len(rows) else np.zeros((1, K), np.int64)
-    return np.asarray(legal.sum(axis=0, dtype=np.int64)[None])
-
-
-def _legal(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
-    """Which targets are reached from one place: (N,)."""
-    return np.asarray(_answers(question, at, turn)[1].any(axis=1))
-
-
-def _answers(question: Question, at: Array, turn: float) -> tuple[Array, NDArray[np.bool_]]:
-    """The branches of all targets from one place (N, B, n), and which are within limits and free (N, B)."""
-    s = ik(question.arm, _seen(question, at, turn))
-    legal = s.within_limits & s.clear if question.arm.keep_out else s.within_limits
-    if question.around.keep_out and legal.any():
-        place, q = (float(at[0]), float(at[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
-        legal = legal & free(question.arm, question.around, place, turn, q)
-    return s.q, np.asarray(legal)
-
-
-def _seen(question: Question, at: Array, turn: float) -> Array:
-    """The targets in the frame of an arm at a place."""
-    task, targets = question.task, question.targets.copy()
-    R = rotation_about(2, -turn)
-    shift = np.array([at[0], at[1], question.z])
-    if task.orientation == "full":
-        targets[:, :3, 3] = (targets[:, :3, 3] - shift) @ R.T
-        targets[:, :3, :3] = R @ targets[:, :3, :3]
-        return targets
-    k = task.position
-    targets[:, :k] = (targets[:, :k] - shift[:k]) @ R[:k, :k].T
-    if task.orientation == "axis":
-        targets[:, 3:6] = targets[:, 3:6] @ R.T
-    if task.name in ("xy_theta", "xyz_yaw"):
-        targets[:, k] -= turn
-    return targets
 
 
 def _margins(good: NDArray[np.bool_], step: float) -> Array:
@@ -327,7 +291,7 @@ def _best(
 
 def _room(question: Question, at: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
-    q, legal = _answers(question, at, turn)
-    margins = np.where(legal, limit_margin(question.arm, q), -np.inf).max(axis=1, initial=-np.inf)
+    s, legal = free_from(question, at, turn)
+    margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
     there = margins[np.isfinite(margins)]
     return float(there.min()) if len(there) else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.clearance import clear
 from armkin.keep_out.guard import guard
 from armkin.model.rotation import rotation_about
+from armkin.model.units import DEGREE
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -68,10 +70,46 @@ def free(arm: Arm, around: Around, at: tuple[float, float, float], turn: float, 
 @lru_cache(maxsize=4)
 def _standing(arm: Arm, around: Around, at: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, among what stands with the targets."""
+    return replace(_put(arm, at, turn), keep_out=around.keep_out, clearance=around.clearance)
+
+
+def standing(arm: Arm, around: Around, at: tuple[float, float, float], turn: float) -> Arm:
+    """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
+    mine = tuple(_moved(entry, at, turn) for entry in arm.keep_out)
+    clearance = max(arm.clearance, around.clearance)
+    return replace(_put(arm, at, turn), keep_out=mine + around.keep_out, clearance=clearance)
+
+
+def _put(arm: Arm, at: tuple[float, float, float], turn: float) -> Arm:
     P = np.eye(4)
     P[:3, :3], P[:3, 3] = rotation_about(2, turn), at
     link, base = arm.link.copy(), P @ arm.base
     link[0] = P @ link[0]
     for moved in (link, base):
         moved.flags.writeable = False
-    return replace(arm, link=link, base=base, keep_out=around.keep_out, clearance=around.clearance)
+    return replace(arm, link=link, base=base)
+
+
+def _moved(entry: Entry, at: tuple[float, float, float], turn: float) -> Entry:
+    """A keep-out that stands with an arm, where the arm stands at a place."""
+
+    def there(point: Sequence[float]) -> tuple[float, float, float]:
+        x, y, z = (rotation_about(2, turn) @ np.array(point) + at).tolist()
+        return x, y, z
+
+    if entry.floor is not None:
+        return entry.model_copy(update={"floor": entry.floor + at[2]})
+    if entry.capsule is not None:
+        ends = {"begin": there(entry.capsule.begin), "end": there(entry.capsule.end)}
+        return entry.model_copy(update={"capsule": entry.capsule.model_copy(update=ends)})
+    if entry.box is not None:
+        box = entry.box
+        if box.min is not None and box.max is not None:
+            low, high = np.array(box.min), np.array(box.max)
+            box = box.model_copy(
+                update={"size": tuple(high - low), "xyz": tuple(0.5 * (low + high)), "min": None, "max": None}
+            )
+        roll, pitch, yaw = box.rpy
+        put = {"xyz": there(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
+        return entry.model_copy(update={"box": box.model_copy(update=put)})
+    return entry

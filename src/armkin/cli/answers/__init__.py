@@ -27,6 +27,7 @@ from armkin.cli.answers.arm import KeepOuts as KeepOuts
 from armkin.cli.answers.arm import Near as Near
 from armkin.cli.answers.arm import Place as Place
 from armkin.cli.answers.arm import PlacedRobot as PlacedRobot
+from armkin.cli.answers.arm import PlannedPlace as PlannedPlace
 from armkin.cli.answers.arm import Ports as Ports
 from armkin.cli.answers.arm import PulsePositions as PulsePositions
 from armkin.cli.answers.arm import Pulses as Pulses

@@ -184,9 +184,19 @@ class BestPlace(TypedDict):
 
     xyz: list[float]
     yaw_deg: float
-    reached: Annotated[int, "targets"]
+    reached: Annotated[int, "targets; of a path, points along it"]
     of: int
     margin_mm: Annotated[float, "to the nearest place of the grid, at this yaw, that does not reach all"]
+
+
+class PlannedPlace(TypedDict):
+    """A place from which the path was planned."""
+
+    xyz: list[float]
+    yaw_deg: float
+    margin_mm: float
+    duration_s: Annotated[float | None, "null: it cannot be planned from there"]
+    refused: Annotated[str | None, "why"]
 
 
 class PlacedRobot(Head):
@@ -194,7 +204,8 @@ class PlacedRobot(Head):
 
     best: BestPlace
     places: int
-    reach_all: Annotated[int, "places that reach all targets"]
+    reach_all: Annotated[int, "places that reach all targets, or carry the whole path on one branch"]
+    planned: NotRequired[Annotated[list[PlannedPlace], "the best places, where FILE is a path"]]
 
 
 class Place(TypedDict):

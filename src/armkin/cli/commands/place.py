@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -13,15 +13,18 @@ from armkin.cli.options import Cluster, Json, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.cli.answers import BestPlace, PlacedRobot
+    from armkin.cli.answers import BestPlace, PlacedRobot, PlannedPlace
     from armkin.cli.answers import Place as Answer
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.reachability.place import Place
+    from armkin.reachability.planning import Planned
 
 
 def place(
-    words: Annotated[list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets.")],
+    words: Annotated[
+        list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
+    ],
     area: Annotated[
         str | None,
         typer.Option("--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Of the places. [default: all that may reach]"),
@@ -39,15 +42,14 @@ def place(
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
     json: Json = False,
 ) -> None:
-    """Where to put an arm, so that it reaches all targets.
+    """Where to put an arm, so that it reaches all targets, or carries a whole path on one branch.
 
     Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
-    one is farthest from places that do not reach all. Exit code 3: no place does; the best part is told.
+    one is farthest from places that do not reach all. Of a path the best places are planned. Exit code 3: no place
+    does; the best part is told.
     """
     if len(words) < 2:
-        raise UsageError("place takes robots, then a file of targets: armkin place ur5e targets.csv")
-    if words[-1].lower().endswith((".yaml", ".yml")):
-        raise UsageError(f"{words[-1]}: place takes targets, rows of a CSV file; give the path's points as such rows")
+        raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
     if plot is not None:
         from armkin.plot import canvas
 
@@ -65,7 +67,7 @@ def place(
     from armkin.reachability.place_file import write
 
     settings |= {"area": bounds, "yaw": turn * DEGREE}
-    targets = [_targets(arm, words[-1]) for arm in arms]
+    targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
     with output.progress("positions") as tick:
         found = each(arms, targets, settings, scene, out, Engine(workers, cluster), tick)
     if out is not None:
@@ -77,11 +79,19 @@ def place(
     answer: Answer = {"robots": [_answer(one) for one in found]}
     with output.destination(None) as say:
         say(f"{render.to_json(answer)}\n" if json else _text(found))
+    for one in found:
+        if one.unplanned and one.reach_all:
+            output.warn(f"the path is not planned from there: {one.unplanned}")
     if not any(one.reach_all for one in found):
         most = max(found, key=lambda one: int(one.reached.max()))
+        what = "points of the path on one branch" if _is_path(words[-1]) else "targets"
         raise NoSolutionError(
-            f"no place reaches all {most.of} targets; {most.arm.name} reaches {int(most.reached.max())} at best"
+            f"no place reaches all {most.of} {what}; {most.arm.name} reaches {int(most.reached.max())} at best"
         )
+
+
+def _is_path(source: str) -> bool:
+    return source.lower().endswith((".yaml", ".yml"))
 
 
 def _targets(arm: Arm, source: str) -> Array:
@@ -108,7 +118,24 @@ def _answer(found: Place) -> PlacedRobot:
         "of": found.of,
         "margin_mm": float(found.margin[i, j, k]),
     }
-    return {**render.head(found.arm), "best": best, "places": found.reached.size, "reach_all": found.reach_all}
+    counts = {"places": found.reached.size, "reach_all": found.reach_all}
+    answer = cast("PlacedRobot", {**render.head(found.arm), "best": best, **counts})
+    if found.planned:
+        answer["planned"] = [_planned(found, one) for one in found.planned]
+    return answer
+
+
+def _planned(found: Place, one: Planned) -> PlannedPlace:
+    from armkin.model.units import DEGREE
+
+    i, j, k = one.index
+    return {
+        "xyz": [float(found.x[i]), float(found.y[j]), found.z],
+        "yaw_deg": round(float(found.yaw[k] / DEGREE), 9),
+        "margin_mm": float(found.margin[i, j, k]),
+        "duration_s": None if one.plan is None else one.plan.duration,
+        "refused": one.refused or None,
+    }
 
 
 def _text(found: Sequence[Place]) -> str:
@@ -126,4 +153,13 @@ def _text(found: Sequence[Place]) -> str:
                 f"{one.reach_all:,} of {one.reached.size:,}",
             ]
         )
-    return render.table(rows, indent="") + "\n"
+    text = render.table(rows, indent="") + "\n"
+    if any(one.planned for one in found):
+        rows = [["planned from", "x/mm", "y/mm", "yaw/deg", "margin/mm", "s", ""]]
+        for one in found:
+            for each in map(_planned, [one] * len(one.planned), one.planned):
+                seconds = "" if each["duration_s"] is None else f"{each['duration_s']:.2f}"
+                numbers = [render.short(x) for x in (*each["xyz"][:2], each["yaw_deg"], each["margin_mm"])]
+                rows.append([one.arm.name, *numbers, seconds, each["refused"] or ""])
+        text += "\n" + render.table(rows, left=(0, 6), indent="") + "\n"
+    return text

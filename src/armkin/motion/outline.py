@@ -1,0 +1,72 @@
+"""Where a path leads the tool: its routes, before a branch or a place of the arm is chosen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.motion.branch_path import Pace
+from armkin.motion.geometry import line
+from armkin.motion.moves import MOVES
+from armkin.motion.path import TOLERANCE, corners_wished
+from armkin.motion.route import joined
+from armkin.motion.walk import Walk, Wishes
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+    from armkin.path_file import Move, PathFile
+
+
+def routes(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
+    """The task, and the targets of every way that the tool goes on one branch, about `step` [mm] apart.
+
+    Between them are joint moves, which may change the branch; a point without a way has one target. Raises UsageError
+    for a way that begins where joint values leave the tool: it would move with the arm.
+    """
+    corner = corners_wished(file, None, None)
+    pace = Pace(tolerance=file.tolerance or TOLERANCE)
+    outline = _Outline(arm, file, pace, arm.home, Wishes(file.task, corner, None, None, False, None))
+    outline.step, outline.found = step, []
+    outline.walked(MOVES)
+    if not outline.found:
+        raise UsageError("the path has no target of the tool: it says nothing of where to put an arm")
+    return outline.task, outline.found
+
+
+class _Outline(Walk):
+    """A walk that notes the routes and plans nothing."""
+
+    step: float
+    found: list[Array]
+
+    def _begin(self) -> None:
+        start = self.file.start
+        if start is not None and not isinstance(start, str) and start.joints is None:
+            self.clear(self.target(start.point))  # type: ignore[arg-type]
+        self.begun = self.q
+
+    def take_posture(self) -> None:
+        raise UsageError("a way along the tool's axes hangs on the posture: give place offsets in the frame of targets")
+
+    def _plan_group(self) -> None:
+        if self.goal is not None:
+            if self.pieces:
+                route, _ = joined(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)
+                even = np.linspace(0.0, route.length, max(int(np.ceil(route.length / self.step)) + 1, 3))
+                s = np.union1d(even, route.breaks)
+                self.found.append(route.targets(s))
+            else:
+                self.found.append(line(self.task, self.goal, self.goal).targets(np.zeros(1)))
+        elif self.pieces:
+            raise UsageError(
+                "this way begins where joint values leave the tool, which moves with the arm: put a point before it"
+            )
+        self.goal = None
+        self.pieces, self.blends, self.pauses = [], [], {}
+
+    def append_joint_move(self, goal: Array, move: Move | None) -> None:
+        self.q = goal

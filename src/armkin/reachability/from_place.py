@@ -1,0 +1,147 @@
+"""What an arm reaches from a place: which targets from each yaw at a position, by arcs of joint 1 where that does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.solve import ik
+from armkin.inverse.tasks.task import Task
+from armkin.model.rotation import rotation_about
+from armkin.reachability import carrying
+from armkin.reachability.answers import TURN, arc, inside
+from armkin.reachability.cells import STRAIGHT
+from armkin.reachability.standing import Around, free
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+class Question(NamedTuple):
+    """Targets of one arm, in the targets' frame."""
+
+    arm: Arm
+    task: Task
+    targets: Array
+    yaws: int
+    step: float  # [rad] of the yaw
+    z: float
+    around: Around = Around()
+    ways: tuple[int, ...] = ()  # of a path: how many targets each way has that one branch is to carry
+
+    @property
+    def arcs(self) -> bool:
+        """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
+        arm, axis = self.arm, self.arm.link[0]
+        upright = np.abs(axis[:2, 2]).max() <= STRAIGHT and np.abs(axis[:2, 3]).max() <= STRAIGHT * arm.reach
+        free = not arm.keep_out and not self.around.keep_out
+        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and free
+        whole = abs(self.yaws * self.step - TURN) < STRAIGHT
+        return bool(upright) and plain and whole and arm.n == self.task.constraints
+
+    @property
+    def sense(self) -> int:
+        """How joint 1 turns with the yaw, in the arm's own frame."""
+        return -1 if self.arm.link[0][2, 2] > 0 else 1
+
+
+def positions_of(task: Task, targets: Array) -> Array:
+    """Positions (N, 2 or 3) of targets."""
+    return targets[:, :3, 3] if task.orientation == "full" else targets[:, : task.position]
+
+
+def counted(question: Question, at: Array) -> NDArray[np.int64]:
+    """Of one position (2,): (1, K)."""
+    legal = _legal_yaws(question, at)
+    if not question.ways:
+        return np.asarray(legal.sum(axis=0, dtype=np.int64)[None])
+    counts, begin = np.zeros(question.yaws, np.int64), 0
+    for length in question.ways:
+        here = slice(begin, begin + length)
+        count = legal[here].sum(axis=0, dtype=np.int64)
+        whole = count == length
+        if length > 1 and whole.any():
+            whole = _on_one_branch(question._replace(targets=question.targets[here]), at, whole)
+        counts += np.where(whole, length, np.minimum(count, length - 1))
+        begin += length
+    return counts[None]
+
+
+def _legal_yaws(question: Question, at: Array) -> NDArray[np.bool_]:
+    """Which targets are reached from one position at each yaw: (N, K)."""
+    arm, K = question.arm, question.yaws
+    turns = np.arange(K) * question.step
+    if not question.arcs:
+        return np.stack([legal_from(question, at, turn) for turn in turns.tolist()], axis=1)
+    goals = seen_from(question, at, 0.0)
+    legal = np.zeros((len(goals), K), bool)
+    near = np.linalg.norm(positions_of(question.task, goals), axis=1) <= 2 * arm.reach + np.linalg.norm(arm.base[:3, 3])
+    some = np.flatnonzero(near)
+    if not len(some):
+        return legal
+    s = ik(arm, goals[some], question.task.name)
+    allowed = s.valid & inside(arm, s.q, range(1, arm.n))
+    first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
+    places = (np.arange(K) - first[:, :, None]) % K < np.where(allowed, length, 0)[:, :, None]
+    legal[some] = places.any(axis=1)
+    for row in some[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)].tolist():
+        one = question._replace(targets=question.targets[row : row + 1])
+        legal[row] = [bool(legal_from(one, at, turn)[0]) for turn in turns]
+    return legal
+
+
+def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """At which of some yaws (K,) one branch carries all targets."""
+    arm, K = question.arm, question.yaws
+    if question.arcs:
+        s = ik(arm, seen_from(question, at, 0.0), question.task.name)
+        whole, low, high = carrying.ranges(s, s.valid)
+        allowed = whole & carrying.within(arm, low, high, range(1, arm.n))
+        first, length = carrying.arc(arm, low[:, 0], high[:, 0], K, question.sense)
+        places = (np.arange(K) - first[:, None]) % K < np.where(allowed, length, 0)[:, None]
+        return np.asarray(which & places.any(axis=0))
+    out = np.zeros(K, bool)
+    for k in np.flatnonzero(which).tolist():
+        s, free = free_from(question, at, k * question.step, within=False)
+        whole, low, high = carrying.ranges(s, free)
+        out[k] = (whole & carrying.within(arm, low, high, range(arm.n))).any()
+    return out
+
+
+def legal_from(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
+    """Which targets are reached from one place: (N,)."""
+    return np.asarray(free_from(question, at, turn)[1].any(axis=1))
+
+
+def free_from(question: Question, at: Array, turn: float, within: bool = True) -> tuple[Solutions, NDArray[np.bool_]]:
+    """The branches of all targets from one place, and which are free (N, B); within: and within limits."""
+    s = ik(question.arm, seen_from(question, at, turn), question.task.name)
+    legal = s.within_limits if within else s.valid
+    if question.arm.keep_out:
+        legal = legal & s.clear
+    if question.around.keep_out and legal.any():
+        place, q = (float(at[0]), float(at[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
+        legal = legal & free(question.arm, question.around, place, turn, q)
+    return s, np.asarray(legal)
+
+
+def seen_from(question: Question, at: Array, turn: float) -> Array:
+    """The targets in the frame of an arm at a place."""
+    task, targets = question.task, question.targets.copy()
+    R = rotation_about(2, -turn)
+    shift = np.array([at[0], at[1], question.z])
+    if task.orientation == "full":
+        targets[:, :3, 3] = (targets[:, :3, 3] - shift) @ R.T
+        targets[:, :3, :3] = R @ targets[:, :3, :3]
+        return targets
+    k = task.position
+    targets[:, :k] = (targets[:, :k] - shift[:k]) @ R[:k, :k].T
+    if task.orientation == "axis":
+        targets[:, 3:6] = targets[:, 3:6] @ R.T
+    if task.name in ("xy_theta", "xyz_yaw"):
+        targets[:, k] -= turn
+    return targets

@@ -1,0 +1,85 @@
+"""A path from the best places: planned as the arm there would move along it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import NoSolutionError, UsageError
+from armkin.formula.arrays import Array
+from armkin.reachability.standing import Around, standing
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+    from armkin.path_file import PathFile
+
+STEP = 0.01  # of the arm's reach, from target to target along a path
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A place from which a path was planned. index: in the arrays of `Place`; plan: None where it is refused."""
+
+    index: tuple[int, int, int]
+    plan: PathPlan | None = field(repr=False)
+    refused: str = ""
+
+
+def path_of(given: Any) -> PathFile | None:
+    """A path by its file's name, its model or its data; None: these are targets."""
+    if isinstance(given, str | os.PathLike):
+        name = os.fspath(given)
+        if Path(name).suffix.lower() not in (".yaml", ".yml"):
+            raise UsageError(f"{name}: a path to place an arm for is a .yaml file; targets are given as an array")
+        from armkin import path_file
+
+        return path_file.read(name)
+    if isinstance(given, Mapping):
+        from armkin import path_file
+
+        return path_file.validated(dict(given))
+    return given if hasattr(given, "moves") else None
+
+
+def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
+    """The task, and the targets of each way that one branch is to carry."""
+    from armkin.motion.outline import routes
+
+    task, found = routes(arm, file, STEP * arm.reach)
+    return task, [np.asarray(each) for each in found]
+
+
+def unplanned(arm: Arm) -> str:
+    """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
+    from armkin.motion.plan import check_rates
+
+    try:
+        check_rates(arm)
+    except UsageError as error:
+        return str(error)
+    return ""
+
+
+def plan(
+    arm: Arm,
+    around: Around,
+    index: tuple[int, int, int],
+    at: tuple[float, float, float],
+    turn: float,
+    file: PathFile,
+) -> Planned:
+    """The path's plan from a place, or why there is none."""
+    from armkin.motion.path import path
+
+    anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
+    try:
+        return Planned(index, path(standing(arm, around, at, turn), anyones))
+    except NoSolutionError as error:
+        return Planned(index, None, str(error).splitlines()[0])
