@@ -71,6 +71,20 @@ def test_reach_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path) -> N
     assert one.read_bytes() == two.read_bytes()
 
 
+@pytest.mark.parametrize("more", [(), ("--compiled",)])
+def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    one, two = tmp_path / "one.npz", tmp_path / "two.npz"
+    words = ("workspace", "three_dof", "--samples", 150_000, *more, "--json")
+    alone = run(*words, "--out", one).json
+    spread = run(*words, "--out", two, "--cluster", address).json
+    pool = run(*words, "--workers", 2).json if not more else alone
+    for other in (spread, pool):
+        assert {**other, "seconds": 0} == {**alone, "seconds": 0}
+    assert one.read_bytes() == two.read_bytes()
+
+
 def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(armkin, "__version__", "0.0.9")
     with pytest.raises(ClusterError, match="has armkin "):

@@ -150,26 +150,27 @@ def test_volume_is_repeatable() -> None:
 
 def test_random_samples_are_within_limits_and_repeatable() -> None:
     sampling = Random(THREE_DOF, CHUNK + 10, seed=3)
-    first, second = sampling.chunks()
+    assert sampling.parts == 2
+    first, second = map(sampling.part, range(2))
     assert (len(first), len(second)) == (CHUNK, 10)
     assert np.all((first >= THREE_DOF.lower) & (first <= THREE_DOF.upper))
-    assert np.array_equal(next(sampling.chunks()), first)
-    assert not np.array_equal(next(Random(THREE_DOF, 10, seed=4).chunks()), first[:10])
+    assert np.array_equal(sampling.part(0), first)
+    assert not np.array_equal(Random(THREE_DOF, 10, seed=4).part(0), first[:10])
     # A short run is the beginning of a long one.
-    assert np.array_equal(next(Random(THREE_DOF, 10, seed=3).chunks()), first[:10])
+    assert np.array_equal(Random(THREE_DOF, 10, seed=3).part(0), first[:10])
 
 
 def test_grid_has_both_limits_and_a_half_open_turn() -> None:
-    [q] = grid(THREE_DOF, (3, 2, 1)).chunks()
+    q = grid(THREE_DOF, (3, 2, 1)).part(0)
     assert np.rad2deg(q).round(9).tolist() == [[a, b, 0] for a, b in product((-120, 0, 120), (-20, 120))]
-    [q] = grid(PAN_TILT, (4, 2)).chunks()
+    q = grid(PAN_TILT, (4, 2)).part(0)
     assert np.rad2deg(q).round(9).tolist() == [list(pair) for pair in product((-180, -90, 0, 90), (-180, 0))]
     assert grid(THREE_DOF, [5]).points == (5, 5, 5)
 
 
 def test_grid_across_chunks_is_the_whole_grid() -> None:
     sampling = grid(THREE_DOF, (7, 101, 211))
-    parts = list(sampling.chunks())
+    parts = [sampling.part(i) for i in range(sampling.parts)]
     assert len(parts) > 1
     q = np.concatenate(parts)
     assert len(np.unique(q, axis=0)) == sampling.count == 7 * 101 * 211

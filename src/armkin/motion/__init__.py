@@ -6,7 +6,7 @@ path_numbers.py     the moves of a path file, in degrees, as joint values and ta
 placing.py          where a drawing stands, and how the tool is held on it
 geometry.py         lines, arcs, helices, splines and blends of the tool, each at unit speed
 dense.py            targets on lines, gathered; fitting.py: one smooth curve of them, by b_spline.py
-route.py            one after another, with rests at corners
+route.py            one after another, with rests at corners; outline.py: those of a path, before anything is planned
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
 boundary.py         what branches that meet on a boundary make of it

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -55,12 +55,19 @@ class Random:
             raise UsageError(f"seed {self.seed}: give 0 or more")
         span(self.arm)
 
-    def chunks(self) -> Iterator[Array]:
-        """The poses, (up to CHUNK, n) [rad | mm] at a time; the same ones at every call."""
-        rng = np.random.default_rng(self.seed)
+    @property
+    def parts(self) -> int:
+        """How many chunks there are."""
+        return -(-self.count // CHUNK)
+
+    def part(self, number: int) -> Array:
+        """The poses of a chunk, (up to CHUNK, n) [rad | mm], the same ones at every call and wherever it runs."""
+        start = number * CHUNK
+        bits = np.random.PCG64(self.seed)
+        bits.advance(start * self.arm.n)  # a number takes one step of the generator
         low, high = span(self.arm)
-        for start in range(0, self.count, CHUNK):
-            yield low + (high - low) * rng.random((min(CHUNK, self.count - start), self.arm.n))
+        shape = (min(CHUNK, self.count - start), self.arm.n)
+        return np.asarray(low + (high - low) * np.random.Generator(bits).random(shape))
 
 
 @dataclass(frozen=True)
@@ -91,8 +98,13 @@ class Grid:
         """Number of poses."""
         return math.prod(self.points)
 
-    def chunks(self) -> Iterator[Array]:
-        """The poses, (up to CHUNK, n) [rad | mm] at a time."""
+    @property
+    def parts(self) -> int:
+        """How many chunks there are."""
+        return -(-self.count // CHUNK)
+
+    def part(self, number: int) -> Array:
+        """The poses of a chunk, (up to CHUNK, n) [rad | mm]."""
         low, high = span(self.arm)
         step = np.zeros(self.arm.n)
         first = low.copy()
@@ -102,10 +114,9 @@ class Grid:
                 first[i] = 0.5 * (low[i] + high[i])
             else:
                 step[i] = (high[i] - low[i]) / (k if turn else k - 1)
-        for start in range(0, self.count, CHUNK):
-            flat = np.arange(start, min(start + CHUNK, self.count))
-            index = np.stack(np.unravel_index(flat, self.points), axis=-1)
-            yield np.minimum(first + step * index, high)
+        flat = np.arange(number * CHUNK, min((number + 1) * CHUNK, self.count))
+        index = np.stack(np.unravel_index(flat, self.points), axis=-1)
+        return np.asarray(np.minimum(first + step * index, high))
 
 
 Sampling = Random | Grid

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from armkin.engines.run import Engine, in_order
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
@@ -55,6 +56,8 @@ def workspace(
     keep: int = 0,
     progress: Callable[[int], None] | None = None,
     position: Callable[[Array], Array] | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
 ) -> Workspace:
     """Sample an arm's joints within their limits and see where the tip comes.
 
@@ -63,7 +66,8 @@ def workspace(
     measures: of "manipulability" and "step_error", worked out for every sample.
     out: a .csv, .npz or .ply file for all samples. keep: how many samples the result holds.
     progress: called with the number of samples done. position: the tip (N, 3) for joint values (N, n), by default
-    `armkin.forward.position`; `armkin.compile(arm).position` is faster.
+    `armkin.forward.position`; `armkin.compile(arm).position` is faster. workers: processes; cluster: a Dask scheduler's
+    address (`position` is then a function of a module, for it travels): the samples are the same ones.
 
     Memory does not grow with the number of samples. The volume does not depend on it from 5,000 on; below,
     its error grows: see `extent`.
@@ -73,22 +77,66 @@ def workspace(
     for name in measures:
         if name not in MEASURES:
             raise UsageError(f"there is no measure '{name}'; there are {', '.join(MEASURES)}")
-    functions = [measure(arm, name) for name in measures]
-    tip_of = position or partial(position_of, arm)
-    tally = _Tally(arm, sampling.count, len(functions), keep, seed)
+    job = Job(sampling, tuple(measures), position or partial(position_of, arm), out is not None or keep > 0)
+    tally = _Tally(arm, sampling.count, len(measures), keep, seed)
     with ExitStack() as stack:
         write = None if out is None else stack.enter_context(clouds.cloud(out, arm, sampling.count, measures))
-        for q in sampling.chunks():
-            tip = tip_of(q)
-            values = [function(q) for function in functions]
-            tally.add(q, tip, values)
+        for part in in_order(Engine(workers, cluster), work, job, range(sampling.parts)):
+            tally.add(part)
             if write is not None:
-                write(q, tip, values)
+                write(part.q, part.tip, part.values)
             if progress is not None:
                 progress(tally.done)
         # Within the block: without its volume there is no result, and then no file either.
         size = extent(actual(arm), seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
+
+
+class Job(NamedTuple):
+    """What is asked of all samples; rows: whether they come back, for a file or a picture."""
+
+    sampling: Sampling
+    measures: tuple[str, ...]
+    position: Callable[[Array], Array]
+    rows: bool
+
+
+class Part(NamedTuple):
+    """What some samples come to; q, tip, values: empty where no rows are asked for."""
+
+    samples: int
+    free: int
+    low: Array
+    high: Array
+    near: float
+    far: float
+    least: Array
+    most: Array
+    q: Array
+    tip: Array
+    values: list[Array]
+
+
+def work(job: Job, number: int) -> Part:
+    """One chunk of the samples: a pure function, wherever it runs."""
+    arm, q = job.sampling.arm, job.sampling.part(number)
+    tip = job.position(q)
+    values = [measure(arm, name)(q) for name in job.measures]
+    distance = np.linalg.norm(tip - arm.base[:3, 3], axis=1)
+    some = slice(None if job.rows else 0)
+    return Part(
+        samples=len(q),
+        free=int(clear(arm, q).sum()) if arm.keep_out else 0,
+        low=tip.min(axis=0),
+        high=tip.max(axis=0),
+        near=float(distance.min()),
+        far=float(distance.max()),
+        least=np.array([value.min() for value in values]),
+        most=np.array([value.max() for value in values]),
+        q=q[some],
+        tip=tip[some],
+        values=[value[some] for value in values],
+    )
 
 
 def _sampling(arm: Arm, samples: int | None, grid_points: Sequence[int] | None, seed: int) -> Sampling:
@@ -111,18 +159,15 @@ class _Tally:
         self._rng = np.random.default_rng([seed, 1])
         self._kept: list[Array] = []
 
-    def add(self, q: Array, tip: Array, values: list[Array]) -> None:
-        self.done += len(q)
-        if self.arm.keep_out:
-            self.free += int(clear(self.arm, q).sum())
-        self.low, self.high = np.minimum(self.low, tip.min(axis=0)), np.maximum(self.high, tip.max(axis=0))
-        distance = np.linalg.norm(tip - self.arm.base[:3, 3], axis=1)
-        self.near, self.far = min(self.near, float(distance.min())), max(self.far, float(distance.max()))
-        for k, value in enumerate(values):
-            self.least[k], self.most[k] = min(self.least[k], value.min()), max(self.most[k], value.max())
+    def add(self, part: Part) -> None:
+        self.done += part.samples
+        self.free += part.free
+        self.low, self.high = np.minimum(self.low, part.low), np.maximum(self.high, part.high)
+        self.near, self.far = min(self.near, part.near), max(self.far, part.far)
+        self.least, self.most = np.minimum(self.least, part.least), np.maximum(self.most, part.most)
         if self._share > 0:
-            chosen = self._rng.random(len(q)) < self._share if self._share < 1 else slice(None)
-            self._kept.append(np.column_stack([q, tip, *values])[chosen])
+            chosen = self._rng.random(part.samples) < self._share if self._share < 1 else slice(None)
+            self._kept.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
 
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
         n = self.arm.n

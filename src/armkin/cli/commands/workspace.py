@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import is_number, whole
-from armkin.cli.options import Compiled, Json, Robot, Scene
+from armkin.cli.options import Cluster, Compiled, Json, Robot, Scene, Workers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Workspace as Answer
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
     from armkin.reachability import Workspace
 
 
@@ -55,6 +58,8 @@ def workspace(
     ] = None,
     scene: Scene = None,
     compiled: Compiled = False,
+    workers: Workers = 1,
+    cluster: Cluster = None,
     json: Json = False,
 ) -> None:
     """Where the tip can reach: bounds, volume, a cloud of points.
@@ -92,11 +97,13 @@ def workspace(
             count,
             grid_points=points,
             seed=whole(seed, "--seed", 0, 2**53),
-            position=armkin.compile(arm).position if compiled else None,
+            position=partial(_compiled, arm) if compiled else None,
             measures=measures,
             out=out,
             keep=keep,
             progress=tick,
+            workers=workers,
+            cluster=cluster,
         )
     if plot is not None:
         from armkin.plot import plot_workspace
@@ -105,6 +112,13 @@ def workspace(
     answer = _answer(found)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
+
+
+def _compiled(arm: Arm, q: Array) -> Array:
+    """The tip by machine code, which each process builds or finds."""
+    import armkin
+
+    return armkin.compile(arm).position(q)
 
 
 def _points(grid: str) -> list[int]:
