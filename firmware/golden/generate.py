@@ -196,6 +196,8 @@ def talks(name: str, suffix: str = "") -> None:
         (1011, motion(0, 3, 1, [0, 0], [5, 6], [(5, 16000, 0, [0, -STEP])]), 15, 1),
         (1012, motion(0, 1, 1, [0], [100], [whole(100, 4000, 0, [100])]), 16, 0),
         (1014, motion(0, 1, 1, [0], [100], [whole(200, 8000, 0, [100])]), 29, 0),
+        # what changes within a segment leaves less for the jump to it
+        (1023, motion(0, 1, 1, [0], [130], [whole(100, 8000, 0, [25]), whole(135, 6914, -5011, [105])]), 29, 0),
         (
             1013,
             motion(0, mask(0, -1), 3, [0, 1500], [0, 2101], [whole(2600, 16000, 0, [0, 601], 1)]),

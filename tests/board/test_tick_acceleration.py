@@ -171,3 +171,34 @@ def test_the_board_takes_random_lines() -> None:
             rate = min(math.sqrt(accel * n) * rng.uniform(0.98, 1.001), 16e6 / 448)
         end = [n, int(n * rng.uniform(-1, 1)), int(n * rng.uniform(-1, 1) * 10 ** rng.uniform(-3, 0))]
         assert refused(end, rate, accel) == "", (end, rate, accel)
+
+
+def crude(seconds: float, share: float, within: float) -> bool:
+    """Whether the board takes pieces up to 12,000 steps/s at `share` of 20,000 steps/s^2; `within`: of their change."""
+    image = Image((AxisImage(True, False, -(1 << 28), 1 << 28, 0, 20_000, 20_000),))
+    velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=448), image)
+    ticks = max(1, round(seconds * 16e6 / 600))
+    speed, change = 10_000 * seconds, 20_000 * share * seconds
+    while speed < 12_000:
+        inside = within * change if speed > 2 * change else 0.0
+        mean = seconds * 16e6 / ticks
+        first, last = (round(mean * speed / (speed + half)) for half in (-inside / 2, inside / 2))
+        add = round((last - first) / (ticks - 1) * 65536) if ticks > 1 else 0
+        segment = Segment(ticks, first, add, (round(speed * mean / 16e6 * (1 << 15)) << 8,))
+        velocity.begin(segment)
+        try:
+            velocity.check(0, segment.rates[0])
+        except RefusedError:
+            return False
+        speed += change
+    return True
+
+
+@pytest.mark.parametrize("seconds", [0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05])
+def test_crude_plans_at_1_3_times_max_accel_are_refused_at_any_segment_length(seconds: float) -> None:
+    assert crude(seconds, 1.0, 0.0)
+    assert crude(seconds, 1.2, 0.0)
+    assert seconds < 0.002 or crude(seconds, 1.1, 0.5)  # in less, whole cycles of an interval are jumps
+    for within in (0.0, 0.5, 1.0):
+        assert not crude(seconds, 1.3, within)
+        assert not crude(seconds, 2.48, within)

@@ -74,14 +74,14 @@ void hal_timer_stop(void) {
 }
 
 void hal_probe(uint8_t input, bool high) {
-    static const volatile uint8_t *const ports[] = {
-#define SWITCH_PORT(i, port, bit) [i] = &PIN##port,
-        SWITCH_PINS(SWITCH_PORT)};
-    static const uint8_t masks[] = {
-#define SWITCH_MASK(i, port, bit) [i] = 1 << (bit),
-        SWITCH_PINS(SWITCH_MASK)};
-    probe_port = ports[input];
-    probe_mask = masks[input];
+    switch (input) {  // no table, which would be in RAM
+#define PROBE(i, port, bit)      \
+    case i:                      \
+        probe_port = &PIN##port; \
+        probe_mask = 1 << (bit); \
+        break;
+        SWITCH_PINS(PROBE)
+    }
     probe_level = high ? probe_mask : 0;
 }
 

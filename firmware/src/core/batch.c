@@ -12,20 +12,24 @@ enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
 
 enum { QUICK_INTERVAL = MIN_INTERVAL + MIN_INTERVAL / 4 };  // a tick that counts the bend costs more
 #define RECIPROCAL (1UL << (VELOCITY_BITS - 15))
+_Static_assert(FRAME_MAX / NARROW_SIZE < QUEUE_SLOTS, "a batch leaves the segment before it where it is");
 _Static_assert(RECIPROCAL / MIN_INTERVAL < 1UL << 16, "the reciprocal of an interval has 16 bits");
 
-// A segment's time in 1/256 of 50 ms, from units of 256 cycles.
+// A segment's time: in 2^-16 of 50 ms from 16 cycles, and a longer one's in 2^-8 of 50 ms from 256 cycles.
+#define FRACTION ((uint32_t)((1ULL << 35) / (CLOCK / 20)))
 #define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
-enum { LONGEST = 255, LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
+_Static_assert((uint64_t)FRACTION * (CLOCK / 20 / 16) < 1ULL << 32 && FRACTION * (MIN_INTERVAL / 16) >> 15, "32 bits; no segment takes no time");
+enum { LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
 
 // Velocities are rounded down in two places.
 static const uint32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
+enum { CYCLES = 2 * VELOCITY_BITS - 67 };  // of a velocity, what whole cycles of its intervals make: 2^-9, or 2^-7
 
 // What is the same for all axes of a segment.
 struct pace {
-    uint16_t first, last;  // RECIPROCAL / interval
-    uint32_t time;         // 1/256 of 50 ms
-    uint8_t window;        // the same, rounded up, at most 255
+    uint16_t first, last;  // RECIPROCAL / interval; at rest 0
+    uint16_t time;         // 2^-16 of 50 ms, at most 50 ms; 0: rest, which is as long as the segment beside it
+    uint16_t windows;      // of a longer one: 2^-8 of 50 ms; else 0
 };
 
 static enum error check_axis(uint8_t i, int32_t start) {
@@ -96,19 +100,29 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     return motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
+static void take_pace(const struct segment *s, uint16_t last, struct pace *pace) {
+    pace->first = pace->last = RECIPROCAL / s->interval;
+    if (s->add) {
+        pace->last = RECIPROCAL / last;
+    }
+    const uint32_t cycles = (uint32_t)s->ticks * (((uint32_t)s->interval + last) >> 1);
+    pace->windows = 0;
+    if (cycles < CLOCK / 20) {
+        pace->time = (cycles >> 4) * FRACTION >> 15;
+    } else {
+        const uint32_t windows = ((cycles >> 16) * WINDOW >> 8) + ((cycles >> 8 & 0xFF) * WINDOW >> 16);
+        pace->time = 0xFFFF;
+        pace->windows = windows < 0xFFFF ? windows : 0xFFFF;
+    }
+}
+
 static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {
     int32_t last;
     read_times(p, wide, s);
     if (!times_valid(s, &last)) {
         return E_INTERVAL;
     }
-    pace->first = pace->last = RECIPROCAL / s->interval;
-    if (s->add) {
-        pace->last = RECIPROCAL / (uint32_t)last;
-    }
-    const uint32_t units = motion_units(s);
-    pace->time = units < 65536 ? units * WINDOW >> 16 : ((units >> 8) * WINDOW >> 16) << 8;
-    pace->window = pace->time < LONGEST ? pace->time + 1 : LONGEST;
+    take_pace(s, last, pace);
     return OK;
 }
 
@@ -116,22 +130,62 @@ static uint32_t distance(int32_t a, int32_t b) {
     return a > b ? (uint32_t)a - (uint32_t)b : (uint32_t)b - (uint32_t)a;
 }
 
-static uint8_t longer(uint8_t a, uint8_t b) {
-    return a > b ? a : b;
+// What 5/4 of max_accel makes of an axis's velocity; in units 2^8 as great where `time` is. 24 by 16 bits, in parts that a small chip is quick with.
+static uint32_t budget(uint8_t axis, uint16_t time) {
+    const uint16_t low = limits.jump[axis], high = limits.jump[axis] >> 16;
+    return ((uint32_t)low * time >> 8) + ((uint32_t)high * time << 8);
 }
 
-static bool jumps(uint8_t axis, int32_t from, int32_t to, uint8_t window) {
-    const uint32_t change = distance(from, to), jump = limits.jump[axis];
-    return change > ROUNDING && jump < JUMP_MAX && change > jump * window + ROUNDING;
+static int32_t velocity(const struct segment *s, uint8_t axis, axes_t bit, uint16_t reciprocal) {
+    const uint16_t rate = s->fine & bit ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
+    const uint32_t size = (uint32_t)rate * reciprocal;
+    return s->back & bit ? -(int32_t)size : (int32_t)size;
 }
 
-// Within a segment, too, the velocity may change by no more than 5/4 of what max_accel allows.
-static bool bends(uint8_t axis, int32_t from, int32_t to, const struct pace *pace) {
-    if (pace->time < LONGEST) {
-        return jumps(axis, from, to, pace->window);
+// A quarter of the velocity in the middle of a segment; of a longer one than 50 ms, 25 ms from the end where it is `from`.
+static int32_t quarter(int32_t from, int32_t to, uint16_t windows) {
+    const int32_t half = from >> 1, change = (to >> 1) - half;
+    if (!windows) {
+        return (half + (change >> 1)) >> 1;
     }
-    const uint32_t windows = (pace->time >> 8) + 1;
-    return windows <= LONGEST && limits.jump[axis] < JUMP_MAX && distance(from, to) >> 8 > limits.jump[axis] * windows;
+    const uint16_t part = (1UL << 23) / windows;
+    return (half + (change >> 16) * part + (int32_t)((uint32_t)(uint16_t)change * part >> 16)) >> 1;
+}
+
+// What changes have taken beyond their budget until now; true if that is more than rounding may be.
+static bool beyond(fine_t *excess, int32_t change, uint32_t budget, uint32_t slack) {
+    const int32_t sum = (int32_t)*excess + change;
+    if (sum <= 0 || (uint32_t)sum <= budget) {
+        *excess = 0;
+        return false;
+    }
+    *excess = (uint32_t)sum - budget;
+    return (uint32_t)sum - budget > slack;
+}
+
+// Does an axis's velocity jump from `a` to `b`, or change within `b`, by more than its budget? Between the middles of both, too, the change
+// is within that; what was beyond it is kept, each way, and at most rounding's: so the velocities in the middles of any two
+// segments differ by no more than the budget of the time between, and rounding once, however short the segments are.
+static bool accelerates(uint8_t axis, axes_t bit, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
+    fine_t *const excess = motion.plan_excess[axis];
+    if (limits.jump[axis] >= JUMP_MAX || ((!before->first || !a->rate[axis]) && (!pace->first || !b->rate[axis]))) {
+        excess[0] = excess[1] = 0;
+        return false;
+    }
+    const int32_t left = velocity(a, axis, bit, before->last), first = velocity(b, axis, bit, pace->first);
+    const int32_t last = pace->first == pace->last ? first : velocity(b, axis, bit, pace->last);
+    const uint32_t slack = ROUNDING + ((distance(left, 0) + distance(last, 0)) >> CYCLES);
+    const uint32_t between = budget(axis, (before->time >> 1) + (pace->time >> 1)), change = distance(first, last);
+    if (distance(left, first) > between + slack || (pace->windows && pace->windows < 0xFFFF && change >> 8 > budget(axis, pace->windows)) ||
+        (!pace->windows && change && change > budget(axis, pace->time) + slack)) {
+        return true;
+    }
+    if (before->windows) {
+        excess[0] = excess[1] = 0;
+    }
+    const int32_t from = before->first == before->last ? left : velocity(a, axis, bit, before->first);
+    const int32_t more = quarter(first, last, pace->windows) - quarter(left, from, before->windows);
+    return beyond(&excess[0], more, between >> 2, slack >> 2) | beyond(&excess[1], -more, between >> 2, slack >> 2);
 }
 
 // A rate of the frame; the direction where it has one, else the one that the axis had.
@@ -147,34 +201,21 @@ static enum error read_rate(const uint8_t *p, uint8_t axis, axes_t bit, struct s
     return OK;
 }
 
-static enum error check_rate(uint8_t axis, axes_t bit, const struct segment *s, const struct pace *pace) {
+static bool too_fast(uint8_t axis, axes_t bit, const struct segment *s, const struct pace *pace) {
     const uint16_t rate = s->fine & bit ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
-    int32_t first = (int32_t)((uint32_t)rate * pace->first);
-    int32_t last = pace->first == pace->last ? first : (int32_t)((uint32_t)rate * pace->last);
-    if ((uint32_t)first > limits.top[axis] || (uint32_t)last > limits.top[axis]) {
-        return E_RATE;
-    }
-    if (s->back & bit) {
-        first = -first;
-        last = -last;
-    }
-    if (jumps(axis, motion.plan_speed[axis], first, longer(motion.plan_window, pace->window)) ||
-        (s->add && bends(axis, first, last, pace))) {
-        return E_ACCEL;
-    }
-    motion.plan_speed[axis] = last;
-    return OK;
+    return (uint32_t)rate * (pace->first > pace->last ? pace->first : pace->last) > limits.top[axis];
 }
 
 // One axis of a segment from the frame into its slot; the plan goes on to its end.
 static enum error read_axis(const uint8_t *p, uint8_t axis, axes_t bit, struct segment *s, const struct pace *pace) {
-    enum error error = read_rate(p, axis, bit, s);
-    if (!error) {
-        error = check_rate(axis, bit, s, pace);
-    }
+    const enum error error = read_rate(p, axis, bit, s);
     if (error) {
         return error;
     }
+    return too_fast(axis, bit, s, pace) ? E_RATE : OK;
+}
+
+static enum error plan_axis(uint8_t axis, axes_t bit, const struct segment *s) {
     const int32_t before = motion.plan[axis];
     motion_advance(axis, bit, s);
     const struct axis_config *config = &memory.image.axis[axis];
@@ -206,32 +247,40 @@ static enum error check_rows(uint8_t *detail) {
     return OK;
 }
 
-static enum error read_axes(const uint8_t *p, uint16_t mask, struct segment *s, const struct pace *pace, uint8_t *detail) {
+static enum error read_axes(const uint8_t *p, uint16_t mask, const struct segment *a, const struct pace *before, struct segment *s,
+                            const struct pace *pace, uint8_t *detail) {
     axes_t bit = 1;
     for (uint8_t i = 0; i < AXES; i++, mask >>= 1, bit <<= 1) {
         enum error error = OK;
         if (mask & 1) {
             error = read_axis(p, i, bit, s, pace);
             p += 2;
-        } else if (motion.plan_speed[i] || motion.plan_fraction.back & bit) {  // it was moving: from now on it stands
-            if (jumps(i, motion.plan_speed[i], 0, longer(motion.plan_window, pace->window))) {
-                error = E_ACCEL;
-            }
-            motion.plan_speed[i] = 0;
+        } else {  // it stands, if it was moving from now on
             s->back |= motion.plan_fraction.back & bit;
+        }
+        if (!error && accelerates(i, bit, a, before, s, pace)) {
+            error = E_ACCEL;
+        }
+        if (!error && mask & 1) {
+            error = plan_axis(i, bit, s);
         }
         if (error) {
             *detail = i;
             return error;
         }
     }
-    motion.plan_window = pace->window;
     return OK;
 }
 
-static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, uint8_t *detail) {
+// Leaves the last segment's pace.
+static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, struct pace *before, uint8_t *detail) {
     if (motion.state == IDLE) {
         begin_rows();
+    }
+    memset(before, 0, sizeof *before);
+    if (!motion.ended) {
+        const struct segment *a = motion_slot(-1);  // it may be done: nothing has been written over it yet
+        take_pace(a, motion_interval(a, a->ticks - 1), before);
     }
     for (uint8_t n = 0; n < count; n++, p += size) {
         struct segment *s = motion_slot(n);
@@ -242,21 +291,27 @@ static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, 
             *detail = n;
             return error;
         }
-        error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, s, &pace, detail);
+        if (!before->time) {
+            before->time = pace.time;
+        }
+        error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, motion_slot(n - 1), before, s, &pace, detail);
         if (!error) {
             error = check_rows(detail);
         }
         if (error) {
             return error;
         }
+        *before = pace;
     }
     return OK;
 }
 
-static enum error check_end(const uint8_t *ends, uint16_t mask, bool end, uint8_t *detail) {
-    for (uint8_t i = 0; i < AXES; i++) {
+static enum error check_end(const uint8_t *ends, uint16_t mask, const struct segment *s, const struct pace *last, bool end, uint8_t *detail) {
+    const struct pace rest = {.time = last->time};
+    axes_t bit = 1;
+    for (uint8_t i = 0; i < AXES; i++, bit <<= 1) {
         *detail = i;
-        if (end && jumps(i, motion.plan_speed[i], 0, motion.plan_window)) {
+        if (end && accelerates(i, bit, s, last, s, &rest)) {
             return E_ACCEL;
         }
         if (mask >> i & 1) {
@@ -281,9 +336,10 @@ static enum error read_batch(const uint8_t *payload, uint8_t axes, uint8_t segme
     if (count > motion_free()) {
         return E_CREDIT;
     }
-    error = read_segments(ends + 4 * axes, count, mask, flags & WIDE, segment, detail);
+    struct pace last;
+    error = read_segments(ends + 4 * axes, count, mask, flags & WIDE, segment, &last, detail);
     if (!error) {
-        error = check_end(ends, mask, flags & END, detail);
+        error = check_end(ends, mask, motion_slot(count - 1), &last, flags & END, detail);
     }
     if (!error && motion.state == IDLE) {
         error = inputs_blocking(motion_slot(0), detail);

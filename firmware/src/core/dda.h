@@ -53,7 +53,7 @@ struct dda {
     uint16_t left;              // ticks of `now` still to compute
     uint32_t interval;          // to the next tick, as planned; 2^-16 cycle
     int32_t add;                // 2^-24 cycle a tick
-    fine_t phase[STEPPERS + 1], rate[STEPPERS + 1];
+    fine_t phase[STEPPERS ? STEPPERS : 1], rate[STEPPERS ? STEPPERS : 1];
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
     uint8_t overruns;

@@ -191,8 +191,8 @@ struct segment *motion_slot(uint8_t ahead) {
 }
 
 static void plan_rest(void) {
-    memset(motion.plan_speed, 0, sizeof motion.plan_speed);
-    motion.plan_window = 0;
+    memset(motion.plan_excess, 0, sizeof motion.plan_excess);
+    motion.ended = true;
     at_rest(&motion.plan_fraction);
 }
 
@@ -200,11 +200,11 @@ void motion_append(uint8_t segments, bool end) {
     for (uint8_t n = 0; n < segments; n++) {
         queued_units += motion_units(motion_slot(n));
     }
+    motion.ended = false;
     if (end) {
         motion_slot(segments - 1)->back |= LAST;
         plan_rest();
     }
-    motion.ended = end;
     HAL_BARRIER();
     queue_head += segments;
 }

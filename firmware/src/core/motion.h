@@ -18,10 +18,9 @@ struct motion {
     // at the end of the queue:
     int32_t plan[AXES];
     struct fraction plan_fraction;
-    int32_t plan_speed[AXES];  // VELOCITY units; 0 at rest
-    uint8_t plan_window;       // the last segment's, see batch.c
-    bool ended;                // it ends with END
-    uint8_t gentle;            // eighths of the accelerations that a hold leaves out
+    fine_t plan_excess[AXES][2];  // of changes of velocity over their budget, up and down: see batch.c
+    bool ended;                   // at rest
+    uint8_t gentle;               // eighths of the accelerations that a hold leaves out
 
     int32_t latch[AXES];  // counts when the probed switch was pressed
     bool latched;         // dda.pressed has been taken into `latch`

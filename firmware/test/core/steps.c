@@ -106,7 +106,56 @@ static void speeds_are_checked_where_segments_meet(void) {
     CHECK(host_status(0).ack.error == OK && bench_pins[0] == 400);
 }
 
+// Pieces of one speed, or half of whose change is within them, up to 12,000/s at so many times max_accel, one a frame: are all taken?
+static bool crude_plan_is_taken(double seconds, double share, double within) {
+    struct image image = host_image();
+    image.axis[0].max_accel = 20000;
+    image.axis[0].upper = 1 << 28;
+    int32_t at[AXES];
+    int64_t places = 1 << 22;
+    fresh_with(220, &image);
+    memcpy(at, home_counts, sizeof at);
+    const double change = 20000 * share * seconds;
+    const struct host_segment pause = {.ticks = 100, .interval = 16000};
+    CHECK(host_motion(1, HOST_WIDE, at, 1, &pause).error == OK);
+    for (double speed = 20000 * seconds / 2; speed < 12000; speed += change) {
+        const double inside = speed > 20000 * seconds ? within * change : 0, begin = speed - inside / 2;
+        const uint16_t ticks = fmax(1, round(seconds * CLOCK / 1000)), interval = round(seconds * CLOCK / ticks);
+        const double first = interval * speed / begin, last = interval * speed / (begin + inside);
+        struct host_segment piece = {.ticks = ticks, .interval = round(first)};
+        piece.add = ticks > 1 ? round((last - first) / (ticks - 1) * 256) : 0;
+        piece.rate[0] = round(speed * interval / CLOCK * (1 << 15)) * 256;
+        places += (int64_t)ticks * piece.rate[0];
+        piece.steps[0] = (places >> 23);
+        places &= (1 << 23) - 1;
+        const struct ack ack = host_motion(1, HOST_WIDE, at, 1, &piece);
+        CHECK(ack.error == OK || (ack.error == E_ACCEL && ack.detail == 0));
+        if (ack.error) {
+            host_wait_idle(2000);
+            return false;
+        }
+        at[0] += piece.steps[0];
+        while (motion_free() == 0) {
+            bench_run(1000);
+            session.silent = 0;
+        }
+    }
+    return true;
+}
+
+// 5/4 of max_accel is one budget, for jumps between segments and changes within them together.
+static void crude_plans_have_one_budget(void) {
+    const double lengths[] = {0.03, 0.04, 0.05};  // a queue of shorter ones would be dry
+    for (size_t n = 0; n < sizeof lengths / sizeof *lengths; n++) {
+        CHECK(crude_plan_is_taken(lengths[n], 1.0, 0) && crude_plan_is_taken(lengths[n], 1.2, 0));
+        CHECK(crude_plan_is_taken(lengths[n], 1.1, 0.5));
+        CHECK(!crude_plan_is_taken(lengths[n], 1.3, 0) && !crude_plan_is_taken(lengths[n], 1.3, 0.5));
+        CHECK(!crude_plan_is_taken(lengths[n], 2.48, 0.5) && !crude_plan_is_taken(lengths[n], 1.3, 1));
+    }
+}
+
 void test_steps(void) {
+    crude_plans_have_one_budget();
     steps_are_exact();
     speeds_are_checked_where_segments_meet();
 }

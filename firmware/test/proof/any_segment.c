@@ -19,7 +19,8 @@ enum error inputs_blocking(const struct segment *s, uint8_t *detail) { (void)s; 
 static void any_plan(void) {
     for (uint8_t i = 0; i < AXES; i++) {
         motion.plan[i] = Frama_C_interval(-(1 << 30), 1 << 30);
-        motion.plan_speed[i] = Frama_C_interval(-0x7FFFFFFF, 0x7FFFFFFF);
+        motion.plan_excess[i][0] = Frama_C_interval(0, 1 << 23);
+        motion.plan_excess[i][1] = Frama_C_interval(0, 1 << 23);
         motion.plan_fraction.phase[i] = Frama_C_interval(0, PHASE_MASK);
         limits.top[i] = Frama_C_interval(0, 0x7FFFFFFF);
         limits.jump[i] = Frama_C_interval(1, JUMP_MAX);
@@ -27,21 +28,30 @@ static void any_plan(void) {
         memory.image.axis[i].upper = Frama_C_interval(-(1 << 30), 1 << 30);
     }
     motion.plan_fraction.back = Frama_C_interval(0, ALL_AXES);
-    motion.plan_window = Frama_C_interval(0, 255);
 }
 
-static void one_segment(void) {
-    uint8_t p[WIDE_SIZE], rate[2];
+static bool any_head(struct segment *s, struct pace *pace) {
+    uint8_t p[WIDE_SIZE];
     Frama_C_make_unknown((char *)p, sizeof p);
+    return read_head(p, Frama_C_interval(0, 1), s, pace) == OK;
+}
+
+// Behind another segment, or at rest, as at an END.
+static void one_segment(bool resting) {
+    uint8_t rate[2], other[2];
     Frama_C_make_unknown((char *)rate, sizeof rate);
+    Frama_C_make_unknown((char *)other, sizeof other);
     any_plan();
-    struct segment *s = &queue[0];
-    struct pace pace;
+    struct segment *a = &queue[1], *s = &queue[0];
+    struct pace before, pace;
     const uint8_t i = Frama_C_interval(0, AXES - 1);
-    if (read_head(p, Frama_C_interval(0, 1), s, &pace) != OK) {
+    if (!any_head(a, &before) || read_rate(other, i, 1 << i, a) != OK || !any_head(s, &pace)) {
         return;
     }
-    if (read_axis(rate, i, 1 << i, s, &pace) != OK) {
+    if (resting) {
+        before = (struct pace){.time = pace.time};
+    }
+    if (read_axis(rate, i, 1 << i, s, &pace) != OK || accelerates(i, 1 << i, a, &before, s, &pace) || plan_axis(i, 1 << i, s) != OK) {
         return;
     }
     motion_units(s);
@@ -73,7 +83,8 @@ static void line(void) {
 
 int main(void) {
     dda.stretch = Frama_C_interval(256, 65535);
-    one_segment();
+    one_segment(true);
+    one_segment(false);
     ticks();
     line();
     return 0;

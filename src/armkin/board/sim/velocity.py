@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from armkin.board.firmware.protocol import Error, Image, Segment
 from armkin.board.sim.frames import RefusedError
 from armkin.board_kinds import Board
 
+_ALL = 0xFFFF
 _UNCHECKED = 1 << 23  # change in a window from which on an acceleration is not checked
 
 
@@ -24,61 +27,98 @@ def times_valid(s: Segment, least: int) -> bool:
     )
 
 
+class Pace(NamedTuple):
+    """What is the same for all axes of a segment; all 0: rest, which is as long as the segment beside it."""
+
+    first: int = 0  # reciprocal of the interval
+    last: int = 0
+    time: int = 0  # 2^-16 of 50 ms, at most 50 ms
+    windows: int = 0  # of a longer one: 2^-8 of 50 ms; else 0
+
+
+def _quarter(start: int, end: int, windows: int) -> int:
+    """A quarter of the velocity in a segment's middle; of a longer one than 50 ms, 25 ms from its end `start`."""
+    half = start >> 1
+    change = (end >> 1) - half
+    if not windows:
+        return (half + (change >> 1)) >> 1
+    part = (1 << 23) // windows
+    return (half + (change >> 16) * part + ((change & _ALL) * part >> 16)) >> 1
+
+
 class Velocity:
-    """Every axis's velocity at the end of the plan; at rest when made."""
+    """Every axis's velocities in the plan's last segment, and what it took beyond its budget; at rest when made."""
 
     def __init__(self, board: Board, image: Image) -> None:
         self.board, self.image = board, image
         self._bits = 23 if board.min_interval > 128 else 22  # velocities are in 2^-15 of 2^-bits steps a cycle
-        self.at = [0] * len(image.axes)
-        self.window = 0  # of the last segment: its time in 1/256 of 50 ms, rounded up, at most 255
+        self._before, self._pace = Pace(), Pace()
+        self._at = [(0, 0, 0)] * len(image.axes)  # at both ends of the last segment, and its rate
+        self._excess = [(0, 0)] * len(image.axes)  # up, down; a quarter of a velocity
 
     def copy(self) -> Velocity:
         """The same, to go on from."""
         other = Velocity(self.board, self.image)
-        other.at, other.window = list(self.at), self.window
+        other._at, other._excess = list(self._at), list(self._excess)
+        other._before, other._pace = self._before, self._pace
         return other
 
     def begin(self, s: Segment) -> None:
         """Take up a segment, whose intervals have been checked."""
-        scale = (1 << 32) // (self.board.clock // 20)
-        units = s.units()
-        self._time = units * scale >> 16 if units < 65536 else ((units >> 8) * scale >> 16) << 8
-        self._first, self._last = (1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval
-        self._add = s.add != 0
-        self._before, self.window = self.window, min(self._time + 1, 255)
+        part = self.board.clock // 20
+        cycles, time, windows = s.ticks * ((s.interval + s.last_interval) >> 1), _ALL, 0
+        if cycles < part:
+            time = (cycles >> 4) * ((1 << 35) // part) >> 15
+        else:
+            window = (1 << 32) // part
+            windows = min(((cycles >> 16) * window >> 8) + ((cycles >> 8 & 255) * window >> 16), _ALL)
+        pace = Pace((1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval, time, windows)
+        self._before, self._pace = self._pace if self._pace.time else Pace(time=time), pace
 
     def check(self, axis: int, rate: int) -> None:
         """Raise RefusedError if an axis of the segment is too fast or changes its velocity too much."""
         image, size, sign = self.image.axes[axis], abs(rate) >> 8, 1 if rate >= 0 else -1
-        first, last = sign * size * self._first, sign * size * self._last
+        first, last = sign * size * self._pace.first, sign * size * self._pace.last
         if max(abs(first), abs(last)) > min(int(image.max_rate * self._second), 2**31 - 1):
             raise RefusedError(Error.RATE, axis)
-        if self._jumps(axis, self.at[axis], first, max(self._before, self.window)):
-            raise RefusedError(Error.ACCEL, axis)
-        if self._add and self._bends(axis, first, last):
-            raise RefusedError(Error.ACCEL, axis)
-        self.at[axis] = last
+        self._accelerate(axis, first, last, rate)
+        self._at[axis] = first, last, rate
 
     def check_rest(self, axis: int) -> None:
         """Raise RefusedError if an axis is too fast to rest now."""
-        if self._jumps(axis, self.at[axis], 0, self.window):
-            raise RefusedError(Error.ACCEL, axis)
+        behind = self.copy()
+        behind._before, behind._pace = self._pace, Pace(time=self._pace.time)
+        behind._accelerate(axis, 0, 0, 0)
 
     @property
     def _second(self) -> float:
         return float((1 << 15 + self._bits) / self.board.clock)
 
-    def _step(self, axis: int) -> int:
-        a = self.image.axes[axis].max_accel
-        return min(int(a * 5 / 4 * 0.05 / 256 * self._second), _UNCHECKED - 1) + 1
+    def _budget(self, axis: int, time: int) -> int:
+        """What 5/4 of max_accel makes in a time; _UNCHECKED: it is not checked."""
+        step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._second), _UNCHECKED - 1) + 1
+        low, high = step & _ALL, step >> 16
+        return (low * time >> 8) + (high * time << 8) if step < _UNCHECKED else _UNCHECKED << 16
 
-    def _jumps(self, axis: int, before: int, after: int, window: int) -> bool:
-        step, slack = self._step(axis), 4 * ((1 << self._bits) // self.board.min_interval)
-        return step < _UNCHECKED and abs(after - before) > step * window + slack
-
-    def _bends(self, axis: int, first: int, last: int) -> bool:
-        if self._time < 255:
-            return self._jumps(axis, first, last, self.window)
-        windows, step = (self._time >> 8) + 1, self._step(axis)
-        return windows <= 255 and step < _UNCHECKED and abs(last - first) >> 8 > step * windows
+    def _accelerate(self, axis: int, first: int, last: int, rate: int) -> None:
+        """See firmware/src/core/batch.c."""
+        (start, left, was), before, pace = self._at[axis], self._before, self._pace
+        between = self._budget(axis, (before.time >> 1) + (pace.time >> 1))
+        if between == _UNCHECKED << 16 or not (was or rate):
+            self._excess[axis] = (0, 0)
+            return
+        whole = 4 * ((1 << self._bits) // self.board.min_interval)
+        slack = whole + ((abs(left) + abs(last)) >> 2 * self._bits - 37)
+        change = abs(last - first)
+        if pace.windows:
+            bends = pace.windows < _ALL and change >> 8 > self._budget(axis, pace.windows)
+        else:
+            bends = change > self._budget(axis, pace.time) + slack
+        if bends or abs(first - left) > between + slack:
+            raise RefusedError(Error.ACCEL, axis)
+        more = _quarter(first, last, pace.windows) - _quarter(left, start, before.windows)
+        excess = (0, 0) if before.windows else self._excess[axis]
+        up, down = (max(0, e + m - (between >> 2)) for e, m in zip(excess, (more, -more), strict=True))
+        self._excess[axis] = up, down
+        if max(up, down) > slack >> 2:
+            raise RefusedError(Error.ACCEL, axis)
