@@ -10,6 +10,7 @@ route.py            one after another, with rests at corners; outline.py: those 
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
 boundary.py         what branches that meet on a boundary make of it
+wrist_turn.py       past a wrist singularity with the tool turned a little; windows.py: where it is
 branch_path.py      the branch that is taken: joint values along the route
 grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _NEAR = 10 * ENDS  # [mm] of a chain's end before the boundary
+_ALIKE = 1e-3  # [rad | mm] between the ends of two chains that are one
 _SAME = 1e-4  # [rad | mm] between two postures that are one
 _MOST = 8  # boundaries on the way: a path along one has thousands, and its chains go on anyway
 
@@ -28,14 +29,15 @@ def through_boundaries(
 ) -> list[Chain]:
     """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
     s, end = columns.s, len(columns.s) - 1
+    all_ = _across(s, all_, tolerance)
     ends = np.unique([at for c in all_ for at in (c.first, c.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
     rows = [j for j in inner.tolist() if len(ends) and np.abs(s[ends] - s[j]).min() <= _NEAR]
     found = list(all_)
     for j in [0, *(rows if len(rows) <= _MOST else []), end]:
         postures = fixed[None] if j == 0 and fixed is not None else columns.q[j][columns.valid[j]]
-        to = [one for c in found for one in _arriving(columns, c, j, postures, tolerance)] if j > 0 else []
-        on = [one for c in found for one in _leaving(columns, c, j, postures, tolerance)] if j < end else []
+        to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)] if j > 0 else []
+        on = [one for c in found for one in _leaving(s, c, j, postures, tolerance)] if j < end else []
         if j in (0, end):
             found += [c for c in (*to, *on) if c not in found]
         else:
@@ -43,14 +45,33 @@ def through_boundaries(
     return found
 
 
-def _arriving(columns: Columns, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+def _across(s: Array, all_: list[Chain], tolerance: float) -> list[Chain]:
+    """Chains, one of each two that are one way: where a wrist is straight exactly, its posture there is any.
+
+    The first ends a few micrometres before it, the other one begins behind it, at nearly the same joint values.
+    """
+    found = list(all_)
+    for a in all_:
+        behind = [b for b in found if a.last < b.first and s[b.first] - s[a.last] <= _NEAR and len(b.q) > 1]
+        for b in behind[:_MOST] if len(a.q) > 1 else []:
+            step = change(a.arm, a.q[-1], b.q[0])
+            if np.abs(step).max() > _ALIKE or float(chord_bound(levers(a.arm), step)) > tolerance:
+                continue
+            share = (s[a.last + 1 : b.first + 1] - s[a.last]) / (s[b.first] - s[a.last])
+            between = a.q[-1] + share[:, None] * step
+            labels = np.concatenate([a.labels, np.repeat(b.labels[:1], len(share))])
+            found.append(_joined(Chain(a.arm, a.first, np.concatenate([a.q, between]), labels), b))
+    return found
+
+
+def _arriving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
     """A chain as far as sample j: the part that leads there, or it and what is between it and a posture there."""
     if c.first < j <= c.last:
         return [c] if c.last == j else [Chain(c.arm, c.first, c.q[: j + 1 - c.first], c.labels[: j + 1 - c.first])]
-    gap = columns.s[j] - columns.s[c.last]
+    gap = s[j] - s[c.last]
     if c.last > j or gap > _NEAR:
         return []
-    share = 1 - ((columns.s[j] - columns.s[c.last + 1 : j + 1]) / gap) ** 0.5  # joints leave a boundary as roots do
+    share = 1 - ((s[j] - s[c.last + 1 : j + 1]) / gap) ** 0.5  # joints leave a boundary as roots do
     made = []
     for step in _steps(c, c.q[-1], postures, tolerance):
         labels = np.concatenate([c.labels, np.repeat(c.labels[-1:], j - c.last)])
@@ -58,19 +79,18 @@ def _arriving(columns: Columns, c: Chain, j: int, postures: Array, tolerance: fl
     return made
 
 
-def _leaving(columns: Columns, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
-    """A chain from sample j on: the part behind it, or a posture there, what is between, and it."""
-    if c.first <= j < c.last:
-        return [c] if c.first == j else [Chain(c.arm, j, c.q[j - c.first :], c.labels[j - c.first :])]
-    gap = columns.s[c.first] - columns.s[j]
-    if c.first < j or gap > _NEAR:
-        return []
-    share = 1 - ((columns.s[j : c.first] - columns.s[j]) / gap) ** 0.5
-    made = []
-    for step in _steps(c, c.q[0], postures, tolerance):
-        labels = np.concatenate([np.repeat(c.labels[:1], c.first - j), c.labels])
-        made.append(Chain(c.arm, j, np.concatenate([c.q[0] + share[:, None] * step, c.q]), labels))
-    return made
+def _leaving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+    """A chain from sample j on: that of the way back arrives there."""
+    if c.first == j < c.last:
+        return [c]
+    N = len(s)
+    back = _arriving(-s[::-1], _backward(c, N), N - 1 - j, postures, tolerance)
+    return [_backward(one, N) for one in back]
+
+
+def _backward(c: Chain, N: int) -> Chain:
+    """A chain as the way back has it, of N samples."""
+    return Chain(c.arm, N - 1 - c.last, c.q[::-1], c.labels[::-1])
 
 
 def _steps(c: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]:

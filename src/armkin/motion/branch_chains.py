@@ -21,6 +21,7 @@ from armkin.motion.linked_branches import ENDS, Columns, Int, turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.motion.windows import Window
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class Chain:
     first: int
     q: Array  # (len, n)
     labels: Int  # (len,) number of the branch's name, -1: none
+    windows: tuple[Window, ...] = ()  # where its wrist passes a singularity with the tool turned a little
 
     @property
     def last(self) -> int:

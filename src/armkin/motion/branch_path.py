@@ -23,6 +23,7 @@ from armkin.motion.hold_cap import hold_cap
 from armkin.motion.linked_branches import ENDS, Columns, change, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, Knots, finer, knots, optimal
+from armkin.motion.wrist_turn import through_wrists
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Pace:
     jerk: Array | None = None  # (n,) [rad/s3 | mm/s3]
     hold: float | None = None  # on a hold, a joint's acceleration is at most this times its max_accel
     tolerance: float = 0.05  # [mm]
+    turn: float = 0.0  # [rad] that the tool may be turned by, to pass a wrist singularity
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ def carry(
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
     all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
+    if pace.turn and route.task.orientation == "full":
+        all_ = through_wrists(arm, route, columns, all_, pace.turn)
     starts = [c for c in all_ if c.first == 0]
     if fixed is not None:
         starts = [c for c in starts if stands(c, fixed)]
@@ -165,7 +169,7 @@ def stretches(
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
         tolerance = None if grid < _GRID else pace.tolerance
-        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, tolerance)
+        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, tolerance, run.chain.windows)
         if off > pace.tolerance:
             raise NoSolutionError(
                 f"between {a:.3f} and {b:.3f} mm the plan may leave the path by {off:.3g} mm; "

@@ -36,6 +36,8 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
     if not plan.branches:
         plan.branches = _branches(arm, carried, near)
     for k, run in enumerate(carried.runs):
+        for window in run.chain.windows:
+            plan.turned = max(plan.turned or 0.0, window.turned)
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
@@ -143,6 +145,7 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "nearest_singularity": None
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
+        **({} if plan.turned is None else {"turned_deg": float(np.rad2deg(plan.turned))}),
         **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
         **({} if plan.clearance is None else {"clearance": plan.clearance}),
     }

@@ -17,29 +17,38 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.motion.route import Route
+    from armkin.motion.windows import Window
 
 _TIMES = 16.0  # as many points, at most, where the tolerance needs them
 _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
-_DAMPING = (0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
 def fine_enough(
-    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, tolerance: float | None
+    arm: Arm,
+    route: Route,
+    s: Array,
+    q: Array,
+    a: float,
+    b: float,
+    number: int,
+    tolerance: float | None,
+    windows: tuple[Window, ...] = (),
 ) -> tuple[Knots, list[int], float]:
     """A grid from length a to b: cubics, numbers of the points where q'' jumps, and how far they may leave the route.
 
     s, q: samples (N,), (N, n) of the branch. The grid has `number` points, and more in the intervals that may leave
-    the route by more than `tolerance` [mm]; None: whatever they do.
+    the route by more than `tolerance` [mm]; None: whatever they do. windows: where the wrist passes a singularity.
     """
-    where, breaks = _places(arm, route, s, q, a, b, number)
+    where, breaks = _places(arm, route, s, q, a, b, number, windows)
     most = _TIMES * len(where)
     for damping in _DAMPING:
         known = None
         for _ in range(_ROUNDS):
-            path = known = _solved(arm, route, s, q, where, breaks, damping, known)
+            path = known = _solved(arm, route, s, q, where, breaks, damping, known, windows)
             if tolerance is None:
                 return path, breaks.tolist(), 0.0
             off = interval_deviations(arm, route, path)
@@ -53,10 +62,13 @@ def fine_enough(
     return path, breaks.tolist(), float(off.max())
 
 
-def _places(arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int) -> tuple[Array, Int]:
+def _places(
+    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, windows: tuple[Window, ...]
+) -> tuple[Array, Int]:
     """Grid points that follow way and joints, and which of them are breaks."""
-    first, last = np.searchsorted(route.breaks, [a + 1e-9, b - 1e-9])
-    edges = np.concatenate([[a], route.breaks[first:last], [b]])
+    bends = np.sort(np.concatenate([route.breaks, *([one.begin, one.end] for one in windows)]))
+    first, last = np.searchsorted(bends, [a + 1e-9, b - 1e-9])
+    edges = np.concatenate([[a], np.unique(bends[first:last]), [b]])
     moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
     at = np.interp(edges, s, measure)
@@ -87,7 +99,15 @@ def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
 
 
 def _solved(
-    arm: Arm, route: Route, s: Array, q: Array, where: Array, breaks: Int, damping: float, known: Knots | None
+    arm: Arm,
+    route: Route,
+    s: Array,
+    q: Array,
+    where: Array,
+    breaks: Int,
+    damping: float,
+    known: Knots | None,
+    windows: tuple[Window, ...],
 ) -> Knots:
     """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
     values, new = np.empty((len(where), arm.n)), np.ones(len(where), bool)
@@ -96,6 +116,10 @@ def _solved(
         values[old], new[old] = known.q, False
     guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
     values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
+    for one in windows:
+        inside = new & (where > one.begin) & (where < one.end)
+        if inside.any():
+            values[inside] = one.joints(arm, route, where[inside], one.copy_of(arm, guess[inside[new]][0]))
     return knots(where, values, breaks.tolist())
 
 

@@ -83,8 +83,7 @@ def _offset(walk: Walk, move: Move, value: Any) -> None:
             typed = walk.spot.sums
             walk.take_posture()
             walk.clear(None)
-            turns = np.rint((typed - walk.spot.sums) / (2 * np.pi))
-            walk._spot = replace(walk.spot, sums=walk.spot.sums + 2 * np.pi * turns)
+            walk.typed(typed)
             d = (fk(walk.arm, walk.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
     walk.add(move, geometry.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
 

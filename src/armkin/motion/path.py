@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.motion import path_numbers
+from armkin.motion import path_numbers, wrist_turn
 from armkin.motion.branch_path import Pace
 from armkin.motion.free import checked
 from armkin.motion.moves import MOVES
@@ -84,7 +84,10 @@ def path(
         check_jerk(arm, jerk),
         hold,
         tolerance or file.tolerance or TOLERANCE,
+        np.deg2rad(file.turn_tolerance or 0.0),
     )
+    if pace.turn:
+        wrist_turn.check(arm)
     here = arm.home if start is None else np.asarray(start, dtype=float)
     if arm.motors and not undriven(arm):
         here = settled(arm, here)

@@ -87,6 +87,7 @@ class PathPlan:
     deviation: float = 0.0
     rounded_most: float | None = None  # [mm] where a given point lies farthest from the motion
     reduced: Reduced = field(default_factory=Reduced)
+    turned: float | None = None  # [rad] by which the tool is turned at wrist singularities; None: it never is
     runs: list[PathRun] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)
     reconfigurations: list[Reconfiguration] = field(default_factory=list)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branch_chains import Run
     from armkin.motion.route import Route
+    from armkin.motion.time_optimal import Knots
     from armkin.path_file import Move, PathFile
 
 _OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
@@ -180,6 +181,11 @@ class Walk:
             return None if inner else 0.0
         return self.wishes.corner
 
+    def typed(self, sums: Array) -> None:
+        """Where the tool is, sums of angles keep the whole turns that were typed."""
+        turns = np.rint((sums - self.spot.sums) / (2 * np.pi))
+        self._spot = replace(self.spot, sums=self.spot.sums + 2 * np.pi * turns)
+
     def queue_event(self, kind: str, value: Any) -> None:
         self.lay_dense()
         if self.goal is None and not self.pieces:
@@ -283,12 +289,7 @@ class Walk:
             self.plan.along(len(self.made), curve, self.plan.length)
             self.made.append(curve)
             self.q = curve.end
-            given = missed(self.arm, route, path_)
-            off = deviation(self.arm, route, path_) if given is None else given[0]
-            if given is not None and off > self.plan.deviation:
-                self.plan.rounded_most = self.plan.length + given[1]
-            self.plan.deviation = max(self.plan.deviation, off)
-            self.plan.nearer_singularity(path_.q, path_.s)
+            _measure(self.plan, route, path_)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -302,6 +303,16 @@ class Walk:
             one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
             self.made += [one] if one.duration > 0 else []
         self.q = goal
+
+
+def _measure(plan: PathPlan, route: Route, path: Knots) -> None:
+    """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
+    given = missed(plan.arm, route, path)
+    off = deviation(plan.arm, route, path) if given is None else given[0]
+    if given is not None and off > plan.deviation:
+        plan.rounded_most = plan.length + given[1]
+    plan.deviation = max(plan.deviation, off)
+    plan.nearer_singularity(path.q, path.s)
 
 
 def _reached(walk: Walk, goal: Spot, branch: str | None) -> Array:

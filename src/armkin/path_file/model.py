@@ -138,6 +138,9 @@ class PathFile(_Model):
     tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=1000)] | None = Field(
         None, description="mm between plan and path; 0.05 by default."
     )
+    turn_tolerance: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        None, description="Degrees by which the tool may be turned to pass a wrist singularity; 0 by default."
+    )
     tool_speed: Speed | None = Field(None, description="mm/s, for all moves.")
     speed: Percent | None = Field(None, description="Percent of the joints' max_speed, for all moves.")
     corners: Literal["stop", "blend", "tolerance"] | None = Field(

@@ -117,6 +117,7 @@ class Path(Head):
     limits: Annotated[dict[str, dict[str, float]] | None, "speed, accel, jerk: greatest share of each joint's limit"]
     nearest_singularity: NearestSingularity | None
     segments: Annotated[int | None, "that a board is sent; null without drives"]
+    turned_deg: Annotated[NotRequired[float], "by which the tool is turned at wrist singularities, if it is"]
     approach: Annotated[NotRequired[Approach], "absent where the arm stands at the path's start"]
     clearance: Annotated[NotRequired[PathClearance], "where there are keep-outs"]
     dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]

@@ -374,6 +374,8 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
             size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
             lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
         lines.append(_deviation_text(plan))
+        if plan.turned is not None:
+            lines.append(f"the tool is turned by at most {found['turned_deg']:.2g} deg past a wrist singularity")
         if plan.reduced.count:
             wished, became = plan.reduced.wished, plan.reduced.became
             lines.append(

@@ -1,0 +1,51 @@
+"""A stretch of a route on which the wrist's joints are cubics and the other three hold the tip on the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.forward import jacobian, position
+from armkin.motion.linked_branches import turns_of
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+    from armkin.motion.route import Route
+
+_STEPS = 12  # of Newton's method
+_LONGEST = 0.1  # [rad] of one of them
+
+
+@dataclass(frozen=True)
+class Window:
+    """From length `begin` to `end`: joint values and their slopes at both, and how far the tool is turned inside."""
+
+    begin: float
+    end: float
+    q: Array  # (2, n) [rad]
+    d: Array  # (2, n) [rad/mm]
+    turned: float  # [rad] at most
+
+    def joints(self, arm: Arm, route: Route, s: Array, offset: Array | float = 0.0) -> Array:
+        """Joint values at lengths s (N,) inside: (N, n); offset: whole turns (n,) of a copy."""
+        h = self.end - self.begin
+        f = ((s - self.begin) / h)[:, None]
+        d0, d1, chord = self.d[0] * h, self.d[1] * h, self.q[1] - self.q[0]
+        q = self.q[0] + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
+        goal = route.targets(s)[:, :3, 3]
+        for _ in range(_STEPS):
+            miss = goal - position(arm, q)
+            step = np.linalg.solve(np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]
+            size = np.abs(step).max(axis=1, initial=1e-300, keepdims=True)
+            q[:, :3] += np.minimum(_LONGEST / size, 1.0) * step
+            if size.max(initial=0.0) < 1e-13:
+                break
+        return np.asarray(q + offset)
+
+    def copy_of(self, arm: Arm, q: Array) -> Array:
+        """Whole turns (n,) from a window to the copy that a run is on; q: (n,) of it, somewhere inside."""
+        turns = turns_of(arm)
+        return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
