@@ -184,6 +184,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_the_order_of_what_says_how_corners_are_passed",
     ),
     "motion/test_every_way.py": (),
+    "motion/test_path_ends.py": (),
     "motion/test_singular_paths.py": (),
     "motion/test_time_law.py": ("test_a_long_way_takes_little_memory_beside_its_own",),
     "plot/test_plot.py": (),

@@ -125,7 +125,7 @@ def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str) -> No
 
 
 @pytest.mark.parametrize(
-    "line", ["send moveo home --dry-run", "path ur5e --via 390,80,300,0,180,0 --via 390,160,300,0,180,0"]
+    "line", ["send moveo home --dry-run", "path ur5e --via 390,80,300,0,180,0 --via 390,160,300,0,180,0 --port none"]
 )
 def test_what_a_shipped_robot_lacks_is_added_to_a_copy(line: str, tmp_path: Path) -> None:
     result = run(*line.split())

@@ -153,3 +153,16 @@ def test_an_arm_on_a_board_of_others_is_planned_without_a_port(tmp_path: Path) -
     done = run("send", robot, "--path", file, "--dry-run")
     assert done.code == 2
     assert "has no gripper that a board of kind grbl moves" in done.err
+
+
+def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved() -> None:
+    corners = ("--via", "300,0,400", "--via", "300,50,400")
+    done = run("path", "ur5e", *corners, "--json")
+    assert done.code == 0, done.err
+    assert done.json["duration_s"] > 0
+    assert "assumed for this plan alone, as ur5e does not say: max_accel of J1, J2, J3, J4" in done.err
+    assert "60 deg/s2" in done.err
+    assert run("path", "ur5e", *corners, "--port", "none", "--dry-run").code == 0
+    refused = run("path", "ur5e", *corners, "--port", "none")
+    assert (refused.code, refused.out) == (2, "")
+    assert "have no max_accel, it has no board" in refused.err

@@ -97,7 +97,7 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     ),
     NothingHeldError: lambda error: "give the same arguments again, or leave --resume out",
     PositionKnownError: lambda error: "leave --assume-home (--assume) out",
-    GripperLostError: lambda error: "add --assume open (or closed, or a value)",
+    GripperLostError: lambda error: "armkin grip ROBOT open --assume open (or closed, or a value) says where it stands",
     GripperKnownError: lambda error: "leave --assume out",
     UnfinishedError: lambda error: "the same command with --resume goes on; without these parts another one may begin",
     UsageError: _incomplete,  # the last: NoHomingError and others are such, too

@@ -150,6 +150,17 @@ def rehearsed(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
     return arm
 
 
+def planned(arm: Arm) -> Arm:
+    """The arm for a plan that moves nothing: with rates that its file does not state, which are named."""
+    from armkin.board.backend.assumptions import with_rates
+
+    arm, made_up = with_rates(arm)
+    if made_up:
+        words = "; ".join(made_up)
+        output.note(f"assumed for this plan alone, as {arm.path or arm.name} does not say: {words}")
+    return arm
+
+
 def simulated(assume: str | None) -> str:
     """What to say of a board in this process, which knows no position before."""
     return AT_HOME if assume in (None, "home") else "the simulated board forgets all at the end"

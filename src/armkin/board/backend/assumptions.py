@@ -37,6 +37,13 @@ def assumed(arm: Arm) -> tuple[Arm, list[str]]:
         said.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
         if any(arm.prismatic[arm.joint_names.index(name)] for name in bare):
             said[-1] += f" (slides: {_LEAD:g} mm a turn)"
+    arm, rates_said = with_rates(arm)
+    return arm, said + rates_said
+
+
+def with_rates(arm: Arm) -> tuple[Arm, list[str]]:
+    """The arm with a max_speed and a max_accel where it has none, and in words which: for plans that move nothing."""
+    said = []
     for key, names in missing_rates(arm).items():
         values = getattr(arm, key).copy()
         for name in names:

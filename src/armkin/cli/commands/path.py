@@ -134,6 +134,7 @@ def path(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
     if port is None or dry_run:
+        arm = board_link.planned(arm)
         if start is not None:
             options["start"] = board_link.standing(arm, start, "--start")
         plan = _planned(arm, moves, locked, options, json=json)
