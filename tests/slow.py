@@ -206,6 +206,8 @@ SLOW: dict[str, tuple[str, ...]] = {
     "robot_file/test_strict_yaml.py": ("test_both_parsers_refuse_the_same",),
     "teach/test_one_file.py": (),
     "teach/test_teach_board.py": (),
+    "teach/test_teach_jog.py": (),
+    "teach/test_teach_jog_page.py": (),
     "teach/test_teach_browser.py": (),
     "teach/test_teach_flow.py": (),
     "teach/test_teach_keep_outs.py": (),

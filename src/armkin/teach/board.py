@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.board import path_run
-from armkin.errors import ArmkinError, FileError, LinkError, UsageError
+from armkin.errors import ArmkinError, FileError, LinkError, NoSolutionError, UsageError
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.robot_file.catalogue import locate
@@ -21,11 +21,12 @@ from armkin.teach import request_checks
 from armkin.teach.request_checks import RefusedError
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend
+    from armkin.board.backend import Backend, Planned
     from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
+    from armkin.motion.jog_line import Frame
     from armkin.motion.path_plan import PathPlan
-    from armkin.teach.board_thread import BoardThread
+    from armkin.teach.board_thread import BoardThread, Job
     from armkin.teach.tabs import Action, Fields, Tab
 
 DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
@@ -41,7 +42,7 @@ class BoardActions:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
         self.thread, self.arm, self.program = thread, thread.arm, program
         self._alive = 0.0  # until when a jog goes on
-        self._jogging: tuple[int, float] | None = None
+        self._jogging: tuple[object, ...] | None = None
         self._goal: Array | None = None
         self._lock = threading.Lock()
 
@@ -121,21 +122,32 @@ class BoardActions:
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Turn one joint as long as this is asked again and again; the arm stops when it is not."""
-        arm = self.arm
-        joint = request_checks.whole(fields, "joint", arm.n)
+        """Turn a joint, or move the tip along an axis, as long as this is asked again and again."""
         percent = request_checks.number(fields, "percent", -100, 100)
         if percent == 0:
             raise UsageError("percent: 0 is no jog")
-        wanted = (joint, percent)
+        wanted, job = self._jog_of(fields, percent)
         if self.thread.doing == "jog" and self._jogging == wanted:
             self._alive = time.monotonic() + DEAD_MAN
             return {}
         self.check_file()
         with self._lock:  # the job asks how long it goes on as soon as it is submitted
-            self.thread.submit("jog", lambda machine: self._jog(machine, joint, percent))
+            self.thread.submit("jog", job)
             self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
         return {}
+
+    def _jog_of(self, fields: Fields, percent: float) -> tuple[tuple[object, ...], Job]:
+        """What is to be jogged, and the job that does it."""
+        if "axis" not in fields:
+            joint = request_checks.whole(fields, "joint", self.arm.n)
+            return (joint, percent), lambda machine: self._jog(machine, joint, percent)
+        from armkin.motion.jog_line import axes
+
+        axis, frame = request_checks.text(fields, "axis", 10), request_checks.text(fields, "frame", 10)
+        if axis not in axes(self.arm) or frame not in ("base", "tool"):
+            raise UsageError(f"axis, frame: expected one of {', '.join(axes(self.arm))}, and base or tool")
+        tool: Frame = "tool" if frame == "tool" else "base"
+        return (axis, frame, percent), lambda machine: self._jog_tip(machine, axis, tool, percent / 100)
 
     def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """The button was let go."""
@@ -195,7 +207,9 @@ class BoardActions:
     def run(self, machine: Backend, goals: Array, speed: float) -> None:
         """Move through joint values (w, n), stopping at each."""
         self.prepare(machine)
-        machine.run([machine.plan(machine.counts(), goals, speed=speed)], self._progress)
+        plan = machine.plan(machine.counts(), goals, speed=speed)
+        self.thread.parts = [plan.trajectory]
+        machine.run([plan], self._progress)
 
     def prepare(self, machine: Backend) -> None:
         """Switch the motors on; LinkError if the position is lost."""
@@ -212,7 +226,11 @@ class BoardActions:
         path_run.check_gripper(plan, self.thread.board)
         path_run.check_pauses(plan, answers=False)
         board = self.thread.board
-        path_run.follow(board, plan, path_run.parts(plan, machine.counts(), board.lay), self._progress)
+        self._carry_out(plan, path_run.parts(plan, machine.counts(), board.lay))
+
+    def _carry_out(self, plan: PathPlan, parts: list[Planned]) -> None:
+        self.thread.parts = [part.trajectory for part in parts]
+        path_run.follow(self.thread.board, plan, parts, self._progress)
 
     def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
         board = self.thread.board
@@ -228,6 +246,20 @@ class BoardActions:
         board = self.thread.board
         rate = board.ready_to_jog(joint, percent / 100 * float(self.arm.max_speed[joint]))
         board.jog(joint, rate, _LONGEST_JOG, self._held_down)
+
+    def _jog_tip(self, machine: Backend, axis: str, frame: Frame, share: float) -> None:
+        """Line after line along an axis; each is planned to its rest, and held on its way when nobody asks for it."""
+        from armkin.motion.jog_line import jog_line
+
+        self.prepare(machine)
+        why = ""
+        while not why and self._held_down():
+            plan, why = jog_line(self.arm, machine.joints(), axis, frame, share)
+            parts = path_run.parts(plan, machine.counts(), self.thread.board.lay)
+            with self.thread.held(lambda: not self._held_down()):
+                self._carry_out(plan, parts)
+        if why and self._held_down():
+            raise NoSolutionError(f"the jog ends: {why}")
 
     def _held_down(self) -> bool:
         """Whether the page was heard of lately: its button is held."""
@@ -250,7 +282,7 @@ class BoardActions:
             raise
 
     def _progress(self, done: float, total: float) -> None:
-        self.thread.done = (round(done, 1), round(total, 1))
+        self.thread.done, self.thread.at = (round(done, 1), round(total, 1)), done
 
 
 def _home(board: Board) -> None:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, StoppedError
@@ -24,6 +25,7 @@ from armkin.teach.request_checks import RefusedError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
+    from armkin.motion.trajectory import Trajectory
 
 Job = Callable[[Backend], None]
 
@@ -41,11 +43,14 @@ class BoardThread:
         self.link: Port | None = None
         self.machine: Backend | None = None
         self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
+        self.at = 0.0  # the same seconds, not rounded
+        self.parts: list[Trajectory] = []  # of that motion, one after another; empty where it has no plan
         self.follower = ""  # id of the page that the arm follows; empty: none
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._stop = threading.Event()
         self._ended = False
+        self._let_go: Callable[[], bool] = lambda: False  # whether a held button is held no more
         self._job: tuple[str, Job] | None = ("connect", lambda machine: None)
         self._doing = "connect"  # name of the job, "" if there is none
         self._error = ""
@@ -64,6 +69,7 @@ class BoardThread:
             if self._doing or self._stop.is_set():
                 raise RefusedError(409, f"the arm is busy ({self._doing or 'stop'}): wait for it, or STOP")
             self._job, self._doing, self._error, self.done = (name, job), name, "", (0.0, 0.0)
+            self.parts, self.at = [], 0.0
         self._wake.set()
 
     def stop(self) -> None:
@@ -168,7 +174,20 @@ class BoardThread:
         if self.machine is not None and time.monotonic() - self._told_at >= _TELL:
             self.board.heard()
             self._publish()
-        return self._stop.is_set()
+        return self._stop.is_set() or self._let_go()
+
+    @contextmanager
+    def held(self, let_go: Callable[[], bool]) -> Iterator[None]:
+        """A motion that a button holds: it ends on its path, as by STOP and as no error, when that is let go."""
+        self._let_go = let_go
+        try:
+            yield
+        except StoppedError as error:
+            if self._stop.is_set():
+                raise
+            self.board.stopped(error)
+        finally:
+            self._let_go = lambda: False
 
     def _hold(self) -> None:
         """STOP while no job was carried out: the board is held all the same."""
@@ -225,6 +244,7 @@ class BoardThread:
             "position": "unknown" if machine is None else machine.position(),
             "pulses": None,
             "joints": None,
+            "commanded": self._commanded(),
             "error": self._error,
             "differences": [] if machine is None else list(machine.differences),
         }
@@ -233,6 +253,15 @@ class BoardThread:
             found["pulses"] = list(counts)
             found["joints"] = units.joints_out(self.arm, joints_of(self.arm, counts)).tolist()
         return found
+
+    def _commanded(self) -> list[float] | None:
+        """Where the plan has the arm now [deg | mm]; None while no planned motion is under way."""
+        left = self.at
+        for part in self.parts if self._doing else ():
+            if left <= part.duration or part is self.parts[-1]:
+                return [float(x) for x in units.joints_out(self.arm, part.q(min(left, part.duration)))]
+            left -= part.duration
+        return None
 
     def _publish(self) -> None:
         with self._telling:

@@ -1,9 +1,9 @@
 // @ts-check
 /** The board: where the arm stands, and what it is told to do. Nothing here moves it but a button. */
-import { fixed, get, make } from "./dom.js";
+import { fixed, get } from "./dom.js";
+import { Jog } from "./jog.js";
+import { Live } from "./live.js";
 import { act } from "./server.js";
-
-const BEAT = 100; // [ms] between two signs of life of a jog: the arm stops 0.3 s after the last one
 
 const WORDS = /** @type {Object<string, string>} */ ({
   known: "position known", retained: "position retained through a reset", lost: "position lost",
@@ -22,14 +22,17 @@ export class Board {
     /** @type {import("./types.js").BoardState | null} */
     this.state = null;
     this.open = true; // the gripper, as last told
-    this.beating = 0;
     this.lost = false; // the server does not answer
+    this.jog = new Jog(arm, {
+      ask: (name, fields) => this.ask(name, fields),
+      busy: () => this.state?.doing !== "" || !this.state.connected || this.lost,
+    });
+    this.live = new Live(arm);
     get("gripper").hidden = arm.gripper === null;
     if (arm.gripper) {
       get("grip-unit").textContent = arm.gripper.unit;
       /** @type {HTMLInputElement} */ (get("grip-value")).value = String(arm.gripper.open);
     }
-    get("jog-joint").append(...arm.joints.map((joint, i) => make("option", { value: String(i) }, joint.name)));
     this.wire();
   }
 
@@ -50,8 +53,6 @@ export class Board {
       /** @type {HTMLInputElement} */ (get("consent")).checked = false;
     });
     get("follow").addEventListener("change", () => (checked("follow") ? this.follow() : this.ask("follow", { on: false })));
-    this.dead("jog-down", -1);
-    this.dead("jog-up", 1);
   }
 
   /** From where it stands: what is shown instead was not dragged. */
@@ -74,44 +75,10 @@ export class Board {
     /** @type {HTMLInputElement} */ (get("follow")).checked = this.state?.follows ?? false;
   }
 
-  /** A dead man's button: by pointer, and by the space bar or Enter. @param {string} id @param {number} sign */
-  dead(id, sign) {
-    const button = get(id);
-    const begin = () => {
-      if (this.beating) return;
-      const speed = /** @type {HTMLInputElement} */ (get("jog-speed")).valueAsNumber;
-      const joint = Number(/** @type {HTMLSelectElement} */ (get("jog-joint")).value);
-      const beat = () => this.ask("jog", { joint, percent: sign * speed });
-      beat();
-      this.beating = setInterval(beat, BEAT);
-    };
-    const end = () => {
-      if (!this.beating) return;
-      clearInterval(this.beating);
-      this.beating = 0;
-      this.ask("jog_end");
-    };
-    button.addEventListener("pointerdown", (event) => {
-      button.setPointerCapture(event.pointerId); // held is what is pressed, also where the page moves beneath the pointer
-      begin();
-    });
-    for (const name of ["pointerup", "pointercancel", "blur", "lostpointercapture"]) {
-      button.addEventListener(name, end);
-    }
-    button.addEventListener("keydown", (event) => {
-      if (event.key !== " " && event.key !== "Enter") return;
-      event.preventDefault();
-      begin();
-    });
-    button.addEventListener("keyup", end);
-    document.addEventListener("visibilitychange", end);
-    window.addEventListener("blur", end);
-  }
-
   /** @param {string} name @param {object} [fields] */
   async ask(name, fields = {}) {
     // Before it is asked for: what the board says of it may come sooner than the answer.
-    if (name !== "jog" || !this.beating) {
+    if (name !== "jog" || !this.jog.beating) {
       this.page.begun();
       get("arrived").textContent = "";
     }
@@ -119,8 +86,7 @@ export class Board {
       await act(name, fields);
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
-      if (name === "jog") clearInterval(this.beating);
-      if (name === "jog") this.beating = 0;
+      if (name === "jog") this.jog.stopped();
     }
   }
 
@@ -135,8 +101,7 @@ export class Board {
 
   /** STOP was pressed. */
   stopped() {
-    clearInterval(this.beating);
-    this.beating = 0;
+    this.jog.stopped();
   }
 
   /** @param {import("./types.js").BoardState} state */
@@ -157,6 +122,7 @@ export class Board {
     bar.value = state.total_s ? state.done_s / state.total_s : 0;
     if (before && state.ended.count !== before.ended.count) {
       get("arrived").textContent = state.error ? "" : `${state.ended.name}: done`;
+      if (state.error) this.jog.stopped(); // at a limit, say: it does not begin again while its button is still held
       if (state.error && state.error !== "stopped") this.page.trouble(state.error);
     }
     if (state.error === "stopped") get("arrived").textContent = "stopped: the arm stands on its path, its position is known";
@@ -167,6 +133,7 @@ export class Board {
     else get("how-safe").textContent = "If this page is closed, its browser ends or armkin teach is paused while the arm moves, the board holds it "
         + "along its path within a second, and its position stays known. " + stop;
     this.follows();
+    this.live.show(state);
     this.buttons();
     this.page.moved(state);
   }

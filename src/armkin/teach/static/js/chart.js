@@ -2,14 +2,14 @@
 /** Joint speeds over time, as shares of their limits. */
 import { get, make } from "./dom.js";
 
-const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
+export const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
 const [WIDTH, HEIGHT] = [400, 90];
 
 /**
  * @param {string} tag
  * @param {Object<string, string | number>} attributes
  */
-function svg(tag, attributes) {
+export function svg(tag, attributes) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
   return element;

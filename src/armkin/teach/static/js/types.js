@@ -8,7 +8,7 @@
  * @typedef {{robot: string, robot_file: string, reach: number, base: number[][],
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
  *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
- *   lock: string|null, locks: boolean, obstacles?: number[]}} Arm
+ *   lock: string|null, locks: boolean, obstacles?: number[], jogs?: string[]}} Arm
  * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], hits?: string, motion: number}} Branch
  * @typedef {{pulses: number[], moves: number[], from: string, error_mm: number, best: boolean,
  *   outside_travel: string[]}} Motors
@@ -17,7 +17,7 @@
  *   status: string|null, complete?: boolean, free?: string[], branches: Branch[], names?: string[],
  *   chosen?: number|null, closest?: {joints: number[], distance_mm: number, angle_deg: number}|null}} Look
  * @typedef {{port: string, board: string, simulated: boolean, connected: boolean, doing: string, follows: boolean, ended: {count: number, name: string}, done_s: number,
- *   total_s: number, position: string, pulses: number[]|null, joints: number[]|null, error: string, differences: string[]}} BoardState
+ *   total_s: number, position: string, pulses: number[]|null, joints: number[]|null, commanded?: number[]|null, error: string, differences: string[]}} BoardState
  * @typedef {{kind: string, name: string, said: string, blend: number|null}} ProgramMove
  * @typedef {{moves: ProgramMove[], blend: number, speed: number, tool_speed: number|null, via: boolean,
  *   undo: number, redo: number}} ProgramState

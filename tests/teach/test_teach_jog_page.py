@@ -1,0 +1,67 @@
+"""The jog of the tip, a gamepad and the live chart in a real browser."""
+
+from __future__ import annotations
+
+import re
+
+from browsing import chromium, opened, until
+from served import served
+
+# A gamepad that the test holds: Chromium has none without a hand.
+_PAD = """
+window.pad = {id: 'Pad <b>1</b>', connected: true, mapping: 'standard', axes: [0, 0, 0, 0],
+              buttons: Array.from({length: 17}, () => ({pressed: false}))};
+navigator.getGamepads = () => [window.pad, null];
+"""
+_AT = "document.querySelector('#position').textContent"
+
+
+def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_charted() -> None:
+    with served(board="sim") as server, chromium() as browser, opened(browser, server.address, script=_PAD) as page:
+        until(page, f"{_AT}.startsWith('It stands')")
+
+        def joints() -> list[float]:
+            return [float(x) for x in re.findall(r" (-?[\d.]+)(?:,|\.$)", page.text_content("#position") or "")]
+
+        def jogs(*, ends: bool = False) -> None:
+            sign = "!" if ends else ""
+            until(page, f"{sign}document.querySelector('#standing').textContent.startsWith('jog')")
+
+        page.fill("#jog-speed", "10")
+        groups = page.locator("#jog-joint optgroup").all()
+        assert [group.get_attribute("label") for group in groups] == ["Joints", "Tip, base axes", "Tip, tool axes"]
+        page.select_option("#jog-joint", "base x")
+        page.locator("#jog-down").focus()
+        page.keyboard.down("Space")
+        jogs()
+        until(page, "document.querySelectorAll('#live polyline').length === 6")
+        until(page, f"!{_AT}.includes('q2 90.00')")
+        page.keyboard.up("Space")
+        jogs(ends=True)
+        assert page.text_content("#trouble") == ""
+        stands, stood = joints(), page.text_content("#position")
+        assert stands[0] == 0  # along x, the first joint rests
+        assert stands[1] > 90
+        assert "apart" in (page.text_content("#live-keys") or "")
+        assert page.get_attribute("#live", "aria-label")
+
+        # The gamepad is off until it is switched on, and moves nothing without a held shoulder button.
+        page.evaluate("() => { pad.axes[1] = -1; pad.buttons[5].pressed = true; }")
+        page.wait_for_timeout(300)
+        assert joints() == stands
+        page.evaluate("() => { pad.buttons[5].pressed = false; }")
+        page.check("#gamepad")
+        until(page, "document.querySelector('#pad').textContent.includes('hold a shoulder')")
+        assert page.locator("#pad b").count() == 0  # its name is text
+        page.wait_for_timeout(300)
+        assert joints() == stands
+        page.evaluate("() => { pad.buttons[5].pressed = true; }")
+        jogs()
+        until(page, f"{_AT} !== argument", stood)
+        page.evaluate("() => { pad.buttons[5].pressed = false; }")
+        jogs(ends=True)
+        assert joints()[1] < stands[1]  # forwards again
+        page.evaluate("() => { pad.buttons[5].pressed = true; }")
+        jogs()
+        page.evaluate("() => { pad.buttons[1].pressed = true; pad.buttons[5].pressed = false; }")
+        until(page, "document.querySelector('#arrived').textContent.startsWith('stopped')")
