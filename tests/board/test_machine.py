@@ -172,7 +172,7 @@ def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
     [
         (", driver: A4988", "", "has no driver"),
         ("axis: Y, ", "", "motor q2 has no axis"),
-        ("    max_accel: 120\n", "", "joints q1, q2, q3 have no max_accel"),
+        ("    max_accel: 120\n", "", "its joints have no max_accel"),
     ],
 )
 def test_what_is_missing_is_named(old: str, new: str, message: str) -> None:

@@ -67,8 +67,8 @@ def test_a_target_out_of_reach_is_exit_3_and_moves_nothing() -> None:
         ((THREE_DOF, *POSE, "--port", "sim", "--target", "1,2,3"), 2, "give one of them"),
         ((THREE_DOF, *POSE, "--port", "sim", "--branch", "left"), 2, "belong to --target"),
         ((THREE_DOF, *POSE, "--port", "sim", "--from", "0,0,0"), 2, "belongs to --dry-run"),
-        (("robots/planar_2dof.yaml", 10, 10, "--port", "/dev/null"), 2, "joints q1, q2 have no max_speed"),
-        (("robots/planar_2dof.yaml", 10, 10, "--dry-run"), 2, "joints q1, q2 have no max_speed"),
+        (("robots/planar_2dof.yaml", 10, 10, "--port", "/dev/null"), 2, "its joints have no max_speed"),
+        (("robots/planar_2dof.yaml", 10, 10, "--dry-run"), 2, "its joints have no max_speed"),
         (("robots/puma560.yaml", 0, 0, 0, 0, 0, 0, "--port", "/dev/null"), 2, "have no drive"),
     ],
 )

@@ -79,3 +79,10 @@ def test_teach_says_how_it_ends() -> None:
     os.kill(page.pid, signal.SIGINT)
     assert page.wait(timeout=60) == 130
     assert page.communicate() == ("", "")
+
+
+def test_a_target_of_another_length_names_what_phi_is_and_the_task_that_fits() -> None:
+    error = run("ik", "ra02", 100, 0, 200).err
+    assert "task xyz_pitch takes 4 numbers (x y z phi), got 3" in error
+    assert "phi is the tool's pitch" in error
+    assert "--task xyz takes x y z" in error

@@ -46,8 +46,8 @@ def message(error: ArmkinError) -> str:
     if not step:
         return error.message
     lines = error.message.count("\n") + 1
-    if error.fields.get("lines_to_add"):
-        return f"{error.message}\n{step}"
+    if error.fields.get("lines_to_add"):  # to a copy of a shipped robot: two lines, and `info` shows the others
+        return f"{error.message.partition('; add to ')[0]}\n{step}"
     return f"{error.message}{': ' if lines > 1 or isinstance(error, _ONE_LINE) else chr(10)}{step}"
 
 
@@ -64,7 +64,7 @@ def _incomplete(error: ArmkinError) -> str:
     name = error.fields.get("robot_file")
     if not error.fields.get("lines_to_add") or not name or shipped(name) is None or os.path.isfile(name):
         return error.advice
-    copy = f"{name} comes with armkin: add them to a copy, armkin export {name} --dh -o my_{name}.yaml"
+    copy = f"armkin info {name} shows lines to add, to a copy: armkin export {name} --dh -o my_{name}.yaml"
     return f"{copy}\nor rehearse with --accel 60, for example" if error.fields.get("option") == "--accel" else copy
 
 

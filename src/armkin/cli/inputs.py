@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
@@ -106,9 +107,31 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
 
 def target(arm: Arm, task: Task, words: Sequence[str] | None) -> list[float]:
     """The target's numbers [mm, deg], one word each."""
-    values = numbers(words or (), task.labels, f"task {task.name}")
+    try:
+        values = numbers(words or (), task.labels, f"task {task.name}")
+    except UsageError as error:
+        if "got" in error.fields:
+            error.message += _other_task(arm, task, error.fields["got"])
+        raise
     unit_notes.target(arm, task.labels, values)
     return values
+
+
+_MEANING = {"phi": "phi is the tool's pitch, the sum of the parallel joints' angles"}
+
+
+def _other_task(arm: Arm, task: Task, got: int) -> str:
+    """What a label means that is no coordinate, and the task that takes as many numbers as were given."""
+    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.task import LABELS
+
+    told = [words for label, words in _MEANING.items() if label in task.labels]
+    for name, labels in LABELS.items():
+        if len(labels) == got and name != task.name:
+            with suppress(UsageError):
+                told.append(f"--task {task_for(arm, name).name} takes {' '.join(labels)}")
+                break
+    return "".join(f"; {words}" for words in told)
 
 
 def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = None) -> list[float]:

@@ -27,7 +27,7 @@ def needs(arm: Arm) -> dict[str, list[str]]:
     >>> import armkin
     >>> found = needs(armkin.load("three_dof"))
     >>> found["send"], found["home"]
-    ([], ['joints q1, q2, q3 have no homing'])
+    ([], ['its joints have no homing'])
     """
     send = missing(arm)
     return {
@@ -60,9 +60,9 @@ def _without_rates(arm: Arm, board: bool) -> list[Lack]:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
         still = undriven(arm)
-        found.append((_have(still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
+        found.append((_have(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
     absent = missing_rates(arm)
-    found += [(_have(names, key), []) for key, names in absent.items()]
+    found += [(_have(arm, names, key), []) for key, names in absent.items()]
     if absent:
         found[-1] = (found[-1][0], rate_lines(arm))
     return found
@@ -130,7 +130,7 @@ def without_board(arm: Arm) -> list[Lack]:
 def _without_drives(arm: Arm) -> list[str]:
     still = undriven(arm)
     if still:
-        return [_have(still, "drive")]
+        return [_have(arm, still, "drive")]
     try:
         joints_per_pulse(arm)
     except UsageError as error:
@@ -142,10 +142,12 @@ def _without_homing(arm: Arm) -> list[str]:
     if arm.motors and all(motor.kind == "bus" for motor in arm.motors):
         return []  # bus servos know where they are
     bare = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
-    return [_have(bare, "homing")] if bare else []
+    return [_have(arm, bare, "homing")] if bare else []
 
 
-def _have(names: list[str], what: str) -> str:
+def _have(arm: Arm, names: list[str], what: str) -> str:
+    if len(names) == arm.n > 1:
+        return f"its joints have no {what}"
     return f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {what}"
 
 

@@ -16,9 +16,10 @@ _CAN = ("ik", "pulses", "simulate", "send", "home")
 def robots(json: Json = False, out: Out = None) -> None:
     """The robots that come with armkin, and what each can do.
 
-    Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run` and
-    `--port sim`. `armkin info ROBOT` says what is missing for the rest. compared: whether the geometry was held
-    against a maker's or another author's figure, or against the URDF alone that it comes from; --json says which.
+    Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run`, and
+    `--port sim` without assumptions. `armkin info ROBOT` says what is missing for the rest. compared: whether the
+    geometry was held against a maker's or another author's figure, or against the URDF alone that it comes from;
+    --json says which.
     """
     from armkin.robot_file import catalogue
 
