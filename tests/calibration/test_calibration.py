@@ -359,3 +359,13 @@ def test_poses_with_orientations_from_a_file(tmp_path: Path) -> None:
     answer = run("calibrate", "ur5e", csv, "--poses", "--json").json
     assert answer["after"]["rms_mm"] < 0.3
     assert any(entry["name"] == "tool yaw" for entry in answer["corrections"])
+
+
+def test_few_rows_state_no_deviations() -> None:
+    arm = armkin.load("three_dof")
+    for rows, stated in ((19, False), (20, True)):
+        q = np.random.default_rng(4).uniform(-1, 1, (rows, 3))
+        tips = armkin.fk(arm, q + np.array([0, 0.02, 0]))[:, :3, 3]
+        found = armkin.calibrate(arm, q, tips, fix=["base", "tool", "ratios", "lengths", "twists"])
+        assert found.corrections
+        assert all(np.isfinite(doubt) == stated for _, _, doubt, _ in found.corrections)

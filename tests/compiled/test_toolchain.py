@@ -152,3 +152,19 @@ def test_no_place_to_build_is_said(cache: Path, tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     with pytest.raises(armkin.FileError, match=r"no place to build the arm's code: .*TMPDIR"):
         toolchain.load(SOURCE, "abc")
+
+
+def test_a_compiler_that_takes_too_long_to_optimise_does_not(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "slow"
+    path.write_text('#!/bin/sh\ncase "$*" in *-O3*) exec sleep 600 ;; esac\nexec cc "$@"\n')
+    path.chmod(0o755)
+    monkeypatch.setenv("CC", str(path))
+    monkeypatch.setattr(toolchain, "LONGEST", 1.0)
+    said: list[str] = []
+    monkeypatch.setattr(toolchain, "announce", lambda: said.append("built"))
+    source = 'const char arm_content[] = "slow"; int half(int x) { return x / 2; }\n'
+    assert toolchain.load(source, "slow").half(84) == 42
+    assert toolchain.load(source, "slow").half(84) == 42, "kept, and not waited for again"
+    assert said == ["built"]

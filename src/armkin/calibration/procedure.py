@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 FLAGGED = 0.1  # a row of less weight is called wrong
+STATED = 20  # rows from which on standard deviations are stated: of 8 to 10 rows half lay within one, not 68 %
 HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
 
 # Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
@@ -42,7 +43,7 @@ class Calibration:
     after: Array  # (M,) [mm] the calibrated arm's error on each row, fitted without it
     flagged: NDArray[np.intp]  # rows that do not fit the others, from 0
     noise: float  # [mm] of a measured coordinate
-    corrections: list[tuple[str, float, float, str]]  # name, value, standard deviation, unit (mm, rad, 1)
+    corrections: list[tuple[str, float, float, str]]  # name, value, deviation (nan: few rows), unit (mm, rad, 1)
     unseen: list[str]  # corrections that the rows do not show; they stay with the file
     held: list[str]  # kinds that were not corrected
 
@@ -95,6 +96,8 @@ def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str]
     found = choice.fit
     new, tool = corrections.corrected(found.p)
     doubts = observability.doubts(corrections, found) if len(found.free) else np.zeros(0)
+    if len(data) < STATED:
+        doubts = np.full(len(doubts), np.nan)
     listed = [
         (corrections.parameters[k].name, float(found.p[k]), float(doubt), corrections.parameters[k].unit)
         for k, doubt in zip(found.free, doubts, strict=True)

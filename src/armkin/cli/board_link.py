@@ -61,6 +61,7 @@ Assume = Annotated[
     ),
 ]
 BAUD = 250_000
+_LONGEST_NOTE = 10_000  # bytes
 SIM = "sim"
 AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
@@ -93,13 +94,26 @@ def backend(
     if port == SIM:
         output.note(simulated)
     with stoppable() as stop, open_board(board, port, baud=baud, stop=stop, reset=reset) as one:
-        for difference in one.differences if port != SIM else ():
-            output.note(difference)
+        if port != SIM:
+            _once_a_day(port, one.differences)
         try:
             yield one
         except StoppedError:
             output.warn(f"stopped: {one.standing()}{_goes_on(one)}")
             raise
+
+
+def _once_a_day(port: str, words: Sequence[str]) -> None:
+    """What a kind of board cannot promise: told on a port's first use of a day."""
+    from datetime import date
+
+    from armkin.board.ports import note_path, read_note, write_note
+
+    path, today = f"{note_path(port)}.told", {"day": date.today().isoformat(), "words": list(words)}
+    if words and read_note(path, _LONGEST_NOTE) != today:
+        for word in words:
+            output.note(word)
+        write_note(path, today)
 
 
 def _goes_on(machine: Backend) -> str:

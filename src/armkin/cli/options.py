@@ -1,5 +1,6 @@
 """Arguments and options that several commands share: same name, same meaning, same help."""
 
+import sys
 from typing import Annotated
 
 import typer
@@ -62,9 +63,25 @@ Cluster = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="Share the work on a Dask cluster: tcp://HOST:8786."),
 ]
+
+
+def _built(wanted: bool) -> bool:
+    """Say on a terminal that something is built, which takes seconds the first time."""
+    if wanted and sys.stderr is not None and sys.stderr.isatty():
+        from armkin.cli import output
+        from armkin.compiled import toolchain
+
+        toolchain.announce = lambda: output.note("compiling for this computer, once for each arm: some seconds")
+    return wanted
+
+
 Compiled = Annotated[
     bool,
-    typer.Option("--compiled", help="By machine code that this computer's C compiler builds: for batches."),
+    typer.Option(
+        "--compiled",
+        callback=_built,
+        help="By machine code that this computer's C compiler builds: for batches.",
+    ),
 ]
 Workers = Annotated[
     int,

@@ -16,6 +16,7 @@ import shlex
 import shutil
 import stat
 import subprocess
+import sys
 import tempfile
 from contextlib import suppress
 from functools import cache
@@ -27,6 +28,14 @@ from armkin.errors import FileError, MissingExtraError
 # set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
 FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
+LONGEST = 60.0  # [s] that optimising may take; three_dof takes 2, an arm by elimination 8
+
+
+_CACHES = {"win32": "AppData/Local", "darwin": "Library/Caches"}  # of a user, where it is not ~/.cache
+
+
+def announce() -> None:
+    """A library is built now: the command line puts its own words here."""
 
 
 def compiler() -> list[str]:
@@ -59,18 +68,21 @@ def _words(wanted: str) -> list[str]:
 def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """A C file as a loaded library: from the cache, or built now.
 
-    content: what the library must hold as `arm_content`; level: of optimisation. Raises MissingExtraError
-    without a compiler, or if it fails; FileError where there is no place to build.
+    content: what the library must hold as `arm_content`; level: of optimisation, or none where that takes the
+    compiler longer than LONGEST. Raises MissingExtraError without a compiler, or if it fails; FileError where there is
+    no place to build.
     """
-    command = [*compiler(), f"-O{level}", *FLAGS]
-    key = "\0".join([source, *command, _version(command[0]), _processor()])
-    name = hashlib.sha256(key.encode()).hexdigest()
-    folder = _folder()
-    if folder is not None and (found := _kept(folder, name, content)) is not None:
-        return found
+    folder, commands = _folder(), {}
+    for way in dict.fromkeys((level, 0)):
+        command = [*compiler(), f"-O{way}", *FLAGS]
+        key = "\0".join([source, *command, _version(command[0]), _processor()])
+        commands[name := hashlib.sha256(key.encode()).hexdigest()] = command
+        if folder is not None and (found := _kept(folder, name, content)) is not None:
+            return found
+    announce()
     try:
         with tempfile.TemporaryDirectory(prefix="armkin-") as own:
-            built = _build(command, source, Path(own))
+            built, name = _build(commands, source, Path(own))
             if folder is not None:
                 _keep(built, folder, name)
                 if (found := _kept(folder, name, content)) is not None:
@@ -82,25 +94,34 @@ def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
         ) from None
 
 
-def _build(command: list[str], source: str, folder: Path) -> Path:
-    """Compile in a folder of one's own; returns the library."""
+def _build(commands: dict[str, list[str]], source: str, folder: Path) -> tuple[Path, str]:
+    """Compile in a folder of one's own, by the first command that ends in time; the library and that command's name."""
     (folder / "arm.c").write_text(source, encoding="utf-8")
-    done = _run([*command, "arm.c", "-o", "arm.so", "-lm"], folder)
+    for name, command in commands.items():
+        done = _run([*command, "arm.c", "-o", "arm.so", "-lm"], folder, LONGEST if name != [*commands][-1] else None)
+        if done is not None:
+            break
     library = folder / "arm.so"
-    if done.returncode or not library.is_file():
-        lines = done.stderr.splitlines()
-        said = next((line for line in lines if "error" in line), done.stderr.strip()[:200])
+    if done is None or done.returncode or not library.is_file():
+        lines = [] if done is None else done.stderr.splitlines()
+        said = next((line for line in lines if "error" in line), "\n".join(lines).strip()[:200])
         raise MissingExtraError(
             f"the C compiler {command[0]} failed: {said or 'it wrote no library'}\n"
             "it needs the C library's headers (Debian, Ubuntu: apt install gcc libc6-dev)"
         )
-    return library
+    return library, name
 
 
-def _run(words: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the compiler. Raises MissingExtraError if it is no program."""
+def _run(
+    words: list[str], folder: Path | None = None, seconds: float | None = None
+) -> subprocess.CompletedProcess[str] | None:
+    """Run the compiler; None if it does not end in time. Raises MissingExtraError if it is no program."""
     try:
-        return subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+        return subprocess.run(
+            words, cwd=folder, capture_output=True, text=True, errors="replace", check=False, timeout=seconds
+        )
+    except subprocess.TimeoutExpired:
+        return None
     except OSError as error:
         raise MissingExtraError(f"the C compiler {words[0]} cannot be run: {error.strerror or error}") from None
 
@@ -127,7 +148,7 @@ def _digest(held: bytes) -> str:
 def _folder() -> Path | None:
     """The cache folder, made if need be; None if it is not this user's alone."""
     home = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(home) if os.path.isabs(home) else Path.home() / ".cache"
+    base = Path(home) if os.path.isabs(home) else Path.home() / _CACHES.get(sys.platform, ".cache")
     folder = base / "armkin" / "compiled"
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -143,6 +164,8 @@ def _folder() -> Path | None:
 def _is_ours(path: Path, alone: bool = True) -> bool:
     """Whether a file or folder is no link, belongs to this user (or, not `alone`, to root), and others cannot write."""
     status = os.lstat(path) if alone else os.stat(path)
+    if sys.platform == "win32":  # a user's own folders are closed to others
+        return not stat.S_ISLNK(status.st_mode)
     owner = status.st_uid == os.geteuid() or (not alone and status.st_uid == 0)
     return owner and not stat.S_ISLNK(status.st_mode) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
@@ -165,7 +188,8 @@ def _kept(folder: Path, name: str, content: str) -> ctypes.CDLL | None:
 
 @cache
 def _version(path: str) -> str:
-    return _run([path, "--version"]).stdout
+    done = _run([path, "--version"], seconds=LONGEST)
+    return "" if done is None else done.stdout
 
 
 @cache

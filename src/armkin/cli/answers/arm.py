@@ -361,7 +361,7 @@ class Correction(TypedDict):
 
     name: str
     value: float
-    deviation: Annotated[float, "standard deviation"]
+    deviation: Annotated[float | None, "standard deviation; null where fewer than 20 rows were measured"]
     unit: str
 
 

@@ -116,7 +116,8 @@ def _answer(arm: Arm, found: Calibration, numbers: list[int], out: str | None) -
     corrections = []
     for name, value, doubt, unit in found.corrections:
         shown, size = _UNITS[unit]
-        corrections.append({"name": name, "value": value * size, "deviation": doubt * size, "unit": shown})
+        stated = None if np.isnan(doubt) else doubt * size
+        corrections.append({"name": name, "value": value * size, "deviation": stated, "unit": shown})
     return {
         **render.head(arm),
         "rows": len(found.before),
@@ -148,9 +149,11 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
     if answer["corrections"]:
         table = [["correction", "value", "+-", ""]]
         for entry in answer["corrections"]:
-            numbers = (render.fixed(entry[key], 3) for key in ("value", "deviation"))
+            numbers = ("?" if entry[key] is None else render.fixed(entry[key], 3) for key in ("value", "deviation"))
             table.append([entry["name"], *numbers, entry["unit"]])
         lines += [render.table(table, (0, 3)), ""]
+        if answer["corrections"][0]["deviation"] is None:
+            lines.append("+- is not stated from fewer than 20 rows")
     if flagged := answer["flagged"]:
         said = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
         lines.append(render.wrapped(said, "forgotten rows: ", " " * 16))
