@@ -142,6 +142,29 @@ def test_folds_far_apart() -> None:
     assert not report.lost.any()
 
 
+@pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_four_roots_of_three_joints_are_all(off: float) -> None:
+    """Seeds and Newton steps in straight-line code: `complete` where four are there, by the quartic's degree."""
+    arm, screw = moved(armkin.load("three_dof"), off, 5)
+    case_joints = random_joints(screw, 2000, 5)
+    report = examine(arm, screw, "xyz", case_joints)
+    found = report.solutions
+    assert not report.lost.any()
+    assert report.duplicates == 0
+    four = found.valid.sum(axis=1) == 4
+    assert four.mean() > 0.94
+    assert found.complete[four].mean() > 0.999  # but where two of them all but meet
+    assert found.complete.mean() >= 0.99 - (0.05 if off > 1e-3 else 0.0)
+    compiled = armkin.compile(arm).ik(found.target)
+    assert (compiled.valid == found.valid).all()
+    assert (compiled.complete == found.complete).all()
+    near = np.isclose(compiled.q, found.q, atol=1e-7, rtol=0.0) | ~found.valid[..., None]
+    assert near.mean() > 0.999
+    k = np.flatnonzero(four)[0]
+    alone = armkin.ik(arm, found.target[k])
+    assert np.allclose(alone.q[alone.valid], found.q[k][found.valid[k]], atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["planar RR", "SCARA, P at 1", "pitch arm, 5 joints", "UR table"])
 def test_no_target_at_all(name: str) -> None:
     case = random_case(name, 1)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armkin.formula.recording import BOOLEAN, Node, Recording, axes_of
+from armkin.formula.recording import BOOLEAN, FLIPS, Node, Recording, axes_of, flipped
 
 # Operations on single numbers; the functions in capitals are macros of the file that the lines go to.
 _C = {
@@ -196,6 +196,12 @@ def write(recording: Recording, inputs: list[str], language: Language = C) -> Co
         return writer.constant(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
 
     for node in recording.nodes:
+        if node.op in FLIPS:
+            before = node.args[0]
+            values[id(node)] = {
+                index: value(before, flipped(node.op, index, node.axes)) for index in np.ndindex(*node.axes)
+            }
+            continue
         values[id(node)] = {
             index: writer.apply(node.op, [value(x, index) for x in node.args]) for index in np.ndindex(*node.axes)
         }

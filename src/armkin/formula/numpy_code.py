@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.python_code import function_of
-from armkin.formula.recording import BOOLEAN, Node, Recording, axes_of, branch_signs
+from armkin.formula.recording import BOOLEAN, FLIPS, Node, Recording, axes_of, branch_signs
 
 Run = Callable[..., tuple[Any, ...]]
 Place = tuple[int | slice, ...]
@@ -71,21 +72,28 @@ def write(recording: Recording) -> tuple[Run, list[Buffer]]:
             buffers.append(Buffer(*kinds[id(x)], int(whole[1:]), place))
         return parts[whole, str(place)]
 
+    def release(nodes: list[Node]) -> None:
+        """Buffers that are free again."""
+        for x in nodes:
+            free.setdefault(kinds[id(x)], []).append(names[id(x)])
+
     for k, node in enumerate(recording.nodes):
         if id(node) in both_signs:
             continue
         term = _term(node)
         signed = term if id(term) in both_signs else None
         arguments = [name(x) for x in node.args] if signed is None else []
-        for x in {id(x): x for x in reads[id(node)]}.values():
-            if x.op != "input" and last[id(x)] == k:
-                free.setdefault(kinds[id(x)], []).append(names[id(x)])
+        over = [x for x in {id(x): x for x in reads[id(node)]}.values() if x.op != "input" and last[id(x)] == k]
+        if node.op not in FLIPS:  # a flip must not write where it reads
+            release(over)
         kind = kinds[id(node)] = (node.axes, bool if node.op in BOOLEAN else float)
         if free.get(kind):
             names[id(node)] = free[kind].pop()
         else:
             names[id(node)] = f"b{len(buffers)}"
             buffers.append(Buffer(*kind))
+        if node.op in FLIPS:
+            release(over)
         if signed is None:
             # numpy deprecates a positional third argument of minimum and maximum
             out = "out=" if node.op in ("minimum", "maximum") else ""
@@ -104,7 +112,8 @@ def write(recording: Recording) -> tuple[Run, list[Buffer]]:
     parameters = [names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers))]
     outputs = list(map(name, recording.outputs))
     scope = {**constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
-    scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op != "where"}
+    scope |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
+    scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in scope}
     return function_of(parameters, lines, outputs, scope), buffers
 
 
@@ -119,6 +128,11 @@ def _both_signs(recording: Recording) -> set[int]:
     terms = {id(x) for node in recording.nodes if (x := _term(node)) is not None and node.args[0] is not node.args[1]}
     asked = {id(x) for node in recording.nodes for x in node.args if x is not _term(node)}
     return terms - asked - {id(x) for x in recording.outputs}
+
+
+def _flip(axis: int, a: Any, out: NDArray[Any]) -> None:
+    """`numpy.flip` into a buffer that is not that of a."""
+    np.copyto(out, np.flip(a, axis))
 
 
 def _where(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:

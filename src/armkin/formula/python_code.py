@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from armkin.formula.recording import Node, Recording, axes_of
+from armkin.formula.recording import FLIPS, Node, Recording, axes_of, flipped
 
 # Operations on single numbers.
 _PYTHON = {
@@ -60,6 +60,9 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     minus: dict[Value | str, Value | str] = {}  # negated values
     for node in recording.nodes:
         for index in np.ndindex(*node.axes):
+            if node.op in FLIPS:
+                same[id(node), index] = value(node.args[0], flipped(node.op, index, node.axes))
+                continue
             op, args = node.op, [value(x, index) for x in node.args]
             if op == "multiply" and "1.0" in args:  # a sign of branches
                 same[id(node), index] = args[1 - args.index("1.0")]

@@ -21,6 +21,19 @@ ODD = {"arctan2", "rint", "tan", "cbrt"}  # functions whose sign is that of thei
 COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
 
 
+FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # the same values, of the other branch
+
+
+def flipped(op: str, index: tuple[int, ...], axes: tuple[int, ...]) -> tuple[int, ...]:
+    """Where the value that stands on a branch after a flip stood before it.
+
+    >>> flipped("flip_1", (0, 0, 0), (2, 2, 1))
+    (0, 1, 0)
+    """
+    axis = FLIPS[op]
+    return (*index[:axis], axes[axis] - 1 - index[axis], *index[axis + 1 :])
+
+
 Sign = Any  # 1.0, -1.0 or an array of them on branch axes
 
 
@@ -42,6 +55,9 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
     def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
         if function is np.any:
             return True  # what is not known yet may be true of some pose
+        if function is np.flip:  # of a branch axis: what stands on the other branch
+            x, axis = inputs
+            return x if axis >= len(x.axes) or x.axes[axis] == 1 else self.trace.record(f"flip_{axis}", (x,))
         if function is not np.where or len(inputs) != 3:
             raise TypeError(f"{function.__name__} cannot be recorded")
         return self.trace.record("where", inputs)

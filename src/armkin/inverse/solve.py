@@ -18,7 +18,7 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
-from armkin.inverse.answers.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers.batch import Batch, Goals, empty, pack, replaced
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -107,7 +107,7 @@ def ik(
     each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count, target, shown = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
+        out, count, target, shown = _closed(arm, definition, geometry, given, each, one, examine, workers)
     else:
         target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
@@ -153,6 +153,22 @@ def _commanded(arm: Arm, found: Solutions) -> Solutions:
     """Solutions in actual joint values as those in commanded ones."""
     q, near = found.q / arm.ratio, found.near / arm.ratio
     return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
+
+
+def _closed(
+    arm: Arm, task: Task, geometry: Geometry, given: Array, near: Array, one: Array | None, examine: bool, workers: int
+) -> tuple[Batch, int, Array, Array]:
+    """Closed forms, as `chunks.solve`; what they leave in doubt is solved the other way that they name."""
+    out, count, target, shown, left = chunks.solve(arm, task, geometry, given, near, one, examine, workers)
+    if len(left):
+        assert geometry.doubts is not None
+        some, close = target[left], near[left]
+        if geometry.doubts.pairs:
+            rest = _closed(arm, task, geometry.doubts, some, close, None, examine, workers)[0]
+        else:
+            rest = _rows(arm, task, geometry.doubts, some, close, examine, workers)[0]
+        out = replaced(out, left, rest)
+    return out, count, target, shown
 
 
 def _rows(

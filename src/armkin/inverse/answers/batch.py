@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,16 @@ def wider(out: Batch, width: int) -> Batch:
     wide.status[...], wide.free[...], wide.complete[...] = out.status, out.free, out.complete
     wide.q[:, B:], wide.valid[:, B:], wide.within[:, B:], wide.branch[:, B:] = np.nan, False, False, -1
     return wide
+
+
+def replaced(out: Batch, rows: NDArray[np.intp], by: Batch) -> Batch:
+    """The same with other results for some rows, in as many columns as both need."""
+    width = max(out.q.shape[1], by.q.shape[1])
+    out, by = (one if one.q.shape[1] == width else wider(one, width) for one in (out, by))
+    arrays: tuple[NDArray[Any], ...] = out
+    for array, some in zip(arrays, by, strict=True):
+        array[rows] = some
+    return out
 
 
 def pack(part: Batch, count: NDArray[np.integer]) -> None:

@@ -14,5 +14,6 @@ elbow.py           joints 2 and 3 (and 4) parallel: positions, with pitch, with 
 three_joints.py    any three joints that place a point: the quartic
 spherical.py       three axes that meet in a point, at the wrist or at the shoulder
 three_parallel.py  three parallel axes: the UR arms
+newton_steps.py    arms that miss one of these a little: its roots as seeds
 anywhere.py        three axes that are parallel or meet, anywhere in the arm
 """

@@ -45,4 +45,5 @@ class Geometry:
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
     elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do
     ends: tuple[int, ...] = ()  # of `pairs`: joints that, where they are free, may leave others few solutions or more
+    doubts: Geometry | None = None  # of `pairs`: a slower way for the targets that are in doubt
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

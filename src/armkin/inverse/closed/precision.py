@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
-from armkin.inverse.numeric.tolerances import FREE, NEARLY_FREE, ONE_ROOT, SHARP, TANGENT
+from armkin.inverse.numeric.tolerances import FREE, NEARBY, NEARLY_FREE, ONE_ROOT, SHARP, TANGENT
 
 
 class Precision(NamedTuple):
@@ -22,11 +22,12 @@ class Precision(NamedTuple):
     one_root: float
     free: float
     nearly_free: float
+    nearby: float  # squared residual up to which a branch may be one
 
 
 ULPS = 128 * 2.0**-23  # of a float: a pose of six joints is off by ten to a hundred
-DOUBLE = Precision(TANGENT, SHARP, ONE_ROOT, FREE, NEARLY_FREE)
-SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2)
+DOUBLE = Precision(TANGENT, SHARP, ONE_ROOT, FREE, NEARLY_FREE, NEARBY**2)
+SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)
 
 _current = ContextVar("precision", default=DOUBLE)
 

@@ -38,7 +38,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import EXACT, NEAR, NO_COEFFICIENT, NO_LENGTH, NO_SIZE, TINY
+from armkin.inverse.numeric.tolerances import EXACT, NEAR, NEARLY_SPECIAL, NO_COEFFICIENT, NO_LENGTH, NO_SIZE, TINY
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
@@ -51,11 +51,11 @@ if TYPE_CHECKING:
 class Position:
     """``link[0] Z1 link[1] Z2 link[2] Z3 tip``, three joints, revolute or prismatic, any geometry."""
 
-    def __init__(self, chain: Chain, tip: Array, tolerance: float = EXACT) -> None:
+    def __init__(self, chain: Chain, tip: Array, tolerance: float = EXACT, near: float = NEAR) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm].
 
         tolerance: what still counts as a special case. `close` says that the arm is farther from one than that,
-        but so near that its branches lie too close together for the general case's equations.
+        but, by less than `near`, so near that its branches lie too close together for the general case's equations.
 
         Raises UsageError if the three joints cannot place a point in space.
         """
@@ -75,7 +75,7 @@ class Position:
         self.square = _form(self.Y)  # |y|^2
         self.rows, self.rest, self.forms = self._equations(L1)
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
-        self.tolerance = tolerance
+        self.tolerance, self.near = tolerance, near
         self.close = False
         self.why = self._split()
 
@@ -108,7 +108,7 @@ class Position:
 
     def _is_regular(self, off: float) -> bool:
         """Whether the general equations serve, off being how far the arm is from a special case."""
-        self.close = self.tolerance < off <= NEAR
+        self.close = self.tolerance < off <= self.near
         return off > self.tolerance
 
     def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
@@ -276,13 +276,13 @@ def _form(rows: Array) -> Array:
     return np.asarray(rows.T @ rows)
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
-    """Any three joints that place a point."""
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT, near: float = NEARLY_SPECIAL) -> Geometry | None:
+    """Any three joints that place a point; none that is nearer than `near` to a special case but not one."""
     if task.name != "xyz" or arm.n != 3:
         return None
     if rank(arm, task) < 3:
         raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
-    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance)
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, near)
     if position.close and tolerance == EXACT:
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)

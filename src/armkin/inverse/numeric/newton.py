@@ -101,7 +101,7 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
     that there is none, by its Frobenius norm, it gives the step at an eighth of the cost.
     """
     step, weak = np.empty((len(J), J.shape[2])), np.ones(len(J), bool)
-    if J.shape[1] == J.shape[2] > 3:
+    if J.shape[1] == J.shape[2] > 2:
         inverse = nudged(np.linalg.inv, J)
         with np.errstate(over="ignore"):
             weak = ~(least * np.sqrt((inverse * inverse).sum(axis=(1, 2))) < 1.0)

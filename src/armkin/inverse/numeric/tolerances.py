@@ -46,12 +46,16 @@ TOUCHING = 1e-4  # complex roots this close to the real line may be a double roo
 # ---- classes of arms
 EXACT = 1e-12  # axes parallel or meeting to this count as exactly so
 NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.solvers.nearly_special`
+NEARLY_SPECIAL = 0.015  # the same where the roots of three joints are counted: seeds lead to nearly all of them
 STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
 
 # ---- numeric elimination, lengths in the closed loop's own unit
 ELIMINATED = 1e-10  # residual of an answer
 GRAZING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
+APART_ROOTS = 1e-3  # [rad, reaches] roots that seeds lead to are surely two if they are farther apart
+NO_DETERMINANT = 1e-30  # square of a determinant [reaches a radian] that no step is divided by
+LAST_ERROR = 1e-13  # of Newton's last step
 ALIKE = 1e-6  # answers closer than this are one
 EXAMINED = 1e-2  # answers closer than this are examined
 HALFWAY = 1e-13  # residual of a point halfway between two answers that makes them one

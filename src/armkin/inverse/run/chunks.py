@@ -29,12 +29,16 @@ if TYPE_CHECKING:
 
 
 class Solved(NamedTuple):
-    """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`."""
+    """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`.
+
+    left: targets on an edge, of a class that has another way for them.
+    """
 
     out: Batch
     columns: int
     target: Array
     rounding: Array
+    left: NDArray[np.intp]
 
 
 def solve(
@@ -56,10 +60,11 @@ def solve(
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
 
-    def part(rows: slice) -> list[Doubts]:
-        """Some rows, by a thread of its own; returns the targets on an edge."""
+    def part(rows: slice) -> tuple[list[Doubts], list[NDArray[np.intp]]]:
+        """Some rows, by a thread of its own; returns the targets on an edge, as doubts or as rows."""
         workspace: list[NDArray[Any]] = []
         doubts: list[Doubts] = []
+        left: list[NDArray[np.intp]] = []
         for start in range(rows.start, rows.stop, arrays.CHUNK):
             some = slice(start, min(start + arrays.CHUNK, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
@@ -73,16 +78,20 @@ def solve(
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
             edge = _keep(goals, runner.axes, out.part(some), found, close, there)
-            if examine and len(edge):
+            if geometry.doubts is not None:
+                left.append(start + edge)
+            elif examine and len(edge):
                 doubts.append(as_doubts(runner, found, start + edge, edge))
-        return doubts
+        return doubts, left
 
     parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
-    doubts = [doubt for one_part in parts for doubt in one_part]
+    doubts = [doubt for one_part, _ in parts for doubt in one_part]
+    left = [rows for _, one_part in parts for rows in one_part]
+    out.complete[...] = geometry.complete
     if doubts:
         together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
         out = decided(Goals(arm, task, target, near), runner, out, together)
-    return Solved(out, math.prod(runner.axes), target, rounding)
+    return Solved(out, math.prod(runner.axes), target, rounding, np.concatenate([np.empty(0, np.intp), *left]))
 
 
 def _candidates(

@@ -57,6 +57,7 @@ class OneTarget:
 
     def __init__(self, arm: Arm, task: str | None) -> None:
         definition, geometry = solver(arm, task)
+        self._complete = geometry.complete
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
         runner = recorded(arm, definition, geometry)
@@ -157,7 +158,7 @@ class OneTarget:
         block = np.array([
             *[True] * count, *[False] * none, *within, *[False] * none,
             *(there if self._ordered else range(count)), *[-1] * none,
-            *[False] * n, Status.EXACT if count else Status.UNREACHABLE, True,
+            *[False] * n, Status.EXACT if count else Status.UNREACHABLE, self._complete,
         ], np.int8)  # fmt: skip
         flags = block.view(np.bool_)
         end = 3 * B + n

@@ -12,6 +12,7 @@ passes settle shows, six joints go straight to it, and the similar arm only name
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,7 +21,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
-from armkin.inverse.closed import elbow, planar, spherical, three_joints, three_parallel
+from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
@@ -32,6 +33,7 @@ from armkin.inverse.numeric.tolerances import (
     BLURRED,
     HOPELESS,
     NEAR,
+    NEARLY_SPECIAL,
     ROUNDED_ANSWER,
     SOLUTION,
     STEADY,
@@ -61,11 +63,12 @@ class _Corrected(NamedTuple):
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes moved by `NEAR`, or `NEARLY_PARALLEL` if nothing else fits."""
+    """Arms that a closed form would fit if their axes moved by `NEAR`, or by more if nothing else fits."""
     if task.orientation == "axis":
         return None  # see `armkin.inverse.solvers.tool_axis`
-    wide, narrow = (planar, elbow), (three_joints, spherical, three_parallel)
-    classes = [*((module, NEARLY_PARALLEL) for module in wide), *((module, NEAR) for module in narrow)]
+    wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
+    limit = NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
+    classes = [*((module, limit) for module in wide), *((module, NEAR) for module in narrow)]
     found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
     if not found:
         return None
@@ -85,19 +88,20 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         q = np.full((len(target), width, arm.n), np.nan)
         for k, (part, _) in zip(starts, parts, strict=True):
             q[k : k + len(part), : part.shape[1]] = part
-        return Rows(q, np.concatenate([doubt for _, doubt in parts]), np.zeros(len(target), bool))
+        doubt = np.concatenate([doubt for _, doubt in parts])
+        complete = newton_steps.four(q) if counted else np.zeros(len(target), bool)
+        return Rows(q, doubt & ~complete, complete)  # four roots apart are simple ones
 
+    steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
+    corrected, counted = steps or (None, False)
     sizes = [2 if label else 1 for label in alike.labels]
+    named = {"labels": alike.labels, "ordered": alike.ordered}
     why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
-    return Geometry(
-        f"near {alike.name}",
-        why,
-        False,
-        rows=rows,
-        labels=alike.labels,
-        ordered=alike.ordered,
-        branches=int(np.prod(sizes)) if sizes else None,
-    )
+    slow = Geometry(f"near {alike.name}", why, False, rows=rows, branches=math.prod(sizes) if sizes else None, **named)
+    if corrected is None:
+        return slow
+    quartic = three_joints.recognise(arm, task, near=NEAR)
+    return Geometry(slow.name, why, counted, corrected, doubts=quartic or slow, **named)
 
 
 def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
@@ -211,7 +215,7 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
     some = np.flatnonzero(newton.missing(arm, task, flat, goals) < HOPELESS)
     size = np.full(len(flat), np.inf)
-    flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20)
+    flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20, patience=4)
     flat[size > SOLUTION] = np.nan
     q = _packed(flat.reshape(N, B, n), own)
     with np.errstate(invalid="ignore"):

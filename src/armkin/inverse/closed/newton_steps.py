@@ -1,0 +1,183 @@
+"""Arms that miss a class by a little, in straight-line code: the class's roots as seeds, Newton steps on the arm.
+
+Four roots are all that three turning joints have for a point, whatever their axes (Pieper, The Kinematics of
+Manipulators under Computer Control, 1968, gives the quartic): where four seeds lead to four roots, none is missing.
+What the seeds leave open is a doubt, for which other ways are taken.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Bool, Entry
+from armkin.inverse.closed.elbow import together
+from armkin.inverse.closed.precision import precision
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
+from armkin.inverse.numeric.tolerances import APART_ROOTS, LAST_ERROR, NO_DETERMINANT
+from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from armkin.model.arm import Arm
+
+MOST = 5  # steps
+SLOPE = 48.0  # error of the first step per distance from the class, where the arm is not near a singularity
+SENSES = {-1.0, 0.0, 1.0}  # of a joint in a sum
+ABSENT = 90.0  # squared residual of a root that is not real, in distances from the class: 9 on each side of it
+
+
+class NewtonSteps:
+    """Newton's method for an arm whose task is a point, with or without sums of joint values.
+
+    The sums are linear: the last joints follow from the first ones, whose equations are those of the point alone.
+    """
+
+    def __init__(self, arm: Arm, task: Task, off: float) -> None:
+        """off: how far the arm is from the class whose roots are the seeds, lengths in units of the reach."""
+        self.arm, self.size = arm, task.position  # equations and unknowns: 2 or 3
+        self.link = [pose.constant(L) for L in arm.link]
+        self.unit = [float(v) for v in radian_or_reach(arm)]
+        own, rest = task.sums[:, : self.size], task.sums[:, self.size :]
+        follow = -np.linalg.solve(rest, own) if len(task.sums) else np.zeros((0, self.size))
+        self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
+        error = min(SLOPE * off, 0.5)  # its square after a step, and so on
+        self.steps = min(max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1), MOST)
+        self.absent = math.inf if arm.prismatic.any() else ABSENT * off  # far out on a slide a turn tells more
+        self.counted = task.name == "xyz" and not arm.prismatic.any()
+
+    def corrected(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
+        """Seeds moved onto the arm, and which of them are in doubt.
+
+        Where the roots are counted, all four must be there, each apart from the others; else those that may be real.
+        """
+        pairs, where, first = seeds.pairs, goal[: self.size], None
+        for _ in range(self.steps):
+            missing, columns = self._linear(pairs, where)
+            adjugate, det = _adjugate(columns)
+            inverse = det / (det * det + NO_DETERMINANT)
+            pairs = self._moved(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
+            first = missing if first is None else first
+        assert first is not None
+        miss = arrays.dot(missing := self._linear(pairs, where)[0], missing)
+        there = miss < precision().nearby
+        doubt = seeds.doubt | (_merged(pairs, self.unit) & there)
+        if self.counted:
+            return Candidates(pairs, doubt | (miss >= precision().nearby), miss)
+        return Candidates(
+            pairs, doubt | ((miss >= precision().nearby) & (arrays.dot(first, first) < self.absent)), miss
+        )
+
+    def _linear(self, pairs: list[Pair], where: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
+        """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
+
+        All is carried from the tool back to the base; in joint i's own frame its slope is ``z x p``.
+        """
+        p = self.link[-1][9:12]
+        slopes: list[list[Entry]] = []
+        for i in range(self.arm.n - 1, -1, -1):
+            c, s = pairs[i]
+            if s is None:
+                p, slope = [p[0], p[1], arrays.add(p[2], c)], [0.0, 0.0, self.unit[i]]
+            else:
+                p, slopes = spin(c, s, p), [spin(c, s, v) for v in slopes]
+                slope = [arrays.mul(-1.0, p[1]), p[0], 0.0]
+            slopes = [pose.turn(self.link[i], v) for v in [slope, *slopes]]
+            p = pose.apply(self.link[i], p)
+        scale = 1.0 / self.arm.reach
+        columns = []
+        for j in range(self.size):
+            column = slopes[j]
+            for k, row in enumerate(self.follow):
+                column = arrays.combine(1.0, column, row[j], slopes[self.size + k])
+            columns.append([arrays.mul(scale, v) for v in column[: self.size]])
+        return [arrays.mul(scale, arrays.sub(w, v)) for w, v in zip(where, p, strict=False)], columns
+
+    def _moved(self, pairs: list[Pair], step: list[Entry]) -> list[Pair]:
+        """Joints after a step of the first ones [rad, reaches]; the others turn by as much, so that their sums stay.
+
+        A turn by ``2 atan(t / 2)`` instead of t needs no sine; the difference is of the third power.
+        """
+        turns = []
+        for t in step:
+            half = 0.5 * t
+            square = half * half
+            scale = 1.0 / (1.0 + square)
+            turns.append(Pair((1.0 - square) * scale, (half + half) * scale))
+        out = []
+        for i, (c, s) in enumerate(pairs):
+            if s is None:
+                out.append(Pair(arrays.add(c, arrays.mul(self.unit[i], step[i])), None))
+                continue
+            turned = Pair(c, s)
+            for k, turn in enumerate(turns):
+                sense = float(k == i) if i < self.size else self.follow[i - self.size][k]
+                if sense:
+                    turned = together(turned, turn, sense)
+            out.append(turned)
+        return out
+
+
+def steps(
+    arm: Arm, task: Task, off: float, seeds: Callable[[list[Entry], Prefer], Candidates]
+) -> tuple[Callable[[list[Entry], Prefer], Candidates], bool] | None:
+    """A closed form of an arm that misses a class by `off`, and whether it counts all roots; None where it has none.
+
+    seeds: the closed form of the class.
+    """
+    if task.orientation != "none" or len(task.sums) != arm.n - task.position:
+        return None
+    rest = task.sums[:, task.position :]
+    if len(rest) and (abs(np.linalg.det(rest)) < 0.5 or not set(np.unique(np.linalg.solve(rest, task.sums))) <= SENSES):
+        return None  # sums without the last joints, or of parts of turns
+    newton = NewtonSteps(arm, task, off)
+    return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
+
+
+def four(q: Array) -> Bool:
+    """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
+    angle = np.exp(1j * q)
+    with np.errstate(invalid="ignore"):
+        near = np.abs(angle[:, :, None] - angle[:, None]).max(axis=3) < APART_ROOTS
+    there = ~np.isnan(q[:, :, 0])
+    return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
+
+
+def _merged(pairs: list[Pair], unit: list[float]) -> Entry:
+    """Whether a branch is one with another, on any of the branch axes."""
+    merged: Entry = False
+    for axes in ((0,), (1,), (0, 1)):
+        away: Entry = 0.0
+        for (c, s), size in zip(pairs, unit, strict=True):
+            for v, scale in ((c, 1.0 / size), (s, 1.0)):
+                if v is not None:
+                    other = v
+                    for axis in axes:
+                        other = _other(other, axis)
+                    if other is not v:
+                        d = arrays.mul(scale, v - other)
+                        away = arrays.add(away, d * d)
+        if not isinstance(away, float):
+            merged = merged | (away < APART_ROOTS**2)
+    return merged
+
+
+def _other(v: Entry, axis: int) -> Entry:
+    """What stands on the other branch of an axis; the value itself if it is one for both."""
+    return v if isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4) else np.flip(v, axis)
+
+
+def _adjugate(columns: list[list[Entry]]) -> tuple[list[list[Entry]], Entry]:
+    """The adjugate of a matrix of two or three columns, by rows, and its determinant."""
+    if len(columns) == 2:
+        (a, b), (c, d) = columns
+        rows = [[d, arrays.mul(-1.0, c)], [arrays.mul(-1.0, b), a]]
+    else:
+        u, v, w = columns
+        rows = [arrays.cross(v, w), arrays.cross(w, u), arrays.cross(u, v)]
+    return rows, arrays.dot(rows[0], columns[0])
