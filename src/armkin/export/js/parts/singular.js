@@ -90,6 +90,30 @@ function folds(q, v, goal) {
 }
 
 /**
+ * Ways (of length one) within lost directions: spread evenly, and those that hold joints, along which self-motions cross.
+ * @param {number[][]} V
+ */
+function ways(V) {
+  const [n, count] = [V[0].length, V.length === 2 ? 24 : 64];
+  /** @type {number[][]} */
+  const mixes = [];
+  for (let k = 0; k < count; k++) {
+    const turn = (Math.PI * (k + 0.5)) / count;
+    mixes.push(V.length === 2 ? [Math.cos(turn), Math.sin(turn)] : V.map((_, i) => Math.cos((k + 1) * (i + 1.618) * 2.4)));
+  }
+  for (let i = 0; i < n; i++) {
+    if (V.length === 2) mixes.push([V[1][i], -V[0][i]]);
+    if (V.length === 3) for (let j = 0; j < i; j++) mixes.push(cross(V.map((v) => v[i]), V.map((v) => v[j])));
+  }
+  return mixes.flatMap((mix) => {
+    const size = Math.sqrt(dot(mix, mix));
+    if (!(size > 1e-3)) return [];
+    const way = V[0].map((_, j) => V.reduce((sum, v, i) => sum + (mix[i] / size) * v[j], 0));
+    return mixes.indexOf(mix) < count ? [way] : [way, way.map((x) => -x)];
+  });
+}
+
+/**
  * What the solution set is around a posture that solves the target.
  * @param {number[]} q @param {Numbers} goal
  * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossed: boolean, moves?: number[]}} paths of the
@@ -104,17 +128,12 @@ function structure(q, goal) {
     return { kind: folds(q, V[0], goal) ? 'boundary' : 'exact', paths: [], crossed: false };
   }
   // several directions: self-motions that cross here are met again beside it
-  const count = V.length === 2 ? 24 : 64;
   /** @type {number[][][]} */
   const paths = [];
   /** @type {number[][]} */
   const wide = []; // ways to postures that lose several directions, too
   let solved = 0;
-  for (let k = 0; k < count; k++) {
-    const turn = (Math.PI * (k + 0.5)) / count;
-    const mix = V.length === 2 ? [Math.cos(turn), Math.sin(turn)] : V.map((_, i) => Math.cos((k + 1) * (i + 1.618) * 2.4));
-    const size = Math.sqrt(dot(mix, mix));
-    const way = q.map((_, j) => V.reduce((sum, v, i) => sum + (mix[i] / size) * v[j], 0));
+  for (const way of ways(V)) {
     const there = newton(stepped(q, way, 2 * STRIDE), goal, 12);
     const away = apart(there.q, q);
     if (!(there.missed <= SOLUTION) || !(away > STRIDE / 2 && away < 8 * STRIDE)) continue;
@@ -125,9 +144,9 @@ function structure(q, goal) {
     const { path, extent } = follow(there.q, beside[0], goal);
     if (extent >= REACH && !paths.some((other) => oneCurve(path, other, goal))) paths.push(path);
   }
-  if (wide.length > 0.7 * count && !paths.length) {
-    const ways = decompose(wide);
-    if (!(ways.S[1] > 0.1 * ways.S[0])) paths.push(follow(q, ways.V[0], goal).path); // along one of them, the other stays lost
+  if (wide.length > 0.7 * solved && !paths.length) {
+    const mean = decompose(wide);
+    if (!(mean.S[1] > 0.1 * mean.S[0])) paths.push(follow(q, mean.V[0], goal).path); // along one of them, the other stays lost
     else return { kind: 'surface', paths: [], crossed: true, moves: q.map((_, j) => Math.hypot(...V.map((v) => v[j]))) };
   }
   return { kind: paths.length ? 'curve' : solved ? 'exact' : 'boundary', paths, crossed: true };
