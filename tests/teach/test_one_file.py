@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsing import chromium, opened, settled
+from browsing import chromium, opened, repainted, settled
 from playwright.sync_api import Browser, expect
 
 import armkin
@@ -71,6 +71,32 @@ def test_the_branches_are_those_of_python(browser: Browser, tmp_path: Path) -> N
             assert page.locator(absent).count() == 0, absent
         page.evaluate("location.hash = '#q=0,-90,90,0,90,0'")
         expect(page.locator("#box-1")).to_have_value("-90.0000")
+
+
+def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(browser: Browser, tmp_path: Path) -> None:
+    with opened(browser, written(tmp_path, "ur5e") + "#q=20,-70,80,10,20,30") as page:
+        before = page.locator("#canvas").screenshot()
+        page.get_by_role("button", name="Reach").press("Enter")
+        expect(page.locator("#legend")).to_contain_text("8000 poses")
+        repainted(page)
+        assert page.locator("#canvas").screenshot() != before
+        tips = page.evaluate(
+            "import('armkin/js/cloud.js').then(({tips}) => import('armkin/data.js').then((d) => [...tips(d.arm)]))"
+        )
+        place = np.array(tips).reshape(-1, 3)
+        arm = armkin.load("ur5e")
+        assert np.linalg.norm(place, axis=1).max() < arm.reach * 1.3
+        assert np.ptp(place, axis=0).min() > arm.reach
+        page.get_by_role("button", name="Reach").press("Enter")
+        radios = page.get_by_role("radiogroup", name="Branches").get_by_role("radio")
+        radios.nth(0).focus()
+        posture = page.evaluate("location.hash")
+        page.keyboard.press("Control+ArrowDown")
+        assert page.locator("#canvas").get_attribute("data-solid") == "1"
+        assert page.evaluate("location.hash") == posture  # pointed at, not chosen
+        page.keyboard.press("Space")
+        settled(page)
+        assert page.evaluate("location.hash") != posture
 
 
 @pytest.mark.parametrize("fragment", ["#q=<img src=x onerror=alert(1)>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00"])

@@ -213,7 +213,8 @@ class Page {
       return;
     }
     const view = this.view;
-    get("legend").textContent = `a square is ${view.step} mm`;
+    view.legend();
+    get("reach").addEventListener("click", () => view.reach());
     view.pointing.with(this.tip);
     view.gizmo.moved = (position, rpy) => {
       const rest = this.look.task === "pose" ? rpy : (this.look.target ?? []).slice(3);

@@ -145,6 +145,8 @@ export class Tip {
     button.addEventListener("keydown", (event) => this.step(event, k));
     button.addEventListener("pointerenter", () => this.point(this.rows[k]?.branch.name ?? ""));
     button.addEventListener("pointerleave", () => this.point(""));
+    button.addEventListener("focus", () => button.matches(":focus-visible") && this.point(this.rows[k]?.branch.name ?? ""));
+    button.addEventListener("blur", () => this.point(""));
     return button;
   }
 
@@ -155,7 +157,7 @@ export class Tip {
     this.pointed();
   }
 
-  /** Arrow keys go through the radio group. @param {KeyboardEvent} event @param {number} k */
+  /** Arrow keys go through the radio group; with Ctrl they only point, as the pointer does, and Space chooses. @param {KeyboardEvent} event @param {number} k */
   step(event, k) {
     const way = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
     if (!way) return;
@@ -163,7 +165,7 @@ export class Tip {
     event.stopPropagation();
     const next = (k + way + this.rows.length) % this.rows.length;
     get(`branch-${next}`).focus();
-    this.choose(next);
+    if (!event.ctrlKey) this.choose(next);
   }
 
   /** @param {number} k */

@@ -7,6 +7,8 @@ import {
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
+import { POSTURES, cloud } from "./cloud.js";
+import { get } from "./dom.js";
 import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
 import { Pointing } from "./pointing.js";
@@ -48,6 +50,8 @@ export class View {
     this.resting = 0;
     /** @type {Line | null} */
     this.way = null;
+    /** @type {import("three").Points | null} */
+    this.cloud = null;
     this.shapes = new Shapes(arm);
     this.tube = new MeshLambertMaterial();
     this.drum = new MeshLambertMaterial();
@@ -197,6 +201,25 @@ export class View {
     this.pointing.show(wanted, this.q);
     this.canvas.dataset.solid = String(wanted.filter((ghost) => ghost.solid).length); // for tests
     this.draw();
+  }
+
+  /** Show where the tip gets to, or show it no more. */
+  reach() {
+    if (!this.cloud) {
+      this.cloud = cloud(this.arm); // made when it is asked for first
+      this.cloud.visible = false;
+      this.scene.add(this.cloud);
+    }
+    this.cloud.visible = !this.cloud.visible;
+    get("reach").setAttribute("aria-pressed", String(this.cloud.visible));
+    this.legend();
+    this.draw();
+  }
+
+  legend() {
+    const apart = this.arm.obstacles?.length ? ", obstacles apart" : "";
+    const reach = this.cloud?.visible ? `; points: the tip in ${POSTURES} poses spread within the limits${apart}` : "";
+    get("legend").textContent = `a square is ${this.step} mm${reach}`;
   }
 
   /** Draw the tip's way through a program. @param {number[][]} tips @param {number[]} [hit] where it hits something */
