@@ -78,3 +78,10 @@ def test_tests_that_are_called_slow_are_there() -> None:
     for name, functions in SLOW.items():
         text = (ROOT / "tests" / name).read_text()
         assert all(f"def {function}(" in text for function in functions), name
+
+
+def test_the_man_page_is_what_the_commands_are() -> None:
+    from runpy import run_path
+
+    made = run_path(str(ROOT / "scripts/man.py"))
+    assert made["PAGE"].read_text() == made["page"](), "scripts/man.py writes it"
