@@ -40,3 +40,9 @@ def test_no_page_has_a_banned_word(page: Path) -> None:
     words = set(re.findall(r"[a-z]+", text.lower()))
     assert not {word: better for word, better in BANNED.items() if word in words}
     assert not ASKED.findall(text)
+
+
+def test_no_function_has_a_banned_name() -> None:
+    named = re.compile(r"^ *def (told|listed|taken)\(", re.M)
+    found = {path.name: named.findall(path.read_text()) for path in (ROOT / "src/armkin").rglob("*.py")}
+    assert not {name: functions for name, functions in found.items() if functions}

@@ -3,7 +3,7 @@
 import pytest
 
 from armkin.cli.arguments import options_first
-from armkin.cli.numbers import listed, number, numbers, whole
+from armkin.cli.numbers import comma_separated, number, numbers, whole
 from armkin.errors import UsageError
 from command_line import THREE_DOF, run
 
@@ -57,11 +57,11 @@ def test_hints() -> None:
 
 def test_counts() -> None:
     assert numbers(["1", "2"], ["x", "y"], "xy") == [1, 2]
-    assert listed("0, 90,-90", ["a", "b", "c"], "--near") == [0, 90, -90]
+    assert comma_separated("0, 90,-90", ["a", "b", "c"], "--near") == [0, 90, -90]
     with pytest.raises(UsageError, match=r"xy takes 2 numbers \(x y\), got 3"):
         numbers(["1", "2", "3"], ["x", "y"], "xy")
     with pytest.raises(UsageError, match="with commas: 0,90"):
-        listed("0 90", ["a", "b"], "--near")
+        comma_separated("0 90", ["a", "b"], "--near")
     assert whole("1e2", "count", 1, 100) == 100
     for text in ("1.5", "0", "101"):
         with pytest.raises(UsageError, match="whole number from 1 to 100"):

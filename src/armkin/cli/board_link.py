@@ -128,7 +128,7 @@ def can_resume(others: Mapping[str, object]) -> None:
 
 
 @contextmanager
-def told(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
+def progress(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
     """A bar for the plans' time on a terminal, and the note of a motion under way."""
     with output.progress("ms of motion", round(1000 * sum(plan.duration for plan in plans))) as tick:
 

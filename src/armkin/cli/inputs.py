@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output, unit_notes
-from armkin.cli.numbers import NOT_FINITE, is_number, listed, number, numbers
+from armkin.cli.numbers import NOT_FINITE, comma_separated, is_number, number, numbers
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 
@@ -87,7 +87,7 @@ def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     named = _pose(arm, text, f"{option}: ")
     if named is not None:
         return named
-    values = listed(text, arm.joint_names, option)
+    values = comma_separated(text, arm.joint_names, option)
     unit_notes.joint_values(arm, values, f"{option}'s numbers")
     return values
 
@@ -139,7 +139,7 @@ def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = No
     if rest and is_number(text) and all(map(is_number, rest)):
         whole = ",".join([text, *rest])
         raise UsageError(f"--target: separate the numbers with commas: --target {whole}")
-    values = listed(text, task.labels, f"--target (task {task.name})")
+    values = comma_separated(text, task.labels, f"--target (task {task.name})")
     unit_notes.target(arm, task.labels, values)
     return values
 

@@ -55,7 +55,7 @@ def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float
     return [number(word, name) for word, name in zip(words, names, strict=True)]
 
 
-def listed(text: str, names: Sequence[str], what: str) -> list[float]:
+def comma_separated(text: str, names: Sequence[str], what: str) -> list[float]:
     """Comma-separated numbers, as options take them: ``--near 0,90,-90``."""
     words = text.split(",")
     if len(words) == 1 and len(names) > 1 and len(text.split()) == len(names):

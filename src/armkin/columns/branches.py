@@ -33,7 +33,7 @@ class Listed(NamedTuple):
     unsolved: Bool
 
 
-def listed(request: choose.Request, targets: Array, rows: NDArray[np.integer], every: bool, **more: Any) -> Listed:
+def columns(request: choose.Request, targets: Array, rows: NDArray[np.integer], every: bool, **more: Any) -> Listed:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; every: all branches, not the best alone.
 
     more: of `armkin.ik`. The request sweeps no joint.

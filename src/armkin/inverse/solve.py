@@ -114,9 +114,9 @@ def ik(
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
     shown, most = target_rounding.of_targets(arm, definition, target, shown, single, rounding, lead)
     if examine:
-        out = legal_postures.listed(Goals(arm, definition, target, each), out)
+        out = legal_postures.with_legal_postures(Goals(arm, definition, target, each), out)
         out = near_itself.stand(Goals(arm, definition, target, each), out, most)
-        out = free_postures.listed(Goals(arm, definition, target, each), out)
+        out = free_postures.with_free_postures(Goals(arm, definition, target, each), out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:

@@ -101,7 +101,7 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     except ValidationError as error:
         from armkin.path_file import messages
 
-        raise _invalid(name, [(document.line(at), text) for at, text in messages.told(error)]) from None
+        raise _invalid(name, [(document.line(at), text) for at, text in messages.problems(error)]) from None
 
 
 def validated(data: dict[str, Any], name: str = "path") -> PathFile:
@@ -111,7 +111,7 @@ def validated(data: dict[str, Any], name: str = "path") -> PathFile:
     except ValidationError as error:
         from armkin.path_file import messages
 
-        raise _invalid(name, [(0, text) for _, text in messages.told(error)]) from None
+        raise _invalid(name, [(0, text) for _, text in messages.problems(error)]) from None
 
 
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:

@@ -21,7 +21,7 @@ _SYNONYMS = {
 }  # fmt: skip
 
 
-def told(error: ValidationError) -> Iterator[tuple[Place, str]]:
+def problems(error: ValidationError) -> Iterator[tuple[Place, str]]:
     """Places and texts, each place once: of a key that takes several shapes, the shape that came nearest."""
     best: dict[Place, Any] = {}
     for one in error.errors(include_url=False):

@@ -83,7 +83,7 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
 
         problems = [
             (document.line(path), f"{_where(path, document.data)}{text}")
-            for path, text in messages.told(error.errors(include_url=False))
+            for path, text in messages.problems(error.errors(include_url=False))
         ]
         problems.sort(key=lambda problem: problem[0])
         raise _invalid(name, problems) from None

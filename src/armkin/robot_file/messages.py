@@ -117,7 +117,7 @@ _SYNONYMS: dict[str, str] = {
 }
 
 
-def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
+def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
     """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
     suggested: set[Path] = set()
     for error in errors:  # a misspelt key is also a missing one: say it once
@@ -131,7 +131,7 @@ def told(errors: list[Any]) -> Iterator[tuple[Path, str]]:
         if error["type"] == "problems":
             yield from error["ctx"]["problems"]
         elif error["type"] == "errors":  # of a part that is validated by itself
-            yield from told(error["ctx"]["errors"])
+            yield from problems(error["ctx"]["errors"])
         elif error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
             continue  # pydantic counts valid items only, and the invalid ones are told already
         elif error["type"] == "missing" and path and isinstance(path[-1], int):

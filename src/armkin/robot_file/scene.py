@@ -61,7 +61,7 @@ def parse(raw: bytes | str, name: str = "scene.yaml") -> Scene:
         scene = Scene.model_validate(document.data)
     except ValidationError as error:
         told = []
-        for path, text in messages.told(error.errors(include_url=False)):
+        for path, text in messages.problems(error.errors(include_url=False)):
             if text.startswith("unknown key") and len(path) == 1:
                 text = "unknown key; a scene has clearance and keep_out"
             told.append((path, text))

@@ -160,7 +160,7 @@ class Tree:
             return self._known(wanted, "base")
         roots = [link for link in self.links if link not in self.parent and self.children[link]]
         if len(roots) != 1:
-            what = f"several links have no parent: {listed(roots)}" if roots else "no link carries another"
+            what = f"several links have no parent: {in_words(roots)}" if roots else "no link carries another"
             if not roots:
                 raise RobotFileError(f"{self.name}: {what}; there is no chain")
             raise UsageError(f"{self.name}: {what}; the base must be named")
@@ -183,7 +183,7 @@ class Tree:
             several = list(dict.fromkeys([*self._shared_body(base, moving), *moving]))
             raise UsageError(
                 f"{self.name}: the arm has several ends, and which is its tip is not said; "
-                f"the tip must be named: {listed(several)}"
+                f"the tip must be named: {in_words(several)}"
             )
         return moving[0]
 
@@ -230,9 +230,11 @@ class Tree:
 
     def _known(self, link: str, what: str) -> str:
         if link not in self.children:
-            raise UsageError(f"{self.name}: there is no link {link} for the {what}; the links are {listed(self.links)}")
+            raise UsageError(
+                f"{self.name}: there is no link {link} for the {what}; the links are {in_words(self.links)}"
+            )
         return link
 
 
-def listed(names: list[str]) -> str:
+def in_words(names: list[str]) -> str:
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

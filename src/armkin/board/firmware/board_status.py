@@ -27,7 +27,7 @@ WHY = {
 }
 
 
-def told(info: Info, status: Status, configuration: Configuration) -> dict[str, Any]:
+def as_json(info: Info, status: Status, configuration: Configuration) -> dict[str, Any]:
     """A board's last words as JSON."""
     flags = Flag(status.flags)
     return {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
-from armkin.board.firmware.board_status import WHY, told
+from armkin.board.firmware.board_status import WHY, as_json
 from armkin.board.firmware.protocol import Error, Flag, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.board_kinds import board_name
@@ -86,7 +86,7 @@ class Machine(Backend):
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        return {"configured": self.configured, **told(self.info, self.status, self.configuration)}
+        return {"configured": self.configured, **as_json(self.info, self.status, self.configuration)}
 
     def refresh(self) -> None:
         """Read again where the arm stands."""

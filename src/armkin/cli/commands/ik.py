@@ -196,7 +196,7 @@ class Questions:
 
         targets = units.targets_in(self.task.labels, chunk.values)
         rounding = _rounding(self.request.arm, self.task, chunk.values)
-        found = branches.listed(self.request, targets, np.asarray(chunk.numbers), self.all_branches, rounding=rounding)
+        found = branches.columns(self.request, targets, np.asarray(chunk.numbers), self.all_branches, rounding=rounding)
         return found.table, ~found.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:

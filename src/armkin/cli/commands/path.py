@@ -12,7 +12,7 @@ from armkin.cli import board_link, foreign_path, inputs, keep_outs, lock_and_swe
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.numbers import listed, number, whole
+from armkin.cli.numbers import comma_separated, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -204,7 +204,7 @@ def _carried_out(
             _files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
-        with board.under_way(laid, held) as (left, first, note), board_link.told(left, note) as tell:
+        with board.under_way(laid, held) as (left, first, note), board_link.progress(left, note) as tell:
             path_run.follow(board, plan, left, tell, first, ask=_until_enter)
         found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
         if held is not None:
@@ -242,7 +242,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
 def _corner(text: str, labels: tuple[str, ...]) -> list[float]:
     """`--via X,Y,Z`, or with the rest of the target."""
     short = labels[: 2 if labels[2:3] != ("z",) else 3]
-    return listed(text, short if text.count(",") + 1 == len(short) else labels, "--via")
+    return comma_separated(text, short if text.count(",") + 1 == len(short) else labels, "--via")
 
 
 def _positive(text: str | None, option: str, least: float) -> float | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.numbers import listed, number
+from armkin.cli.numbers import comma_separated, number
 from armkin.cli.options import Cluster, Json, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
@@ -60,7 +60,7 @@ def place(
     turn = number(yaw, "--yaw")
     if settings["step"] <= 0 or turn <= 0:
         raise UsageError("--step and --yaw must be above 0")
-    bounds = None if area is None else listed(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
+    bounds = None if area is None else comma_separated(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
     from armkin.engines.run import Engine
     from armkin.model.units import DEGREE
     from armkin.reachability.place import each

@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import inputs, lock_and_sweep, piped_answers, render
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.numbers import listed
+from armkin.cli.numbers import comma_separated
 from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -129,7 +129,7 @@ def _eye(text: str) -> tuple[float, float]:
         return _VIEWS[text]
     if "," not in text:
         raise UsageError(f"--view {text}: there are {', '.join(_VIEWS)}, or ELEVATION,AZIMUTH, for example 20,-60")
-    elevation, azimuth = listed(text, ("elevation", "azimuth"), "--view")
+    elevation, azimuth = comma_separated(text, ("elevation", "azimuth"), "--view")
     return elevation, azimuth
 
 

@@ -191,7 +191,7 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
 def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:
     """Move through the plans, or through what is left of them since they were held."""
     board = planner.board
-    with board.under_way(plans, held) as (left, _, note), board_link.told(left, note) as tell:
+    with board.under_way(plans, held) as (left, _, note), board_link.progress(left, note) as tell:
         board.machine.run(planner.noted(left), tell)
 
 

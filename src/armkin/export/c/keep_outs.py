@@ -52,10 +52,10 @@ def clearances(arm: Arm, single: bool = False) -> str:
     """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
     held = tables(arm)
 
-    def listed(values: Iterable[float]) -> str:
+    def initialiser(values: Iterable[float]) -> str:
         return ", ".join(number(float(v), single) for v in values)
 
-    rows = [listed([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in held.shapes]
+    rows = [initialiser([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in held.shapes]
     crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in held.crossings]
     fields = {
         "segments": str(len(held.thick)),
@@ -63,7 +63,7 @@ def clearances(arm: Arm, single: bool = False) -> str:
         "obstacle_count": str(len(held.shapes)),
         "crossing_count": str(len(crossings)),
         "solid": str(held.solid),
-        "thick": listed(held.thick),
+        "thick": initialiser(held.thick),
         "moving": ", ".join(str(k) for pair in held.moving for k in pair) or "0",
         "kinds": ", ".join(str(kind) for kind, _ in held.shapes) or "0",
         "obstacles": ",\n    ".join(f"{{{row}}}" for row in rows) or "{0}",

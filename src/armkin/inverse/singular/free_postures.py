@@ -27,7 +27,7 @@ FINE = np.deg2rad(0.1)  # between the postures that are looked at
 MOST = 600  # steps each way: more than four turns of one joint
 
 
-def listed(goals: Goals, out: Batch) -> Batch:
+def with_free_postures(goals: Goals, out: Batch) -> Batch:
     """The same branches; of singular targets each that hits something or is outside limits, at the nearest posture of
     its self-motion that is neither, if there is one to 0.1 degrees.
     """

@@ -20,7 +20,7 @@ from armkin.inverse.singular import components
 from armkin.model.units import radian_or_reach
 
 
-def listed(goals: Goals, out: Batch) -> Batch:
+def with_legal_postures(goals: Goals, out: Batch) -> Batch:
     """The same branches, with legal ones for targets on an edge that have none, where such a posture is found.
 
     goals, out: N targets and their branches. The legal posture takes the place of the one that it shares a self-motion
