@@ -11,6 +11,7 @@ answers/      the answer as arrays, its rounding, the nearest legal pose where t
 singular/     what a solution is: isolated, boundary or self-motion manifold
 solvers/      which class an arm belongs to
 run/          how targets go through: one alone, chunks of a batch, threads
+families.py    one joint more than the target asks for: intervals of the redundant joint
 position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes
 solve.py      `ik`
 choose.py     one branch a target, of an arm with joints held or swept, too; or why none is

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
-from armkin.inverse import position_first
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
+from armkin.inverse.families import intervals_out
 from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
 from armkin.inverse.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
@@ -76,6 +76,7 @@ class Branch(NamedTuple):
     motion: float  # sum of |change| from near [deg | mm]
     clearance: float | None = None  # [mm] where there are keep-outs that count
     hits: Sequence[Hit] = ()
+    interval: tuple[float, float] | None = None  # of the redundant joint [deg | mm], where there is one
 
     @property
     def may_be_taken(self) -> bool:
@@ -125,11 +126,6 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
             if not request.every and len(found[i].branches) > _THIN:
                 found[i].thin_out(request)
     return [one.answer(request) for one in found]
-
-
-def check_position_first(request: Request) -> None:
-    """Raise UsageError where position first is not for this arm, its held joints apart, or task."""
-    position_first.check(locked(request), request.task)
 
 
 def combinations(request: Request) -> int:
@@ -282,6 +278,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     # From here on plain Python: numpy is slow at single numbers, and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     kept = [name for name in arm.joint_names if name not in held]
+    families = intervals_out(s)
     near_by = iter(hits(arm, q[s.valid])) if arm.keep_out else itertools.repeat((None, ()))
     told = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
     for i, (valid, status, sure) in enumerate(told):
@@ -296,6 +293,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
                 turn[i][b],
                 motion[i][b],
                 *next(near_by),
+                interval=None if families is None else (families[i][b][0], families[i][b][1]),
             )
             for b in range(len(valid))
             if valid[b]

@@ -25,6 +25,7 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
+from armkin.inverse.families import families
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.position_first import check as check_position_first
@@ -35,6 +36,7 @@ from armkin.inverse.run.edges import examined
 from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import free_postures, legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task, around, distance, read_targets, shaped
 from armkin.model.arm import actual
@@ -79,6 +81,8 @@ def ik(
     if position_first:
         check_position_first(arm, task)
         return minima(ik, arm, targets, near=near)
+    if (free := redundancy(arm, task)) is not None:
+        return families(ik, arm, free, targets, near, rounding)
     values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
     if (
         rounding is None

@@ -15,6 +15,7 @@ from armkin.cli.answers.arm import Correction as Correction
 from armkin.cli.answers.arm import Error as Error
 from armkin.cli.answers.arm import Errors as Errors
 from armkin.cli.answers.arm import Export as Export
+from armkin.cli.answers.arm import Family as Family
 from armkin.cli.answers.arm import Fk as Fk
 from armkin.cli.answers.arm import Flagged as Flagged
 from armkin.cli.answers.arm import Flash as Flash

@@ -55,6 +55,15 @@ class Fk(Head, Near):
     frames: Annotated[NotRequired[list[Frame]], "with --frames: base first, tool last"]
 
 
+class Family(TypedDict):
+    """A piece of a curve of answers, of arms with one joint more than the target asks for."""
+
+    joint: Annotated[str, "the redundant joint, along which the family is monotone"]
+    interval: Annotated[
+        list[float], "its values [deg or mm] within limits; of a branch outside limits those of the whole family"
+    ]
+
+
 class Branch(Near):
     """One branch, modulo whole turns: the legal copy nearest to --near."""
 
@@ -65,6 +74,7 @@ class Branch(Near):
     residual_mm: Annotated[float, "distance between the tool and the target"]
     residual_deg: Annotated[float, "angle between them, where the task has one"]
     motion: Annotated[float, "sum of |change| from --near in joint units"]
+    family: Annotated[NotRequired[Family], "where the arm has one joint more than the task asks for"]
     turns: Annotated[NotRequired[list[list[float]]], "with --turns: all copies within limits, the nearest first"]
 
 

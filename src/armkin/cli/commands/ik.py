@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, lock_and_sweep, output, piped_answers, render
+from armkin.cli import ik_text, inputs, lock_and_sweep, output, piped_answers, render
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -28,7 +28,6 @@ from armkin.cli.options import (
     TaskName,
     Workers,
 )
-from armkin.cli.render import fixed
 from armkin.cli.rows import Chunk, one_row
 from armkin.errors import UsageError
 from armkin.model import units
@@ -77,6 +76,7 @@ def ik(
     the nearest pose within limits is shown instead. Without a target, standard input's answers of fk are reached.
     """
     from armkin.inverse import choose
+    from armkin.inverse.position_first import check as position_first_is_for
     from armkin.inverse.tasks.fitting import task_for
 
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene)
@@ -95,7 +95,7 @@ def ik(
         position_first=position_first,
     )
     if position_first:
-        choose.check_position_first(request)
+        position_first_is_for(choose.locked(request), what.name)
     if position_first and compiled:
         raise UsageError("--position-first has no compiled solver; leave --compiled away")
     if compiled and sweep:
@@ -136,7 +136,7 @@ def ik(
     [found] = choose.solve(request, goal, _rounding(arm, what, values))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
-        write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
+        write(f"{render.to_json(answer)}\n" if json else ik_text.text(arm, answer))
     if answer["best"] is None and answer["closest"] is None:
         raise choose.blocked(request, found)
     if answer["best"] is None and answer["closest"] is not None:
@@ -340,9 +340,12 @@ def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Bran
         "motion": branch.motion,
     }
     row.update(_near_to(arm, branch))
-    if turns:
-        from armkin.inverse import choose
+    from armkin.inverse import choose
+    from armkin.inverse.solvers.redundant import redundant_joint
 
+    if branch.interval is not None:
+        row["family"] = {"joint": redundant_joint(choose.locked(request), request.task), "interval": [*branch.interval]}
+    if turns:
         row["turns"] = choose.turns(request, branch)
     return row
 
@@ -354,45 +357,3 @@ def _records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:
         yield [row, answer["status"], branch["name"].replace(",", ""), *branch["joints"], *rest]
     if not answer["branches"]:
         yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]
-
-
-def _text(arm: Arm, answer: Ik) -> str:
-    headings = render.joint_headings(arm)
-    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
-    rows = [["", "branch", *headings, "motion", ""]]
-    for i, branch in enumerate(answer["branches"]):
-        bad = ", ".join(violation["joint"] for violation in branch["violations"])
-        mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
-        notes = [_turned(branch["residual_deg"]), f"outside limits: {bad}" if bad else "", render.hits_said(branch)]
-        note = "; ".join(filter(None, notes))
-        rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
-        for copy in branch.get("turns", ())[1:]:
-            rows.append(["", "  or", *map(fixed, copy), "", ""])
-    nearest = answer["closest"]
-    if nearest and not answer["branches_within_limits"]:
-        miss = f"{fixed(nearest['distance_mm'])} mm away"
-        if turned := _turned(nearest["angle_deg"]):
-            miss += f", {turned}"
-        rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
-    last = len(headings) + 3
-    table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
-    return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
-
-
-def _turned(angle_deg: float) -> str:
-    """By how much a rotation is off the target's, where it is more than rounding."""
-    return f"turned by {fixed(angle_deg)} deg" if angle_deg > 1e-6 else ""
-
-
-def _summary(answer: Ik) -> str:
-    """What the table does not show: how many branches there are, and by which method."""
-    count, legal = answer["branch_count"], answer["branches_within_limits"]
-    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
-    if "branches_free" in answer:
-        text += f", {answer['branches_free']} free"
-    if answer["free_joints"]:
-        text += f"; free: {', '.join(answer['free_joints'])}"
-    if count > len(answer["branches"]):
-        text += " (--all-branches lists all)"
-    sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
-    return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")

@@ -42,7 +42,9 @@ class Solutions:
     there (never of a sliding arm's targets more than 20 reaches away). rounding: (...) how
     far the columns of a pose's rotation were from orthonormal; `target` holds the rotation next to it, which
     the branches answer. angle: (..., B) [rad] how far each row's rotation is off, of `ik(..., position_first=True)`
-    alone: rows are then sorted by it, and `status` tells of the first.
+    alone: rows are then sorted by it, and `status` tells of the first. interval: (..., B, 2) [rad] where an arm has one
+    joint more than the target asks for: the values of the redundant joint (`armkin.inverse.families`) along which a
+    row's posture moves within limits; of rows outside limits those of its whole family.
     """
 
     arm: Arm
@@ -61,6 +63,7 @@ class Solutions:
     complete: NDArray[np.bool_]
     rounding: Array
     angle: Array | None = None
+    interval: Array | None = None
 
     def __repr__(self) -> str:
         batch, sure = self.status.shape, "complete" if self.complete.all() else "not all proved complete"

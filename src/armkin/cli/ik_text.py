@@ -1,0 +1,68 @@
+"""The answer of `armkin ik` as text: a table of branches, and what it does not show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armkin.cli import render
+from armkin.cli.render import fixed
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.cli.answers import Branch, Ik
+    from armkin.model.arm import Arm
+
+
+def text(arm: Arm, answer: Ik) -> str:
+    headings = render.joint_headings(arm)
+    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
+    rows = [["", "branch", *headings, "motion", ""]]
+    for i, branch in enumerate(answer["branches"]):
+        bad = ", ".join(violation["joint"] for violation in branch["violations"])
+        mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
+        notes = [
+            _family(branch),
+            _turned(branch["residual_deg"]),
+            f"outside limits: {bad}" if bad else "",
+            render.hits_said(branch),
+        ]
+        note = "; ".join(filter(None, notes))
+        rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
+        for copy in branch.get("turns", ())[1:]:
+            rows.append(["", "  or", *map(fixed, copy), "", ""])
+    nearest = answer["closest"]
+    if nearest and not answer["branches_within_limits"]:
+        miss = f"{fixed(nearest['distance_mm'])} mm away"
+        if turned := _turned(nearest["angle_deg"]):
+            miss += f", {turned}"
+        rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
+    last = len(headings) + 3
+    table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
+    return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
+
+
+def _family(branch: Branch) -> str:
+    """Along which values of the redundant joint a branch moves."""
+    if "family" not in branch:
+        return ""
+    low, high = map(fixed, branch["family"]["interval"])
+    return f"{branch['family']['joint']} from {low} to {high}"
+
+
+def _turned(angle_deg: float) -> str:
+    """By how much a rotation is off the target's, where it is more than rounding."""
+    return f"turned by {fixed(angle_deg)} deg" if angle_deg > 1e-6 else ""
+
+
+def _summary(answer: Ik) -> str:
+    """What the table does not show: how many branches there are, and by which method."""
+    count, legal = answer["branch_count"], answer["branches_within_limits"]
+    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
+    if "branches_free" in answer:
+        text += f", {answer['branches_free']} free"
+    if answer["free_joints"]:
+        text += f"; free: {', '.join(answer['free_joints'])}"
+    if count > len(answer["branches"]):
+        text += " (--all-branches lists all)"
+    sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
+    return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")

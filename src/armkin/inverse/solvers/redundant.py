@@ -1,0 +1,84 @@
+"""Arms with one joint more than their task asks for: which joint is redundant, and what its motion does to a target."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import Task
+from armkin.model.lock import lock
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+SAMPLES = 720, 120  # of a turn of the redundant joint, by a closed form and by the elimination
+
+
+class Redundancy(NamedTuple):
+    """The redundant joint of an arm and task, and the arm of the others, that joint at zero."""
+
+    joint: int
+    rest: Arm
+    task: Task  # of the arm itself
+    geometry: Geometry  # of the rest
+
+    @property
+    def samples(self) -> int:
+        return SAMPLES[0 if self.geometry.pairs is not None else 1]
+
+
+@lru_cache(maxsize=64)
+def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
+    """What is redundant of an arm that has one joint more than its task asks for; None for every other.
+
+    Chosen by structure, the same for every target: the last joint if that leaves a closed form, else the first.
+    """
+    try:
+        task = task_for(arm, task_name)
+    except UsageError:
+        return None
+    if arm.n != task.constraints + 1 or arm.n < 3:
+        return None
+    found = []
+    for joint in ([arm.n - 1] if task.orientation == "full" else []) + [0]:
+        if arm.prismatic[joint]:
+            continue
+        rest = lock(arm, {arm.joint_names[joint]: 0.0})
+        try:
+            found.append(Redundancy(joint, rest, task, solver(rest, task.name)[1]))
+        except UsageError:
+            continue
+    closed = [one for one in found if one.geometry.pairs is not None]
+    return next(iter(closed or found[:1]), None)
+
+
+def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
+    """Targets (M, m) or (M, 4, 4) as those of the rest, for values t (M,) of the redundant joint."""
+    c, s = np.cos(t), np.sin(t)
+    Z = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
+    Z[:, 0, 0], Z[:, 0, 1], Z[:, 1, 0], Z[:, 1, 1] = c, s, -s, c
+    if free.joint:
+        return np.asarray(target @ (inverse(arm.link[-1]) @ Z @ arm.link[-1]))
+    G = arm.link[0] @ Z @ inverse(arm.link[0])
+    if free.task.orientation == "full":
+        return np.asarray(G @ target)
+    out, p = target.copy(), free.task.position
+    out[:, :p] = np.einsum("mij,mj->mi", G[:, :p, :p], target[:, :p]) + G[:, :p, 3]
+    out[:, p : p + len(free.task.sums)] -= t[:, None] * free.task.sums[:, 0]
+    if free.task.orientation == "axis":
+        out[:, 3:] = np.einsum("mij,mj->mi", G[:, :3, :3], target[:, 3:])
+    return out
+
+
+def redundant_joint(arm: Arm, task_name: str | None) -> str:
+    """The name of the redundant joint; of an arm that has one."""
+    free = redundancy(arm, task_name)
+    return "" if free is None else arm.joint_names[free.joint]
