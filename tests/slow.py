@@ -45,6 +45,11 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "board/test_smooth.py": ("test_no_tick_is_faster_than_102_percent_however_short_the_ramp",),
     "board/test_board_plugin.py": (),
+    "inverse/test_families.py": (
+        "test_a_row_is_the_posture_of_its_interval_nearest_to_near",
+        "test_as_many_legal_postures_as_intervals_at_any_value",
+        "test_the_generating_posture_lies_in_a_listed_interval",
+    ),
     "inverse/test_position_first.py": (
         "test_no_posture_of_a_grid_is_nearer",
         "test_rows_are_minima_each_once_by_angle",

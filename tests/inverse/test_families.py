@@ -1,0 +1,136 @@
+"""One joint more than the target asks for: intervals of the redundant joint, against brute force along it."""
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin import Status
+from armkin.inverse.solvers.redundant import redundancy
+from armkin.model.arm import from_links
+from command_line import run
+
+ARMS = [("panda", None), ("iiwa7", None), ("planar_3dof", "xy")]
+
+
+def postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joint values within limits (N, n), and the targets that they reach."""
+    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    q = np.random.default_rng(seed).uniform(low, high, (count, arm.n))
+    T = armkin.fk(arm, q)
+    return q, T[:, :2, 3] if task == "xy" else T
+
+
+def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, task: str | None) -> np.ndarray:
+    """Legal postures (B, n) with the redundant joint held: the arm is built anew, as `--lock` does."""
+    held = {arm.joint_names[joint]: value}
+    s = armkin.ik(armkin.lock(arm, held), target, task, examine=False)
+    return armkin.unlock(arm, held, s.q[s.within_limits])
+
+
+def covers(arm: armkin.Arm, intervals: np.ndarray, value: float, slack: float = 1e-8) -> np.ndarray:
+    """Which intervals (B, 2) hold a value, modulo whole turns."""
+    middle, half = intervals.mean(axis=-1), np.ptp(intervals, axis=-1) / 2
+    return np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack
+
+
+@pytest.mark.parametrize(("name", "task"), ARMS)
+def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str | None) -> None:
+    arm = armkin.load(name)
+    q, target = postures(arm, task, 60, 3)
+    s = armkin.ik(arm, target, task)
+    free = redundancy(arm, task)
+    assert free is not None
+    assert s.interval is not None
+    assert (s.status == Status.EXACT).all()
+    assert (s.best >= 0).all()
+    for k in range(len(q)):
+        legal = s.interval[k][s.within_limits[k]]
+        assert covers(arm, legal, q[k, free.joint]).any()
+    mm, rad = s.residual()
+    assert np.nanmax(mm) <= 1e-9 * arm.reach
+    assert np.nanmax(rad, initial=0.0) <= 1e-9
+
+
+@pytest.mark.parametrize(("name", "task"), ARMS)
+def test_as_many_legal_postures_as_intervals_at_any_value(name: str, task: str | None) -> None:
+    """On both sides of each end, 1e-6 degrees from it, and between: as many as the arm with the joint held has."""
+    arm = armkin.load(name)
+    _, target = postures(arm, task, 1, 8)
+    s = armkin.ik(arm, target, task)
+    free = redundancy(arm, task)
+    assert free is not None
+    assert s.interval is not None
+    for k in range(len(target)):
+        legal = s.interval[k][s.within_limits[k]]
+        ends = np.unique(legal.ravel().round(7))
+        beside = np.concatenate([legal.ravel() - np.deg2rad(1e-6), legal.ravel() + np.deg2rad(1e-6)])
+        for value in [*beside[::9], *(0.5 * (ends[1:] + ends[:-1]))[:3]]:
+            if arm.lower[free.joint] <= value <= arm.upper[free.joint]:
+                own = held_answers(arm, free.joint, float(value), target[k], task)
+                assert covers(arm, legal, value, 0.0).sum() == len(own), (k, np.rad2deg(value))
+
+
+@pytest.mark.parametrize(("name", "task"), ARMS)
+def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: str | None) -> None:
+    arm = armkin.load(name)
+    q, target = postures(arm, task, 1, 9)
+    free = redundancy(arm, task)
+    assert free is not None
+    s = armkin.ik(arm, target, task)
+    assert s.interval is not None
+    for k in range(len(target)):
+        values = np.linspace(*s.interval[k, s.best[k]], 9)
+        least = np.inf
+        for value in values:
+            for row in held_answers(arm, free.joint, float(value), target[k], task):
+                least = min(least, float(np.rad2deg(np.abs(row - arm.home)).sum()))
+        assert s.motion[k, s.best[k]] <= least + 1e-6
+    again = armkin.ik(arm, target, task, near=q)
+    assert np.nanmax(np.take_along_axis(again.motion, again.best[:, None], axis=1)) <= 1e-6
+
+
+def test_the_command_answers_without_options() -> None:
+    done = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--json")
+    assert done.code == 0
+    [row] = done.json["branches"]
+    assert row["family"]["joint"] == "J7"
+    low, high = row["family"]["interval"]
+    assert low <= row["joints"][6] <= high
+    every = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--json", "--all-branches").json["branches"]
+    assert {branch["within_limits"] for branch in every} == {True, False}
+    assert "J7 from -56.9683 to 56.9683" in run("ik", "panda", 400, 0, 400, 180, 0, 0).out
+
+
+def test_a_turn_without_ends_is_the_whole_of_it() -> None:
+    links = np.tile(np.eye(4), (4, 1, 1))
+    links[1:, 0, 3] = 50, 300, 300
+    s = armkin.ik(from_links(links, [False] * 3), [280.0, 90.0], "xy")
+    assert s.interval is not None
+    assert np.rad2deg(s.interval[s.valid]).tolist() == [[-180.0, 180.0]] * int(s.valid.sum())
+
+
+def test_out_of_reach_is_unreachable_and_exits_3() -> None:
+    done = run("ik", "panda", 1400, 0, 400, 180, 0, 0, "--json")
+    assert (done.code, done.json["status"]) == (3, "unreachable")
+    assert done.json["closest"]["distance_mm"] > 400
+
+
+def test_held_joints_still_leave_isolated_branches() -> None:
+    done = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--lock", "J7=20", "--json")
+    assert done.code == 0
+    assert "family" not in done.json["branches"][0]
+    assert done.json["branches"][0]["joints"][6] == pytest.approx(20)
+
+
+def test_with_keep_outs_the_posture_of_an_interval_is_free(tmp_path: object) -> None:
+    words = "ik", "panda", 400, 0, 400, 180, 0, 0, "--json"
+    best = run(*words).json["branches"][0]
+    arm = armkin.load("panda")
+    x, y, z = armkin.frames(arm, np.deg2rad(best["joints"]))[4, :3, 3].tolist()
+    scene = f"{tmp_path}/ball.yaml"
+    with open(scene, "w") as file:
+        file.write(f"keep_out:\n  - capsule: {{from: [{x}, {y}, {z}], to: [{x}, {y}, {z + 1}], radius: 20}}\n")
+    answer = run(*words, "--scene", scene).json
+    if answer["best"] is not None:
+        assert not answer["branches"][0]["hits"]
+        assert abs(answer["branches"][0]["joints"][6] - best["joints"][6]) > 1
