@@ -24,7 +24,7 @@ def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, 
     """Legal postures (B, n) with the redundant joint held: the arm is built anew, as `--lock` does."""
     held = {arm.joint_names[joint]: value}
     s = armkin.ik(armkin.lock(arm, held), target, task, examine=False)
-    return armkin.unlock(arm, held, s.q[s.within_limits])
+    return np.asarray(armkin.unlock(arm, held, s.q[s.within_limits]))
 
 
 def covers(arm: armkin.Arm, intervals: np.ndarray, value: float, slack: float = 1e-8) -> np.ndarray:
@@ -79,7 +79,8 @@ def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: s
     s = armkin.ik(arm, target, task)
     assert s.interval is not None
     for k in range(len(target)):
-        values = np.linspace(*s.interval[k, s.best[k]], 9)
+        low, high = s.interval[k, s.best[k]]
+        values = np.linspace(low, high, 9)
         least = np.inf
         for value in values:
             for row in held_answers(arm, free.joint, float(value), target[k], task):

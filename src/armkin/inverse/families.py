@@ -21,6 +21,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import read_targets
@@ -308,6 +309,8 @@ def _of_chunk(find: _Follower) -> _Rows:
     found = find.along(t)
     pieces = _pieces(find, t, found)
     q = _nearest(find, pieces, float(t[1] - t[0])) if len(pieces.row) else pieces.start
+    if not find.labelled and len(q):  # an elimination's answers near singular postures are less exact
+        q = newton.correct(find.arm, find.free.task, q, find.target[pieces.row])[0]
     if find.arm.keep_out:
         q = _free(find, pieces, q)
     own = pieces.at + 2 * np.pi * np.round((q[:, find.free.joint] - pieces.at) / (2 * np.pi))
@@ -321,7 +324,7 @@ def _of_chunk(find: _Follower) -> _Rows:
     place = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     out = _Rows(
         np.full((N, B, find.arm.n), np.nan), np.full((N, B, 2), np.nan), np.zeros((N, B)), np.full((N, B), -1.0),
-        _all_short(found),
+        _all_short(find, found),
     )  # fmt: skip
     where = pieces.row[order], place
     out.q[where], out.interval[where] = q[order], interval[order]
@@ -329,8 +332,10 @@ def _of_chunk(find: _Follower) -> _Rows:
     return out
 
 
-def _all_short(found: _Postures) -> Bool:
+def _all_short(find: _Follower, found: _Postures) -> Bool:
     """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
+    if not find.labelled:  # the pieces of a linked branch say nothing of the whole curve
+        return np.zeros(len(found.valid), bool)
     together = found.valid
     for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
         together = together & np.roll(found.valid, -shift, axis=1)
