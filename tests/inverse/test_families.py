@@ -30,7 +30,7 @@ def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, 
 def covers(arm: armkin.Arm, intervals: np.ndarray, value: float, slack: float = 1e-8) -> np.ndarray:
     """Which intervals (B, 2) hold a value, modulo whole turns."""
     middle, half = intervals.mean(axis=-1), np.ptp(intervals, axis=-1) / 2
-    return np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack
+    return np.asarray(np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack)
 
 
 @pytest.mark.parametrize(("name", "task"), ARMS)
