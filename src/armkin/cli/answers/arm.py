@@ -59,9 +59,7 @@ class Family(TypedDict):
     """A piece of a curve of answers, of arms with one joint more than the target asks for."""
 
     joint: Annotated[str, "the redundant joint, along which the family is monotone"]
-    interval: Annotated[
-        list[float], "its values [deg or mm] within limits; of a branch outside limits those of the whole family"
-    ]
+    interval: Annotated[list[float], "its values [deg] within limits; of a branch outside limits the whole family's"]
 
 
 class Branch(Near):
@@ -109,8 +107,7 @@ class Ik(Head):
     branches_within_limits: int
     branches: Annotated[
         list[Branch],
-        "within limits first, of them those without hits, then (--position-first) by residual_deg, then by motion; all "
-        "with --all-branches",
+        "within limits first, then without hits, residual_deg (--position-first), motion; all with --all-branches",
     ]
     best: Annotated[int | None, "index of the default answer in `branches`"]
     closest: Annotated[Closest | None, "whenever `best` is null, but where every branch within limits hits something"]
