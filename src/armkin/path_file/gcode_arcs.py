@@ -46,6 +46,15 @@ def arc(
     radius, off = math.hypot(*u), abs(math.hypot(*v) - math.hypot(*u))
     if off > _OFF[2] or (off > _OFF[0] and off > _OFF[1] * radius):
         raise ArcError(f"{word} ends {off:.4g} mm off its circle of {radius:.6g} mm")
+    chord = b[x] - a[x], b[y] - a[y]
+    size = math.hypot(*chord)
+    along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size) if size else 0.0
+    if abs(along) <= 2 * off:  # the centre as far from both ends: misses of arcs one after another would add up
+        moved = list(centre)
+        moved[x] += along * chord[0] / size if size else 0.0
+        moved[y] += along * chord[1] / size if size else 0.0
+        centre = moved[0], moved[1], moved[2]
+        u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
     angle = sense * (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % (2 * math.pi)
     same = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
     angle = 2 * math.pi if same or angle < 1e-12 else angle

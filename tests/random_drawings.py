@@ -1,0 +1,153 @@
+"""Programs and drawings at random, in the styles of slicers, CAM, plotters, senders' tests and drawing programs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def program(seed: int) -> str:
+    """A G-code program."""
+    rng = np.random.default_rng(seed)
+    return (_slicer, _cam, _plotter, _sender)[seed % 4](rng)
+
+
+def _n(x: float, digits: int = 3) -> str:
+    text = f"{x:.{digits}f}"
+    return text.rstrip("0") if text.endswith("0") and "." in text else text
+
+
+def _slicer(rng: np.random.Generator) -> str:
+    out = [";FLAVOR:Marlin", "M140 S60", "M104 S205 ; hotend", "G21", "G90", "M82", "G28 ;home", "G92 E0"]
+    e = 0.0
+    for layer in range(int(rng.integers(1, 4))):
+        z = 0.2 + 0.2 * layer
+        out += [f";LAYER:{layer}", "M106 S85" if layer else "M107", f"G0 F6000 X20 Y20 Z{_n(z)}", ";TYPE:WALL-OUTER"]
+        sides, r = int(rng.integers(3, 60)), rng.uniform(5, 15)
+        for k, a in enumerate(np.linspace(0, 2 * np.pi, sides + 1)):
+            e += 0.05
+            out.append(f"{'G0 F9000' if k == 0 else 'G1 F1200' if k == 1 else 'G1'} "
+                       f"X{_n(20 + r * np.cos(a))} Y{_n(20 + r * np.sin(a))} E{e:.5f}")  # fmt: skip
+        out += ["G1 F2400 E-1", ";TYPE:FILL", "G91", f"G1 Z{_n(rng.uniform(0.1, 1))} F600", "G90"]
+        for k in range(int(rng.integers(2, 8))):
+            y = 12 + k * 1.2
+            out += [f"G1 X{10 if k % 2 else 30} Y{_n(y)} E{e:.5f}", f"G1 X{10 if k % 2 else 30} Y{_n(y + 1.2)}"]
+    return "\n".join([*out, "M104 S0", "G92 E0", "M84 X Y E"]) + "\n"
+
+
+def _cam(rng: np.random.Generator) -> str:
+    inch = rng.random() < 0.5
+    k = 1 / 25.4 if inch else 1.0
+    out = ["%", "O1001 (POCKET)", "G17 G40 G49 G80 G90 " + ("G20" if inch else "G21"), "T1 M6", "S12000 M3", "G54"]
+    out = [line for line in out if not line.startswith("O")]
+    out.append(f"G0 X{_n(10 * k, 4)} Y{_n(10 * k, 4)}")
+    out += [f"Z{_n(5 * k, 4)}", f"G1 Z{_n(-1 * k, 4)} F{_n(300 * k, 1)}"]
+    for _ in range(int(rng.integers(2, 9))):
+        how, r = int(rng.integers(5)), rng.uniform(2, 9) * k
+        word = "G2" if rng.random() < 0.5 else "G3"
+        if how == 0:
+            out.append(f"{word} I{_n(r, 4)} J{_n(0.5 * r, 4)}")  # a whole circle
+        elif how == 1:
+            out.append(f"G91 {word} X{_n(2 * r, 4)} Y0 I{_n(r, 4)} J0 Z{_n(rng.uniform(-1, 1) * k, 4)}")
+            out.append("G90")
+        elif how == 2:
+            axes, one, two = (("G18", "X", "Z"), ("G19", "Y", "Z"))[int(rng.integers(2))]
+            i, j = ("I", "K") if axes == "G18" else ("J", "K")
+            out += [f"{axes} G91 {word} {one}{_n(r, 4)} {two}{_n(r, 4)} {i}{_n(r, 4)} {j}0", "G17 G90"]
+        elif how == 3:
+            out.append(f"G1 X{_n(rng.uniform(0, 40) * k, 4)} Y{_n(rng.uniform(0, 40) * k, 4)}")
+        else:
+            out.append(f"G91 {word} P{int(rng.integers(1, 4))} X{_n(r, 4)} Y{_n(r, 4)} I{_n(r, 4)} J0 G90"
+                       .replace(" G90", "\nG90"))  # fmt: skip
+    out += ["M5 M9", "M30", "%"]
+    return "\n".join(f"N{10 * i} {line}" if line not in ("%",) else line for i, line in enumerate(out)) + "\n"
+
+
+def _plotter(rng: np.random.Generator) -> str:
+    out = ["g21 g90", "F1500", "g0 z5"]
+    for _ in range(int(rng.integers(1, 6))):
+        x, y = rng.uniform(0, 60, 2)
+        out += [f"g0x{_n(x)}y{_n(y)}", "m3 s90", "g1z0"]
+        for _ in range(int(rng.integers(1, 10))):
+            dx, dy = rng.uniform(-9, 9, 2)
+            x, y = round(x + dx, 3), round(y + dy, 3)
+            r = round(float(np.hypot(dx, dy)) * rng.uniform(0.52, 2) * (1 if rng.random() < 0.7 else -1), 3)
+            line = f"g1x{_n(x)}y{_n(y)}" if rng.random() < 0.5 else f"g{rng.integers(2, 4)} x{_n(x)} y{_n(y)} r{_n(r)}"
+            out.append(line)
+        out += ["m5", "g0z5 (pen up)"]
+    return "\n".join(out) + "\n"
+
+
+def _sender(rng: np.random.Generator) -> str:
+    out = ["G21 G90 G54", "G0 X0 Y0 Z0", "F800"]
+    for _ in range(int(rng.integers(5, 25))):
+        how = int(rng.integers(8))
+        x, y, z = (float(round(v, 3)) for v in rng.uniform(-20, 20, 3))
+        out.append((
+            f"G1 X{x} Y{y}", f"G91\nG1 X{x} Z{z}\nG90", f"G92 X{x} Y{y}", f"G52 X{x} Z{z}",
+            f"G10 L2 P{rng.integers(0, 7)} X{x} Y{y} Z{z}", f"G10 L20 P{rng.integers(0, 7)} X{x} Z{z}",
+            f"G{rng.integers(54, 60)} G0 X{x}", f"G53 G1 X{x} Y{y}",
+        )[how])  # fmt: skip
+    out += ["G1 X1 Y2 Z3", "X4"]
+    lines = "\n".join(out).splitlines()
+    if rng.random() < 0.5:  # numbered, with checksums
+        for i, line in enumerate(lines):
+            text, check = f"N{i + 1} {line}", 0
+            for letter in text:
+                check ^= ord(letter)
+            lines[i] = f"{text}*{check}"
+    return "\n".join(lines) + "\n"
+
+
+def drawing(seed: int) -> str:
+    """An SVG drawing."""
+    rng = np.random.default_rng(seed)
+    unit, k = (("mm", 1.0), ("cm", 0.1), ("in", 1 / 25.4), ("px", 96 / 25.4), ("", 96 / 25.4))[seed % 5]
+    x, y = rng.uniform(-20, 20, 2).round(2)
+    body = "\n".join(_nested(rng, int(rng.integers(0, 4))) for _ in range(int(rng.integers(1, 5))))
+    return (
+        f'<?xml version="1.0"?>\n<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'viewBox="{x} {y} 100 80" width="{100 * k:.9f}{unit}" height="{80 * k:.9f}{unit}">\n'
+        f'<defs><path id="a" d="M0 0l3 4h2"/></defs>\n{body}\n</svg>\n'
+    )
+
+
+def _nested(rng: np.random.Generator, deep: int) -> str:
+    if deep == 0:
+        return _shape(rng)
+    a, b = rng.uniform(-5, 5, 2).round(3)
+    how = (
+        f"translate({a},{b})", f"translate({a})", f"rotate({10 * a})", f"rotate({10 * a} {b} {a})",
+        f"scale({1 + a / 9:.4f})", f"scale({1 + a / 9:.4f} {1 + b / 9:.4f})",
+        f"skewX({4 * a})", f"matrix(1 {a / 20:.4f} {b / 20:.4f} 1 {a} {b})",
+    )[int(rng.integers(8))]  # fmt: skip
+    return f'<g transform="{how}" stroke="black">{_nested(rng, deep - 1)}{_shape(rng)}</g>'
+
+
+def _shape(rng: np.random.Generator) -> str:
+    x, y, u, v = rng.uniform(1, 40, 4).round(3)
+    r, s = rng.uniform(1, 12, 2).round(3)
+    kind = int(rng.integers(9))
+    if kind < 4:
+        return f'<path fill="none" d="{_data(rng)}"/>'
+    return (
+        f'<line x1="{x}" y1="{y}" x2="{u}" y2="{v}"/>', f'<rect x="{x}" y="{y}" width="{r}" height="{s}"/>',
+        f'<circle cx="{x}" cy="{y}" r="{r}"/>', f'<ellipse cx="{x}" cy="{y}" rx="{r}" ry="{s}"/>',
+        f'<polygon points="{x},{y} {u},{v} {x + r:.3f} {v}"/><use xlink:href="#a" x="{u}" y="{y}"/>',
+    )[kind - 4]  # fmt: skip
+
+
+def _data(rng: np.random.Generator) -> str:
+    """Path data; numbers run together as drawing programs write them."""
+    out = "M{:g} {:g}".format(*rng.uniform(10, 40, 2).round(2))
+    for _ in range(int(rng.integers(1, 9))):
+        letter = str(rng.choice(list("LlHhVvCcSsQqTtAaZzm")))
+        n = {"H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "Z": 0}.get(letter.upper(), 2)
+        v = rng.uniform(-15, 15, n).round(2) + (25 if letter.isupper() else 0)
+        text = " ".join(f"{a:g}" for a in v)
+        if letter in "Aa":
+            rx, ry = rng.uniform(2, 20, 2).round(2)
+            text = f"{rx:g} {ry:g} {rng.integers(-90, 90)} {rng.integers(2)} {rng.integers(2)} {text}"
+        out += letter + (text.replace(" -", "-") if rng.random() < 0.5 and letter not in "Aa" else text)
+        if letter == "m":
+            out += " l3 1"
+    return out

@@ -1,0 +1,86 @@
+"""Files at random as armkin reads them, and how far that lies off what another reader makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import other_readers
+import random_drawings
+from armkin.path_file import gcode, svg
+from armkin.path_file.drawing import Placing, Wishes
+
+AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+def along(points: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, float]:
+    """Points at shares of a polyline's length, and the length."""
+    u = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    return np.stack([np.interp(f * u[-1], u, points[:, k]) for k in range(points.shape[1])], axis=1), float(u[-1])
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> float:
+    """Greatest distance of two ways, each point from the other way's segments about the same share of its length."""
+    f = np.linspace(0.0, 1.0, 4001)
+    (p, long), (q, other) = along(a, f), along(b, f)
+    return max(_off(p, q), _off(q, p), abs(long - other) / 50 - 0.01)
+
+
+def _off(p: np.ndarray, q: np.ndarray) -> float:
+    least = np.full(len(p), np.inf)
+    for shift in range(-4, 4):
+        i = np.clip(np.arange(len(p)) + shift, 0, len(q) - 2)
+        step = q[i + 1] - q[i]
+        share = ((p - q[i]) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-300)
+        foot = q[i] + np.clip(share, 0.0, 1.0)[:, None] * step
+        least = np.minimum(least, np.linalg.norm(p - foot, axis=1))
+    return float(least.max())
+
+
+def program_read(text: str) -> np.ndarray:
+    """What armkin reads of a program: (N, 3) [mm], arcs as chords."""
+    out: list[np.ndarray] = []
+    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, Wishes()).moves:
+        if move.point is not None:
+            out.append(np.array(move.point))
+        out += [np.array(p) for p in move.polyline or []]
+        if move.arc is not None:
+            out += list(_through(out[-1], np.array(move.arc.via), np.array(move.arc.to)))
+        if move.circle is not None:
+            c, n = np.array(move.circle.centre), np.array(move.circle.normal)
+            r, turn = out[-1] - c, 2 * np.pi * move.circle.turns
+            f = np.linspace(0.0, 1.0, int(2000 * max(abs(turn), 1.0)))[1:, None]
+            flat = np.cos(turn * f) * r + np.sin(turn * f) * np.cross(n, r)
+            out += list(c + flat + f * move.circle.rise * n)
+    return np.array(out)
+
+
+def _through(a: np.ndarray, via: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """An arc of three points: (N, 3)."""
+    u, v = via - a, b - a
+    w = np.cross(u, v)
+    if np.linalg.norm(w) < 1e-9:
+        return np.stack([via, b])
+    centre = a + np.cross((u @ u) * v - (v @ v) * u, w) / (2 * w @ w)
+    n, r = w / np.linalg.norm(w), a - centre
+    across = np.cross(n, r)
+    turn = np.arctan2((b - centre) @ across, (b - centre) @ r) % (2 * np.pi)
+    t = np.linspace(0.0, turn, 2000)[1:, None]
+    return np.asarray(centre + np.cos(t) * r + np.sin(t) * across)
+
+
+def program_off(seed: int) -> float:
+    """How far a program's way lies off the other reader's [mm]."""
+    text = random_drawings.program(seed)
+    return apart(program_read(text), other_readers.gcode(text))
+
+
+def drawing_off(seed: int) -> float:
+    """How far a drawing's strokes lie off the other reader's [mm]."""
+    text = random_drawings.drawing(seed)
+    strokes: list[list[list[float]]] = []
+    for move in svg.parse(text.encode(), "t.svg", AS_IT_IS, Wishes(lift=0.0)).moves:
+        if move.point is not None:
+            strokes.append([list(move.point)])
+        strokes[-1] += [list(p) for p in move.polyline or []]
+    mine = np.concatenate([np.array(s)[:, :2] for s in strokes])
+    return apart(mine, np.concatenate(other_readers.svg(text)))
