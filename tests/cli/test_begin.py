@@ -208,3 +208,22 @@ def test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again(tmp_pat
     assert armkin.load(path).motors[0].invert != armkin.load("three_dof").motors[0].invert
     process.stdout.close()
     process.stderr.close()
+
+
+@pytest.mark.parametrize(
+    ("robot", "j", "words"),
+    [
+        ("cobra600", 3, "the tool turns clockwise about z (the tool's own z), seen with z pointing at you"),
+        ("iiwa7", 0, "the tool turns counter-clockwise about z (the tool's own z), seen with z pointing at you"),
+        ("cobra600", 2, "the tool goes 2.0 mm, mostly towards -z"),
+    ],
+)
+def test_what_shall_be_seen_is_what_the_joint_does(robot: str, j: int, words: str) -> None:
+    from armkin.board.first_hour import _expected
+
+    arm = armkin.load(robot)
+    assert _expected(arm, arm.home, j) == words
+    q = arm.home.copy()
+    q[j] += 0.01
+    turned = armkin.fk(arm, q)[:3, :3] @ armkin.fk(arm, arm.home)[:3, :3].T  # about z of the base
+    assert np.sign(np.round(turned[1, 0], 6)) == {"clockwise": -1, "counter-clockwise": 1}.get(words.split()[3], 0)

@@ -243,7 +243,8 @@ def _expected(arm: Arm, q: Array, j: int) -> str:
     axis = fk(arm, q)[:3, :3].T @ J[3:]
     about = _towards(J[3:])
     seen = " (the tool's own z)" if abs(axis[2]) > 0.99 * float(np.linalg.norm(axis)) else ""
-    return f"the tool turns about {about}{seen}: counter-clockwise, seen with {about[1]} pointing at you"
+    turn = "counter-clockwise" if about[0] == "+" else "clockwise"
+    return f"the tool turns {turn} about {about[1]}{seen}, seen with {about[1]} pointing at you"
 
 
 def _towards(vector: Array) -> str:
