@@ -227,3 +227,21 @@ def test_what_shall_be_seen_is_what_the_joint_does(robot: str, j: int, words: st
     q[j] += 0.01
     turned = armkin.fk(arm, q)[:3, :3] @ armkin.fk(arm, arm.home)[:3, :3].T  # about z of the base
     assert np.sign(np.round(turned[1, 0], 6)) == {"clockwise": -1, "counter-clockwise": 1}.get(words.split()[3], 0)
+
+
+def test_a_key_that_comes_while_another_was_held_counts() -> None:
+    """Enter straight after a tap of + was taken for the end of the tap, and lost."""
+    from armkin.cli.keys import Keys
+
+    coming = list("+\n" + "+++\ny")
+    keys = Keys(lambda seconds: coming.pop(0) if coming else "")
+    assert keys.key() == "+"
+    assert keys.held("+") is None
+    assert keys.key() == ENTER
+    assert keys.key() == "+"
+    more = keys.held("+")
+    assert more is not None
+    assert more()
+    assert not more(), "another key ends it"
+    assert keys.key() == ENTER
+    assert keys.key() == "y"

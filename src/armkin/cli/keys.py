@@ -23,6 +23,7 @@ class Keys:
     def __init__(self, poll: Callable[[float], str]) -> None:
         """poll: the next key that comes within so many seconds, else an empty text."""
         self._poll = poll
+        self._other = ""  # a key that came while another one was held
 
     def say(self, text: str) -> None:
         """A line to read."""
@@ -30,9 +31,10 @@ class Keys:
 
     def key(self) -> str:
         """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
-        while True:
-            if found := self._poll(0.5):
-                return found
+        while not self._other:
+            self._other = self._poll(0.5)
+        found, self._other = self._other, ""
+        return found
 
     def ask(self, question: str, answers: str) -> str:
         """One of some keys; what was pressed before the question is none."""
@@ -44,7 +46,9 @@ class Keys:
 
     def held(self, key: str) -> Callable[[], bool] | None:
         """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
-        if self._poll(_BEGINS) != key:
+        found = self._poll(_BEGINS)
+        if found != key:
+            self._other = found
             return None
         last = time.monotonic()
 
@@ -53,12 +57,15 @@ class Keys:
             found = self._poll(_POLL)
             if found == key:
                 last = time.monotonic()
+            elif found:
+                self._other = found
             return found in ("", key) and time.monotonic() - last < _AGAIN
 
         return more
 
     def _quiet(self) -> None:
         """Wait until no key comes: one that was held until now answers nothing."""
+        self._other = ""
         while self._poll(_AGAIN):
             pass
 
