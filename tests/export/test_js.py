@@ -67,6 +67,20 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
     assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
 
 
+@pytest.mark.parametrize(
+    ("name", "degrees"),
+    [
+        ("thor", [135, 0, 0, 0, -135, 180]),  # the elbow stretched over the base: a self-motion of double roots
+        ("thor", [90, 180, 180, 90, 0, 0]),  # and with the wrist straight: a surface of them
+        ("fanuc_crx10ia", [135, -135, -90, 0, -45, 0]),  # four self-motions, two of which cross at a corner
+    ],
+)
+def test_self_motions_that_meet_are_those_of_python(name: str, degrees: list[float], tmp_path: Path) -> None:
+    arm = armkin.load(name)
+    q = np.deg2rad([degrees])
+    assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+
+
 def test_a_calibrated_arm_is_commanded_in_its_own_values(tmp_path: Path) -> None:
     arm = armkin.load(Path(__file__).parents[1] / "robots" / "ratio_arm.yaml")
     q = _random(arm, 40)

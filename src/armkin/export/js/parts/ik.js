@@ -146,11 +146,12 @@ function components(seeds, goal) {
     if (kind === 'boundary' && status === 'exact') status = kind;
     if (kind === 'curve' || kind === 'surface') status = 'singular';
     complete = complete && !crossed;
-    if (kind !== 'curve') {
-      if (kind === 'surface' && rows.some((row) => row.branch === seed.branch)) continue;
+    if (kind === 'exact' || kind === 'boundary') {
       rows.push(seed);
       continue;
     }
+    if (rows.some((row) => straight(row.q, seed.q, goal))) continue;
+    if (kind === 'surface') rows.push(seed);
     for (const path of paths) {
       if (rows.some((row) => row.path && oneCurve(path, row.path, goal))) continue;
       rows.push({ ...seed, path });
@@ -167,6 +168,23 @@ function joined(a, b, goal) {
   if (away > REACH) return false;
   const way = between(b, a);
   return [0.25, 0.5, 0.75].every((t) => newton(stepped(a, way, t), goal, 3, SPLIT).missed <= SOLUTION);
+}
+
+/** Whether the joints can go straight from one posture to another while they keep the target, each joint either way round.
+ * @param {Numbers} a @param {Numbers} b @param {Float64Array} goal */
+function straight(a, b, goal) {
+  let ways = [between(b, a)];
+  for (let j = 0; j < ARM.joints; j++)
+    if (!ARM.slides[j] && Math.abs(ways[0][j]) > 1e-3)
+      ways = ways.flatMap((way) => [way, way.map((x, k) => (k === j ? x - TURN * Math.sign(x) : x))]);
+  return ways.some((way) =>
+    [0.25, 0.5, 0.75].every((share) => {
+      const start = stepped(a, way, share);
+      if (!(missed(start, goal) < 1e-3)) return false;
+      const there = newton(start, goal, 3, SPLIT);
+      return there.missed <= SOLUTION && apart(there.q, start) < 1e-3;
+    }),
+  );
 }
 
 let copyInside = true;

@@ -147,7 +147,7 @@ function structure(q, goal) {
   if (wide.length > 0.7 * solved && !paths.length) {
     const mean = decompose(wide);
     if (!(mean.S[1] > 0.1 * mean.S[0])) paths.push(follow(q, mean.V[0], goal).path); // along one of them, the other stays lost
-    else return { kind: 'surface', paths: [], crossed: true, moves: q.map((_, j) => Math.hypot(...V.map((v) => v[j]))) };
+    else return { kind: 'surface', paths: [], crossed: true, moves: q.map((_, j) => Math.max(0, ...wide.map((way) => Math.abs(way[j]) - STRIDE / 10))) };
   }
   return { kind: paths.length ? 'curve' : solved ? 'exact' : 'boundary', paths, crossed: true };
 }
