@@ -42,6 +42,10 @@ def table() -> Table:
 def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
     fast = text.csv(table), text.json_lines(table)
     assert fast == by_python(table, monkeypatch)
+    with monkeypatch.context() as patch:
+        patch.setattr(text, "BLOCK", 3_333)
+        patch.setattr(text, "WORTH", 2_000)
+        assert fast == (text.csv(table), text.json_lines(table))
     names = ["", 'with, comma and "quote"', "right"]
     assert fast[0].splitlines()[7] == b"7,right,1.5e-07,true"
     assert csv_line([names[1]]).encode() in fast[0]

@@ -54,6 +54,29 @@ def test_a_killed_worker_loses_its_chunk_alone(address: str, where: str, tmp_pat
     assert mark.exists()
 
 
+_POOL = """
+import os, sys
+from armkin.engines.run import Engine, in_order
+from killed_once import waiting
+if __name__ == "__main__":
+    for found in in_order(Engine(workers=2), waiting, "", range(9)):
+        print(found, flush=True)
+"""
+
+
+def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
+    """Of the pool; a chunk that is in hand is not waited for."""
+    script = tmp_path / "pool.py"
+    script.write_text(_POOL)
+    finds = {**os.environ, "PYTHONPATH": os.fspath(ROOT / "tests")}
+    with subprocess.Popen([sys.executable, script], env=finds, text=True, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        answered = {int(process.stdout.readline()) for _ in range(2)}
+        process.kill()
+        assert process.pid not in answered
+        assert process.stdout.read() == ""  # ends when all that have it are gone
+
+
 def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(csv_rows, "ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)

@@ -34,6 +34,14 @@ def rows(table: Table) -> int:
     return len(next(iter(table.values()))) if table else 0
 
 
+def part(table: Table, some: slice) -> Table:
+    """Some rows of a table."""
+    return {
+        name: Words(column.index[some], column.names) if isinstance(column, Words) else column[some]
+        for name, column in table.items()
+    }
+
+
 def of_records(heading: Sequence[str], records: Sequence[Sequence[Any]]) -> Table:
     """A table of rows of numbers, words and None."""
     columns = zip(*records, strict=True) if records else [()] * len(heading)

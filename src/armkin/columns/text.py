@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.columns.cells import cell
-from armkin.columns.table import Column, Table, Words, rows
+from armkin.columns.table import Column, Table, Words, part, rows
 
 WORTH = 2_000  # rows for which pyarrow is worth its import
+BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
 
 
 def csv(table: Table) -> bytes:
@@ -37,7 +38,8 @@ def _written(table: Table, between: list[str], quoted: Callable[[Any], str], mis
     """All rows: between[i] stands before column i, the last one at the end."""
     count = rows(table)
     if count >= WORTH and (arrow := _arrow()) is not None:
-        return _by_arrow(arrow, table, between, quoted, missing)
+        parts = (table if count <= BLOCK else part(table, slice(i, i + BLOCK)) for i in range(0, count, BLOCK))
+        return b"".join([_by_arrow(arrow, some, between, quoted, missing) for some in parts])
     columns = [_texts(column, quoted, missing) for column in table.values()]
     if not count:
         return b""

@@ -102,7 +102,9 @@ class CompiledArm:
             with self._lock:
                 found = self._tasks.get(task)
                 if found is None:
-                    found = self._tasks[task] = _CompiledTask(self.arm, task)
+                    usual = self._tasks.get(None)
+                    same = usual is not None and bool(usual.branches) and usual.task.name == task
+                    found = self._tasks[task] = usual if usual is not None and same else _CompiledTask(self.arm, task)
         return found
 
 

@@ -1,9 +1,15 @@
-"""A pool of processes on this machine. A process that is killed takes its chunks with it: they are done again."""
+"""A pool of processes on this machine. A process that is killed takes its chunks with it: they are done again.
+
+They are copies of this process, with all that it has loaded; a copy of a process with threads would have the threads'
+locks without the threads, so then new interpreters are started. When this process is killed, those of the pool end.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -51,9 +57,16 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
 
 
 def _pool(workers: int, work: Callable[[Any, Any], Any], job: Any) -> ProcessPoolExecutor:
-    # new interpreters: a copy of this one would have its threads' locks without the threads
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("fork" if _threads() == 1 else "spawn")
     return ProcessPoolExecutor(workers, context, _begin, (work, job))
+
+
+def _threads() -> int:
+    """How many threads this process has, those of libraries among them; 0: the system does not tell."""
+    try:
+        return len(os.listdir("/proc/self/task"))
+    except OSError:
+        return 0
 
 
 def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
@@ -67,10 +80,20 @@ def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
 
 
 def _begin(work: Callable[[Any, Any], Any], job: Any) -> None:
-    """In a new process: Ctrl-C is the parent's matter."""
+    """In a new process: Ctrl-C is the parent's matter, and without the parent there is nothing to do."""
     global _job
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _job = work, job
+
+
+def _end_with_parent() -> None:
+    """The queue of chunks never ends for a process of the pool, as it holds both ends of it."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _done(chunk: Any) -> Any:

@@ -102,6 +102,9 @@ def ik(
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
         request = replace(request, ik=_compiled)
+        import armkin
+
+        armkin.compile(arm)  # before there are processes, which then have it, too
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):
