@@ -147,6 +147,12 @@ def ik(
     )
 
 
+def isolated(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:
+    """`ik` for those who follow single branches: raises RedundantArmError where the answers of a target are curves."""
+    solver(actual(arm), task)
+    return ik(arm, targets, task, **more)
+
+
 def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
     """Commanded values as actual ones; what has a wrong shape is left for `ik` to refuse."""
     close = None if near is None else arrays.real(near, "near")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import ik
+from armkin.inverse.solve import isolated as ik
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

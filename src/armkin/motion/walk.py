@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.names import find
-from armkin.inverse.solve import ik
+from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, said

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import jacobian
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import ik
+from armkin.inverse.solve import isolated as ik
 from armkin.model.limits import SLACK
 from armkin.motors import joints_per_pulse
 from armkin.reachability.cells import STRAIGHT, Grid

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import ik
+from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import rotation_about
 from armkin.reachability import carrying
