@@ -85,8 +85,8 @@ def frames() -> str:
     )
     add(
         "STATUS tag=7 next=6 error=0 detail=0 state=1 flags=7 free=28 queued=313 known=23 switches=7 "
-        "overruns=0 bad=1 page=0 session=48879 counts=-40,-317,212,0,1500",
-        struct.pack("<8BHH4BH5i", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, 48879, -40, -317, 212, 0, 1500),
+        "overruns=0 bad=1 page=0 session=48879 counts=-40,-317,212,0,1500 late_servos=3",
+        struct.pack("<8BHH4BH5iB", 0x82, 7, 6, 0, 0, 1, 7, 28, 313, 23, 7, 0, 1, 0, 48879, -40, -317, 212, 0, 1500, 3),
     )
     head = "# NAME field=value ... | payload | wire, written by generate.py from PROTOCOL.md\n"
     return head + "".join(f"{text} | {p.hex()} | {wire(p).hex()}\n" for text, p in lines)

@@ -160,7 +160,7 @@ def report(
 ) -> str:
     free = board.queue if free is None else free
     head = struct.pack("<8BHH", 0x82, tag, next_, error, detail, state, flags, free, queued, known).hex()
-    return head + "??00" + bad + struct.pack(f"<BH{len(counts)}i", page, digest, *counts).hex()
+    return head + "??00" + bad + struct.pack(f"<BH{len(counts)}iB", page, digest, *counts, 0).hex()
 
 
 def rates(ticks: int, steps: list[int], unit: int = 1) -> list[int]:

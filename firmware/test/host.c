@@ -176,7 +176,7 @@ struct ack host_jog(const int32_t *rate) {
 struct status host_status(uint8_t page) {
     uint8_t payload[300] = {0x02, 7, page};
     bench_payload(payload, 3);
-    CHECK(answer(0x82, payload) == 18 + 4 * AXES);
+    CHECK(answer(0x82, payload) == 19 + 4 * AXES);
     CHECK(payload[1] == 7);
     struct status status = {
         .ack = read_ack(payload + 2),

@@ -44,7 +44,7 @@ class Board(NamedTuple):
 BOARDS = {
     board.kind: board
     for board in (
-        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 152, 448, receive=167),
+        Board("uno_cnc_shield", 1, ("X", "Y", "Z", "A"), ("S0",), ("X", "Y", "Z"), 32, 152, 400, receive=167),
         Board(
             "mega_ramps14",
             2,

@@ -115,16 +115,16 @@ def chip_rows() -> None:
         figures = f"{run.jitter_us:.1f} us, {run.overruns} overruns{fault}"
         row(f"{board}: 25 kHz on all, jitter p2p", figures, "misses ticks" if board == "uno_cnc_shield" else "")
         row(f"{board}: stack never touched", f"{run.stack_free} B")
-    top = measure.ceiling("uno_cnc_shield", range(30_000, 36_000, 500))
+    top = measure.ceiling("uno_cnc_shield", range(35_000, 40_001, 500))
     row("uno_cnc_shield: clean up to, 4 axes + servo", f"{top / 1000:.1f} kHz", "20 kHz, 3 axes")
     top = measure.ceiling("mega_ramps14", range(25_000, 28_000, 500))
     row("mega_ramps14: clean up to, 5 axes + 4 servos", f"{top / 1000:.1f} kHz", "")
-    setup, high, low, _ = measure.reversing("uno_cnc_shield", 448)
+    setup, high, low, _ = measure.reversing("uno_cnc_shield", 400)
     row("DIR set-up, STEP high, STEP low, shortest", f"{setup:.1f}, {high:.1f}, {low:.1f} us", "0.375 us set-up")
     row("first step after the first batch", f"{measure.first_step_ms():.2f} ms", "2.3 ... 3.6 ms")
     for baud, rates, grbl in (
         (115_200, (500, 550, 600, 650), "325 ... 372"),
-        (250_000, (700, 750, 800, 850, 900), ""),
+        (250_000, (1_000, 1_050, 1_100, 1_150, 1_200, 1_250), ""),
     ):
         best = 0.0
         for rate in rates:

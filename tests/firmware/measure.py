@@ -216,6 +216,48 @@ def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, 
 
 
 @dataclass(frozen=True)
+class Turning:
+    """Every motor turns round with every segment, a servo on, STATUS? every 10 ms."""
+
+    exact: bool  # counts and pins agree with the plan
+    error: int
+    overruns: int
+    violations: int  # of a DRV8825's timing
+    servo_ms: float  # longest period of the servo's pulses
+    late_servos: int  # as the board counts them
+    stack_free: int
+
+
+def turning(board: str, interval: int, ticks: int = 100, count: int = 200) -> Turning:
+    """`count` segments of one step a tick on every stepper, `interval` cycles a tick, each the other way."""
+    steppers = STEPPERS[board]
+    with EmulatedBoard(board, speed="step", driver="drv8825") as emulated:
+        host = BareHost(emulated)
+        host.run(0.02)
+        fast = replace(WIDE, max_rate=60_000, max_accel=15_000_000)
+        image = replace(image_for(board, fast), step_high=19, step_low=19, dir_setup=7)
+        host.setup(image, counts_at_home(board))
+        host.run(0.1)
+        emulated.control("clear")
+        work = [whole(100, 16_000, 0, (0,) * steppers)]  # a pause in front, while the queue fills
+        work += [whole(ticks, interval, 0, ((-1) ** n * ticks,) * steppers) for n in range(count)]
+        plan = batches(tuple(range(steppers)), (0,) * steppers, work, 6)
+        status = host.stream(plan, poll=0.01, slice_s=0.25e-3)
+        stats = emulated.stats()
+        figures = list(stats["axes"].values())[:steppers]
+        exact = status.counts[:steppers] == plan[-1].end and all(f["net"] == 0 for f in figures)
+        return Turning(
+            exact,
+            status.error,
+            status.overruns,
+            sum(sum(f["violations"].values()) for f in figures),
+            next(iter(stats["servos"].values()))["period_max_us"] / 1e3,
+            status.late_servos,
+            stats["memory"]["stack_never_touched"],
+        )
+
+
+@dataclass(frozen=True)
 class Noise:
     """A motion of 1,000 segments over a line that flips and drops bytes in both directions."""
 

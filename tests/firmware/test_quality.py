@@ -17,13 +17,30 @@ def test_25_khz_on_every_stepper_with_every_feature_on(board: str) -> None:
 
 
 def test_the_shortest_interval_that_the_board_accepts_is_kept() -> None:
-    got = measure.stepping("uno_cnc_shield", 35_000)
+    got = measure.stepping("uno_cnc_shield", 40_000)
     assert got.exact
     assert (got.error, got.overruns, got.violations) == (0, 0, 0)
     assert got.jitter_us <= 10.5
 
 
-@pytest.mark.parametrize(("board", "interval"), [("uno_cnc_shield", 448), ("mega_ramps14", 576)])
+@pytest.mark.parametrize(("board", "interval", "ticks"), [("uno_cnc_shield", 400, 100), ("mega_ramps14", 576, 100)])
+def test_motors_turn_round_at_the_shortest_interval_that_the_board_tells(board: str, interval: int, ticks: int) -> None:
+    got = measure.turning(board, interval, ticks)
+    assert got.exact
+    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
+    assert got.servo_ms < 25
+    assert got.late_servos == 0
+    assert got.stack_free >= 128
+
+
+def test_40_ticks_a_segment_at_25_khz_do_not_run_dry() -> None:
+    got = measure.turning("uno_cnc_shield", 640, ticks=40)
+    assert got.exact
+    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
+    assert got.servo_ms < 25
+
+
+@pytest.mark.parametrize(("board", "interval"), [("uno_cnc_shield", 400), ("mega_ramps14", 576)])
 @pytest.mark.parametrize("high", [19, 80])
 def test_driver_times_while_turning_round_at_the_fastest_ticks(board: str, interval: int, high: int) -> None:
     dir_setup, step_high, step_low, violations = measure.reversing(board, interval, high)

@@ -28,7 +28,7 @@ const pace = {
   speed: options.speed === 'max' || stepped ? 0 : Number(options.speed), ahead: Number(options.ahead) / 1e3,
   patience: Number(options.patience) / 1e3,
 };
-const MOST_PATIENCE = 3_000_000_000n; // [ns] whoever is silent for so long has closed the port, which is not seen here
+const MOST_PATIENCE = 10_000_000_000n; // [ns] whoever is silent for so long has closed the port, which is not seen here
 const heard = []; // bytes from the board that nobody has taken yet
 
 const pins = new Pins(options.driver, options.trace);

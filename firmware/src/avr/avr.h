@@ -12,7 +12,7 @@ uint8_t serial_waiting(const uint8_t **bytes);  // so many that came, in a row
 void serial_taken(uint8_t count);
 
 void servo_setup(void);
-void servo_frame(void);  // every 20 ms: one pulse each
+bool servo_frame(void);  // every 20 ms: one pulse each; false: those of the frame before are not done
 
 void pins_setup(void);
 

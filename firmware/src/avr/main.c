@@ -5,20 +5,26 @@
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
 
+#include "../core/hal.h"
 #include "../core/link.h"
 #include "../core/protocol.h"
 #include "avr.h"
 
-enum { SERVO_PERIOD_MS = 20, AT_ONCE = 16 };
+enum { AT_ONCE = 16 };
+enum { FRAME = 625, LATE_FRAME = FRAME + 156 };  // half units of timer 0: 20 ms, 25 ms
 
-// Timer 0 counts units of 64 µs and is looked at, not interrupted by: no millisecond is lost if a look comes 16 ms late.
-// True once for each millisecond; those that are late come one a turn, and bytes between them.
-static bool millisecond_due(void) {
+// Timer 0 counts units of 64 µs and is looked at, not interrupted by: no time is lost if a look comes 16 ms late.
+static uint8_t units_gone(void) {
     static uint8_t before;
-    static uint16_t eighths;  // of a millisecond's 15.625 units: 125
-    const uint8_t now = TCNT0;
-    eighths += 8 * (uint8_t)(now - before);
+    const uint8_t now = TCNT0, gone = now - before;
     before = now;
+    return gone;
+}
+
+// True once for each millisecond; those that are late come one a turn, and bytes between them.
+static bool millisecond_due(uint8_t units) {
+    static uint16_t eighths;  // of a millisecond's 15.625 units: 125
+    eighths += 8 * units;
     if (eighths < 125) {
         return false;
     }
@@ -26,14 +32,15 @@ static bool millisecond_due(void) {
     return true;
 }
 
-static void millisecond(void) {
-    protocol_millisecond();
-    if (SERVOS) {
-        static uint8_t until_frame;
-        if (until_frame-- == 0) {
-            until_frame = SERVO_PERIOD_MS - 1;
-            servo_frame();
+// Servo frames keep their own time: they do not wait for milliseconds that are late.
+static void servos(uint8_t units) {
+    static uint16_t waited;
+    waited += 2 * units;
+    if (waited >= FRAME && servo_frame()) {
+        if (waited >= LATE_FRAME && hal_late_servos < 255) {
+            hal_late_servos++;
         }
+        waited = 0;
     }
 }
 
@@ -58,8 +65,12 @@ int main(void) {
     for (;;) {
         wdt_reset();
         take_bytes();
-        if (millisecond_due()) {
-            millisecond();
+        const uint8_t units = units_gone();
+        if (SERVOS) {
+            servos(units);
+        }
+        if (millisecond_due(units)) {
+            protocol_millisecond();
         }
         protocol_poll();
         protocol_frame();

@@ -74,10 +74,10 @@ ISR(TIMER2_COMPA_vect) {
     }
 }
 
-APART void servo_frame(void) {
+APART bool servo_frame(void) {
     int32_t counts[AXES];
     if (busy) {
-        return;
+        return false;
     }
     motion_counts(counts);
     for (uint8_t i = 0; i < SERVOS; i++) {
@@ -86,7 +86,7 @@ APART void servo_frame(void) {
     }
     current = 0;
     if (!find_pulse()) {
-        return;
+        return true;
     }
     busy = rising = true;
     ahead = 0;
@@ -94,6 +94,7 @@ APART void servo_frame(void) {
     OCR2A = moment - EARLY;
     TIFR2 = 1 << OCF2A;  // the compare is set: a match with the one before would count as a turn of the first pulse
     TIMSK2 = 1 << OCIE2A;
+    return true;
 }
 
 void servo_setup(void) {

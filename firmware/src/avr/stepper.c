@@ -3,6 +3,7 @@
 // Order in it: step edges first, so that they only wait for the interrupt itself; then the timer, while there is plenty of time;
 // then the arithmetic of the next tick, during which STEP stays high; then STEP low.
 #include <avr/interrupt.h>
+#include <stddef.h>
 
 #include "../chip.h"
 #include "../core/config.h"
@@ -18,8 +19,18 @@ static uint8_t step_high;  // cycles that STEP stays high at least
 static const volatile uint8_t *probe_port;
 static uint8_t probe_mask, probe_level;
 
-// -Os, as the Arduino IDE compiles, would make it slower.
-__attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
+#if STEPPERS && !defined(TICK_IN_C)  // that is the oracle of the tick by hand
+#define BY_HAND 1
+#define TICK __vector_tick
+#else
+#define BY_HAND 0
+#define TICK TIMER1_COMPA_vect
+#endif
+
+// Any tick; if there is one by hand, behind its step edges. -Os, as the Arduino IDE compiles, would make it slower.
+void TICK(void) __attribute__((signal, used, externally_visible, optimize("O2")));
+void TICK(void) {
+#if !BY_HAND
     const uint8_t bits = dda.bits;
     (void)bits;
 #define STEP_HIGH(i, port, bit, ...) \
@@ -27,6 +38,7 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
         PIN_HIGH(port, bit);         \
     }
     STEPPER_PINS(STEP_HIGH)
+#endif
     const uint16_t rise = TCNT1;
 
     if (dda.probe) {
@@ -54,6 +66,10 @@ __attribute__((optimize("O2"))) ISR(TIMER1_COMPA_vect) {
         dda.overruns++;
     }
 }
+
+#if BY_HAND
+#include "short_tick.h"
+#endif
 
 void hal_timer_start(uint16_t interval) {
     HAL_LOCK();

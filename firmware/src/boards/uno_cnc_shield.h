@@ -10,7 +10,7 @@
 #define QUEUE_SLOTS 32  // a power of two
 #define FRAME_MAX 152
 #define RECEIVE 167  // bytes: a whole frame, and a question
-#define MIN_INTERVAL 448  // cycles between ticks: 35.7 kHz
+#define MIN_INTERVAL 400  // cycles between ticks: 40 kHz
 
 // axis, STEP port and bit, DIR port and bit
 #define STEPPER_PINS(P) \

@@ -19,10 +19,17 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.left = s->ticks;
     dda.interval = (uint32_t)interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
+    const axes_t back = s->back;
+    if (dda.prepared) {
+        dda.prepared = false;
+        dda.back = back;
+        dda_direction(back);
+        return true;
+    }
     if (dda.back & LAST) {
         dda_rest();
     }
-    const axes_t back = s->back, turned = dda.back ^ back, fine = s->fine;
+    const axes_t turned = dda.back ^ back, fine = s->fine;
     (void)turned;
     (void)fine;
 #define LOAD(i, ...)                          \

@@ -56,6 +56,7 @@ struct dda {
     fine_t phase[STEPPERS ? STEPPERS : 1], rate[STEPPERS ? STEPPERS : 1];
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
+    bool prepared;              // the next segment's rates are taken, and phases turned: avr/short_tick.h
     uint8_t overruns;
 
     uint16_t stretch;      // hold: intervals become `stretch`/256 times as long; 256: as planned
@@ -84,6 +85,7 @@ static inline void dda_rest(void) {
         dda.phase[i] = PHASE_HALF;
     }
     dda.back = 0;
+    dda.prepared = false;
 }
 
 // After each block of ticks.

@@ -8,6 +8,7 @@
 // Serial line out. A reply goes only if it fits, so that the core never waits.
 uint8_t hal_send_room(void);
 void hal_send(uint8_t byte);
+extern volatile uint8_t hal_late_servos;  // frames of servo pulses that came too late, saturating; the session sets it to 0
 extern volatile uint8_t hal_spilled;  // set by the chip when bytes are lost because more than HAL_RECEIVE wait
 
 // The tick timer: its interrupt runs dda.h. start: the first tick comes after `interval` cycles.

@@ -18,7 +18,7 @@ enum { SILENCE_MS = 500 };
 enum { DRIVERS = 1, PULSES = 2, CONFIGURED = 4, RETAINED = 8, ABORTED = 16, LATCH = 32, CUT = 64 };  // flags
 
 struct session session;
-volatile uint8_t hal_spilled;
+volatile uint8_t hal_spilled, hal_late_servos;
 
 static uint32_t nonce;
 static bool greeted;  // `nonce` is of a HELLO
@@ -118,7 +118,8 @@ APART static void send_status(uint8_t tag, uint8_t page) {
     for (uint8_t i = 0; i < AXES; i++) {
         p = put32(p, counts[i]);
     }
-    link_send(reply, 18 + 4 * AXES);
+    *p = hal_late_servos;
+    link_send(reply, 19 + 4 * AXES);
 }
 
 // Whether an answer fits the line out: until then a frame waits, so that every one is answered.
@@ -148,7 +149,7 @@ static void hello(const uint8_t *p) {
         end(E_HELD, 0);  // whatever the former host had moving
         session.next = session.error = session.detail = 0;
         session.digest = said;
-        dda.overruns = link_bad = 0;
+        dda.overruns = link_bad = hal_late_servos = 0;
         nonce = said;
         greeted = true;
     }
@@ -204,11 +205,10 @@ static void watch_line(void) {
         return;
     }
     hal_spilled = 0;
-    if (!session.error) {
-        session.detail = E_SPILL;
-        send_ack(CREDIT);
-        session.detail = 0;
-    }
+    const uint8_t detail = session.detail;
+    session.detail = session.error ? detail : E_SPILL;
+    send_ack(CREDIT);
+    session.detail = detail;
 }
 
 APART void protocol_poll(void) {

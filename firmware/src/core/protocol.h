@@ -19,7 +19,7 @@ struct session {
 };
 extern struct session session;
 
-enum { LARGEST_REPLY = 18 + 4 * AXES + 6 > 41 ? 18 + 4 * AXES + 6 : 41 };  // STATUS or INFO on the line
+enum { LARGEST_REPLY = 19 + 4 * AXES + 6 > 41 ? 19 + 4 * AXES + 6 : 41 };  // STATUS or INFO on the line
 
 void protocol_start(uint8_t cause);  // MCUSR of the reset, 0: hidden
 void protocol_frame(void);           // does what link_bytes() has found to be whole, once there is room for its answer

@@ -51,7 +51,7 @@ static void one_segment(bool resting) {
     if (resting) {
         before = (struct pace){.time = pace.time};
     }
-    if (read_axis(rate, i, 1 << i, s, &pace) != OK || accelerates(i, 1 << i, a, &before, s, &pace) || plan_axis(i, 1 << i, s) != OK) {
+    if (read_axis(rate, i, 1 << i, s, &pace) != OK || (!unchecked(i, a, &before, s, &pace) && accelerates(i, 1 << i, a, &before, s, &pace)) || plan_axis(i, 1 << i, s) != OK) {
         return;
     }
     motion_units(s);

@@ -181,6 +181,7 @@ class Status:
     page: int
     session: int
     counts: tuple[int, ...]
+    late_servos: int = 0  # frames of servo pulses; firmware of before it was told says nothing
 
 
 Reply = Ack | Info | Status
@@ -268,10 +269,10 @@ def parse(payload: bytes) -> Reply | None:
     if kind == Type.INFO and size == _INFO.size:
         _, tag, version, major, minor, *rest = _INFO.unpack(payload)
         return Info(tag, version, (major, minor), *rest)
-    if kind == Type.STATUS and size >= _STATUS.size and (size - _STATUS.size) % 4 == 0:
-        n = (size - _STATUS.size) // 4
+    if kind == Type.STATUS and size >= _STATUS.size and (size - _STATUS.size) % 4 <= 1:
+        n, late = divmod(size - _STATUS.size, 4)
         counts = struct.unpack_from(f"<{n}i", payload, _STATUS.size)
-        return Status(*(*_STATUS.unpack_from(payload)[1:], counts))
+        return Status(*(*_STATUS.unpack_from(payload)[1:], counts, payload[-1] if late else 0))
     return None
 
 
@@ -302,4 +303,4 @@ def pack_status(status: Status) -> bytes:
         status.free, status.queued, status.known, status.switches, status.overruns, status.bad, status.page,
         status.session,
     )  # fmt: skip
-    return head + struct.pack(f"<{len(status.counts)}i", *status.counts)
+    return head + struct.pack(f"<{len(status.counts)}iB", *status.counts, status.late_servos)
