@@ -18,6 +18,9 @@ _Static_assert(STEPPERS <= 8 && AXES <= 15, "masks of axes");
 #define ALL_AXES ((1U << AXES) - 1)
 #define STEPPER_AXES ((1U << STEPPERS) - 1)
 #define SERVO_AXES (ALL_AXES & ~STEPPER_AXES)
+#ifndef WATCHED_INTERVAL
+#define WATCHED_INTERVAL (MIN_INTERVAL + MIN_INTERVAL / 8)
+#endif
 // What a driver may ask for, 0.1 us, where a board has not less room in MIN_INTERVAL.
 #ifndef STEP_HIGH_MAX
 #define STEP_HIGH_MAX 80

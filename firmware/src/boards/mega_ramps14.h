@@ -10,6 +10,7 @@
 #define FRAME_MAX 240
 #define RECEIVE 255       // bytes
 #define MIN_INTERVAL 576  // cycles between ticks: 27.8 kHz
+#define WATCHED_INTERVAL 864  // while homing watches a switch, as these ticks take longer
 
 // axis, STEP port and bit, DIR port and bit: D54/D55, D60/D61, D46/D48, D26/D28, D36/D34
 #define STEPPER_PINS(P) \

@@ -11,6 +11,7 @@
 #define FRAME_MAX 152
 #define RECEIVE 167  // bytes: a whole frame, and a question
 #define MIN_INTERVAL 400  // cycles between ticks: 40 kHz
+#define WATCHED_INTERVAL 720  // while homing watches a switch, as these ticks take longer
 
 // axis, STEP port and bit, DIR port and bit
 #define STEPPER_PINS(P) \

@@ -6,7 +6,8 @@
 enum { SLICES = 3, SLICE_MS = 8 };
 #define SLICE (CLOCK / 1000 * SLICE_MS)  // cycles
 #define TICKS (SLICE / (MIN_INTERVAL + MIN_INTERVAL / 8))
-_Static_assert(TICKS >= 16 && SLICE / TICKS <= 0xFFFF, "a slice is one segment");
+#define WATCHED_TICKS (SLICE / WATCHED_INTERVAL)  // where HOME is not faster than one step with each
+_Static_assert(WATCHED_TICKS >= 16 && WATCHED_TICKS <= TICKS && SLICE / WATCHED_TICKS <= 0xFFFF, "a slice is one segment");
 static const float SECONDS = SLICE_MS / 1e3F;
 
 struct cruise cruise;
@@ -93,10 +94,11 @@ static void slice(void) {
         }
     }
     struct segment *s = motion_slot(0);
-    const float part = (cruise.share + next) / 2 * (SECONDS / TICKS * (1UL << 16));
+    const bool watched = !cruise.bounded && size(cruise.rate[cruise.leader]) < WATCHED_TICKS * 1000UL / SLICE_MS;
+    const float part = (cruise.share + next) / 2 * (watched ? SECONDS / WATCHED_TICKS * (1UL << 16) : SECONDS / TICKS * (1UL << 16));
     memset(s, 0, sizeof *s);
-    s->ticks = TICKS;
-    s->interval = SLICE / TICKS;
+    s->ticks = watched ? WATCHED_TICKS : TICKS;
+    s->interval = watched ? SLICE / WATCHED_TICKS : SLICE / TICKS;
     for (uint8_t i = 0; i < AXES; i++) {
         const float rate = size(cruise.rate[i]) * part;
         const bool fine = rate < 256;
