@@ -56,7 +56,7 @@ struct dda {
     fine_t phase[STEPPERS ? STEPPERS : 1], rate[STEPPERS ? STEPPERS : 1];
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
-    bool prepared;              // the next segment's rates are taken, and phases turned: avr/short_tick.h
+    bool prepared;              // the next segment's rates are taken, and phases turned, by a chip's own tick
     uint8_t overruns;
 
     uint16_t stretch;      // hold: intervals become `stretch`/256 times as long; 256: as planned

@@ -269,7 +269,7 @@ def parse(payload: bytes) -> Reply | None:
     if kind == Type.INFO and size == _INFO.size:
         _, tag, version, major, minor, *rest = _INFO.unpack(payload)
         return Info(tag, version, (major, minor), *rest)
-    if kind == Type.STATUS and size >= _STATUS.size and (size - _STATUS.size) % 4 <= 1:
+    if kind == Type.STATUS and size >= _STATUS.size + 4 and (size - _STATUS.size) % 4 <= 1:
         n, late = divmod(size - _STATUS.size, 4)
         counts = struct.unpack_from(f"<{n}i", payload, _STATUS.size)
         return Status(*(*_STATUS.unpack_from(payload)[1:], counts, payload[-1] if late else 0))
