@@ -11,6 +11,7 @@
 //   HAL_NEAR(pointer)          keep it in a register that its fields are reached from, or nothing
 //   HAL_COMING(cycles)         the next tick's interval, told in time where loading a segment may take longer than the one before
 //   DDA_AXIS(i, …)             one axis of the tick, see core/dda.h
+//   HAL_PREPARES               whether its tick takes the next segment's rates ahead of time (dda.prepared)
 //   dda_direction(back)        sets the DIR pins, inline where a call would cost too much
 #pragma once
 

@@ -18,5 +18,6 @@ void dda_direction(uint16_t back);
     planned = dda.interval >> 16; \
     dda.interval += dda.add >> 8;
 
+#define HAL_PREPARES 0
 #define HAL_NEAR(pointer)
 #define HAL_COMING(cycles)

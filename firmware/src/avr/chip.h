@@ -17,6 +17,7 @@
     SREG = sreg;     \
     }
 #define HAL_NOINIT __attribute__((section(".noinit")))
+#define HAL_PREPARES 1
 #define HAL_TABLE PROGMEM
 #define HAL_READ32(p) pgm_read_dword_near(p)
 #define HAL_RECEIVE RECEIVE

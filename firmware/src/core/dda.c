@@ -20,7 +20,7 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.interval = (uint32_t)interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
     const axes_t back = s->back;
-    if (dda.prepared) {
+    if (HAL_PREPARES && dda.prepared) {
         dda.prepared = false;
         dda.back = back;
         dda_direction(back);

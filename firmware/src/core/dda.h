@@ -85,7 +85,9 @@ static inline void dda_rest(void) {
         dda.phase[i] = PHASE_HALF;
     }
     dda.back = 0;
-    dda.prepared = false;
+    if (HAL_PREPARES) {
+        dda.prepared = false;
+    }
 }
 
 // After each block of ticks.
