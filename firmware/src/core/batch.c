@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "acceleration.h"
 #include "bytes.h"
 #include "inputs.h"
 #include "motion.h"
@@ -9,28 +10,10 @@
 enum { END = 1, WIDE = 2, GENTLE = 4 * (GENTLE_PARTS - 1) };  // flags
 enum { HEAD = 6 };                     // type, tag, mask, flags, n
 enum { NARROW_SIZE = 5, WIDE_SIZE = 11 };  // of a segment, without its rates
+_Static_assert(FRAME_MAX / NARROW_SIZE < QUEUE_SLOTS, "a batch leaves the segment before it where it is");
 
 enum { QUICK_INTERVAL = MIN_INTERVAL + MIN_INTERVAL / 4 };  // a tick that counts the bend costs more
-#define RECIPROCAL (1UL << (VELOCITY_BITS - 15))
-_Static_assert(FRAME_MAX / NARROW_SIZE < QUEUE_SLOTS, "a batch leaves the segment before it where it is");
-_Static_assert(RECIPROCAL / MIN_INTERVAL < 1UL << 16, "the reciprocal of an interval has 16 bits");
-
-// A segment's time: in 2^-16 of 50 ms from 16 cycles, and a longer one's in 2^-8 of 50 ms from 256 cycles.
-#define FRACTION ((uint32_t)((1ULL << 35) / (CLOCK / 20)))
-#define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
-_Static_assert((uint64_t)FRACTION * (CLOCK / 20 / 16) < 1ULL << 32 && FRACTION * (MIN_INTERVAL / 16) >> 15, "32 bits; no segment takes no time");
 enum { LONGEST_BEND = 1 << 14, LONGEST_QUICK = 1 << 10 };
-
-// Velocities are rounded down in two places.
-static const uint32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
-enum { CYCLES = 2 * VELOCITY_BITS - 67 };  // of a velocity, what whole cycles of its intervals make: 2^-9, or 2^-7
-
-// What is the same for all axes of a segment.
-struct pace {
-    uint16_t first, last;  // RECIPROCAL / interval; at rest 0
-    uint16_t time;         // 2^-16 of 50 ms, at most 50 ms; 0: rest, which is as long as the segment beside it
-    uint16_t windows;      // of a longer one: 2^-8 of 50 ms; else 0
-};
 
 static enum error check_axis(uint8_t i, int32_t start) {
     if (!(limits.used >> i & 1)) {
@@ -100,37 +83,6 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     return motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
-// RECIPROCAL / interval: long division of a power of two, a third of what a small chip's library takes.
-static uint16_t reciprocal(uint16_t interval) {
-    uint16_t rest = RECIPROCAL >> 16, quotient = 0;
-    for (uint8_t bit = 0; bit < 16; bit++) {
-        const bool over = rest >> 15;
-        rest <<= 1;
-        quotient <<= 1;
-        if (over || rest >= interval) {
-            rest -= interval;
-            quotient |= 1;
-        }
-    }
-    return quotient;
-}
-
-static void take_pace(const struct segment *s, uint16_t last, struct pace *pace) {
-    pace->first = pace->last = reciprocal(s->interval);
-    if (s->add) {
-        pace->last = reciprocal(last);
-    }
-    const uint32_t cycles = (uint32_t)s->ticks * (((uint32_t)s->interval + last) >> 1);
-    pace->windows = 0;
-    if (cycles < CLOCK / 20) {
-        pace->time = (cycles >> 4) * FRACTION >> 15;
-    } else {
-        const uint32_t windows = ((cycles >> 16) * WINDOW >> 8) + ((cycles >> 8 & 0xFF) * WINDOW >> 16);
-        pace->time = 0xFFFF;
-        pace->windows = windows < 0xFFFF ? windows : 0xFFFF;
-    }
-}
-
 static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {
     int32_t last;
     read_times(p, wide, s);
@@ -139,80 +91,6 @@ static enum error read_head(const uint8_t *p, bool wide, struct segment *s, stru
     }
     take_pace(s, last, pace);
     return OK;
-}
-
-static uint32_t distance(int32_t a, int32_t b) {
-    return a > b ? (uint32_t)a - (uint32_t)b : (uint32_t)b - (uint32_t)a;
-}
-
-// What 5/4 of max_accel makes of an axis's velocity; in units 2^8 as great where `time` is. 24 by 16 bits, in parts that a small chip is quick with.
-static uint32_t budget(uint8_t axis, uint16_t time) {
-    const uint16_t low = limits.jump[axis], high = limits.jump[axis] >> 16;
-    return ((uint32_t)low * time >> 8) + ((uint32_t)high * time << 8);
-}
-
-static uint16_t size(const struct segment *s, uint8_t axis, axes_t bit) {
-    return s->fine & bit ? s->rate[axis] >> 9 : s->rate[axis] >> 1;
-}
-
-static int32_t velocity(uint16_t size, uint16_t reciprocal, bool back) {
-    const uint32_t v = (uint32_t)size * reciprocal;
-    return back ? -(int32_t)v : (int32_t)v;
-}
-
-// A quarter of the velocity in the middle of a segment; of a longer one than 50 ms, 25 ms from the end where it is `from`.
-static int32_t quarter(int32_t from, int32_t to, uint16_t windows) {
-    const int32_t half = from >> 1, change = (to >> 1) - half;
-    if (!windows) {
-        return (half + (change >> 1)) >> 1;
-    }
-    const uint16_t part = (1UL << 23) / windows;
-    return (half + (change >> 16) * part + (int32_t)((uint32_t)(uint16_t)change * part >> 16)) >> 1;
-}
-
-// What changes have taken beyond their budget until now; true if that is more than rounding may be.
-static bool beyond(fine_t *excess, int32_t change, uint32_t budget, uint32_t slack) {
-    const int32_t sum = (int32_t)*excess + change;
-    if (sum <= 0 || (uint32_t)sum <= budget) {
-        *excess = 0;
-        return false;
-    }
-    *excess = (uint32_t)sum - budget;
-    return (uint32_t)sum - budget > slack;
-}
-
-static inline bool unchecked(uint8_t axis, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
-    if (limits.jump[axis] < JUMP_MAX && ((before->first && a->rate[axis]) || (pace->first && b->rate[axis]))) {
-        return false;
-    }
-    motion.plan_excess[axis][0] = motion.plan_excess[axis][1] = 0;
-    return true;
-}
-
-// Does an axis's velocity jump from `a` to `b`, or change within `b`, by more than its budget? Between the middles of both, too, the change
-// is within that; what was beyond it is kept, each way, and at most rounding's: so the velocities in the middles of any two
-// segments differ by no more than the budget of the time between, and rounding once, however short the segments are.
-static bool accelerates(uint8_t axis, axes_t bit, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
-    fine_t *const excess = motion.plan_excess[axis];
-    if (before->windows) {
-        excess[0] = excess[1] = 0;
-    }
-    const uint16_t size_a = size(a, axis, bit), size_b = size(b, axis, bit);
-    const int32_t left = velocity(size_a, before->last, a->back & bit), first = velocity(size_b, pace->first, b->back & bit);
-    const bool even = before->first == before->last && pace->first == pace->last;
-    const uint32_t between = budget(axis, (before->time >> 1) + (pace->time >> 1)), jump = distance(left, first);
-    if (even && !excess[0] && !excess[1] && jump + 4 <= between) {  // as nearly always: nothing to add up
-        return false;
-    }
-    const int32_t last = even ? first : velocity(size_b, pace->last, b->back & bit);
-    const uint32_t slack = ROUNDING + ((distance(left, 0) + distance(last, 0)) >> CYCLES), change = distance(first, last);
-    if (jump > between + slack || (pace->windows && pace->windows < 0xFFFF && change >> 8 > budget(axis, pace->windows)) ||
-        (!pace->windows && change && change > budget(axis, pace->time) + slack)) {
-        return true;
-    }
-    const int32_t from = even ? left : velocity(size_a, before->first, a->back & bit);
-    const int32_t more = quarter(first, last, pace->windows) - quarter(left, from, before->windows);
-    return beyond(&excess[0], more, between >> 2, slack >> 2) | beyond(&excess[1], -more, between >> 2, slack >> 2);
 }
 
 // A rate of the frame; the direction where it has one, else the one that the axis had.
