@@ -33,7 +33,8 @@ MAY_IMPORT: dict[str, str] = {
     "inverse/elimination": "errors formula model inverse/numeric",
     "inverse/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/closed",
     "inverse/answers": "errors keep_out formula model forward inverse/tasks inverse/numeric inverse/branches",
-    "inverse/singular": "keep_out formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers",
+    "inverse/singular": "keep_out formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
+    " inverse/answers",
     "inverse/solvers": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination",
     "inverse/run": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
     " inverse/answers inverse/singular inverse/solvers",

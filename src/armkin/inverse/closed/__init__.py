@@ -8,6 +8,7 @@ quadratics.py      quadratic expressions of a cosine and a sine
 wrist.py           three axes that meet
 three_link.py      three parallel axes
 crossings.py       where a self-motion of a class meets another one
+four_bars.py       which circuit of a planar or spherical four-bar linkage a posture is on
 
 planar.py          all joints in the base's x-y plane, and SCARAs
 elbow.py           joints 2 and 3 (and 4) parallel: positions, with pitch, with pitch and roll

@@ -13,11 +13,12 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
-from armkin.inverse.closed import crossings
+from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
+from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE
+from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE, TURNED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -76,33 +77,53 @@ class Recorded:
         which do not, and of some classes from many starts. Everywhere: of places where a self-motion meets another one.
         nan where there is none, or where the candidate is far from its target. near: (N, n).
         """
-        rng = np.random.default_rng(4)
-        N, n = len(target), self.arm.n
-        unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
         # beside round values: where a wrist is straight its joints are free, too, and jump to what is preferred
-        steps = (np.arange(FREED) + BESIDE_ROUND) * 2.0 / FREED - 1.0
-        offsets = np.repeat(steps[:, None], n, axis=1) * unit
-        if lost.any():  # else what follows the first ones would be dropped
-            offsets = np.concatenate([offsets, rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
-        goals = np.repeat(target[:, None], len(offsets), axis=1)
-        for k in range(2 * FREED, len(offsets)):
-            goals[:, k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
-        values = (near[:, None] + offsets).reshape(-1, n)
-        prefer = preferred(self.arm, values)
-        found = self.candidates(entries(self.task, goals.reshape(-1, *target.shape[1:])), prefer)
-        rows = as_rows(found[: n + 1], len(values))
-        B = rows.shape[1]
-        rows = rows.reshape(N, -1, n + 1)
-        q, miss = rows[:, :, :n], rows[:, :, n]
-        q = np.where((miss < HOPELESS**2)[:, :, None], q, np.nan)
-        on = np.where((miss < SEED**2)[:, :, None], q, np.nan)[:, : FREED * B].reshape(N, FREED, B, n)
+        steps = ((np.arange(FREED) + BESIDE_ROUND) * 2.0 / FREED - 1.0)[:, None]
+        unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
+        q, miss = self._at(np.repeat(target[:, None], FREED, axis=1), near[:, None] + steps * unit)
+        exact = np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
+        kept, held = four_bars.one_a_circuit(self.arm, exact, near)
+        known: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
+        linkage = np.asarray(known.any(axis=1))
+        # what else does not depend on the free joint is known already
+        kept = np.where(linkage[:, None, None], kept & known[:, None], miss < HOPELESS**2)
+        more = [np.where((kept & lost[:, None, None])[..., None], q, np.nan).reshape(len(q), -1, self.arm.n)]
+        on = np.where((miss < SEED**2)[..., None], q, np.nan)
         meeting = crossings.beside(self.arm, self.task, on, target)
-        q[~lost] = np.nan
-        more = [q, meeting]
+        with np.errstate(invalid="ignore"):
+            off = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
+        same = np.where(np.isnan(off), 0.0, off).max(axis=3) < TURNED
+        meeting[np.any(same & known[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
+        more.append(meeting)
+        rest = np.flatnonzero(lost & ~linkage)
+        if len(rest):
+            others = np.full((len(q), (FREED + SHAKEN) * q.shape[2], self.arm.n), np.nan)
+            others[rest] = self._random(target[rest], near[rest])
+            more.append(others)
         if self.geometry.ends and lost.any():
             more.append(many_starts(self.arm, self.task, target, lost))
-        branch = np.concatenate([np.arange(part.shape[1]) % B for part in more])
+        branch = np.concatenate([np.arange(part.shape[1]) % q.shape[2] for part in more])
         return np.concatenate(more, axis=1), branch
+
+    def _random(self, target: Array, near: Array) -> Array:
+        """Candidates (N, M, n) with random values for joints that are free, and of targets moved to where none is."""
+        rng, n = np.random.default_rng(4), self.arm.n
+        unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
+        offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
+        goals = np.repeat(target[:, None], len(offsets), axis=1)
+        for k in range(FREED, len(offsets)):
+            goals[:, k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
+        q, miss = self._at(goals, near[:, None] + offsets)
+        return np.where((miss < HOPELESS**2)[..., None], q, np.nan).reshape(len(target), -1, n)
+
+    def _at(self, goals: Array, values: Array) -> tuple[Array, Array]:
+        """Candidates (N, S, B, n) of targets (N, S, ...) with values (N, S, n) for free joints; squared residuals."""
+        N, S = goals.shape[:2]
+        prefer = preferred(self.arm, values.reshape(-1, self.arm.n))
+        found = self.candidates(entries(self.task, goals.reshape(-1, *goals.shape[2:])), prefer)
+        rows = as_rows(found[: self.arm.n + 1], N * S)
+        rows = rows.reshape(N, S, *rows.shape[1:])
+        return rows[..., :-1], rows[..., -1]
 
 
 def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:

@@ -13,7 +13,7 @@ from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
 from armkin.inverse.numeric.tolerances import ACCEPTED, SAME
-from armkin.inverse.singular import components, regular_targets
+from armkin.inverse.singular import components, lines, regular_targets
 
 AT_ONCE = 256  # targets examined together
 
@@ -70,6 +70,14 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
     rows = doubts.rows[left]  # what is singular hangs on the last digit
     some = as_doubts(runner, runner.in_numbers(target[rows]), rows, np.arange(len(rows)))
     first, other, loose, ends = _freed(goals, runner, some)
+    at_ends = np.zeros(len(rows), bool)
+    at_ends[ends] = True
+    open_ = ~_on_lines(goals, out, rows, first, other, loose, some.free & ~at_ends)
+    if not open_.any():
+        return out
+    rows, first, other, loose = rows[open_], first[open_], other[open_], loose[open_]
+    some = Doubts(rows, some.q[open_], some.valid[open_], some.free[open_])
+    ends = np.flatnonzero(at_ends[open_])
 
     def candidates(of: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""
@@ -86,6 +94,26 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
         unsettled = np.zeros(len(target), bool)
         unsettled[rows[ends]], out.complete[rows[ends]] = True, False
     return examined(goals, out, rows, candidates, runner.others, unsettled)
+
+
+def _on_lines(
+    goals: Goals, out: Batch, rows: NDArray[np.intp], first: Array, other: Array, loose: Bool, asked: Bool
+) -> Bool:
+    """Write those of the asked targets rows (K,) that are singular by two joints about one line alone; which (K,)."""
+    done = np.zeros(len(rows), bool)
+    for start in range(0, len(rows), AT_ONCE):
+        part = start + np.flatnonzero(asked[start : start + AT_ONCE])
+        if not len(part):
+            continue
+        line = lines.settle(goals.of(rows[part]), first[part], other[part], loose[part])
+        order = np.argsort(~line.branch, axis=1, kind="stable")[line.known]
+        there = np.take_along_axis(line.branch[line.known], order, axis=1)
+        part = part[line.known]
+        kept = np.take_along_axis(first[part], order[:, :, None], axis=1)
+        write(goals.arm, out, rows[part], kept, there, order, goals.near[rows[part]])
+        out.status[rows[part]], out.free[rows[part]] = Status.SINGULAR, line.free[line.known]
+        done[part] = True
+    return done
 
 
 def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> tuple[Array, Array, Bool, NDArray[np.intp]]:

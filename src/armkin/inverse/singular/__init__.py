@@ -2,6 +2,7 @@
 
 local_structure.py     the residual along the direction that a posture loses, and the component that it lies on
 components.py          candidates of targets on an edge: which are one, isolated, a boundary or a self-motion manifold
+lines.py               self-motions of two joints about one line, at once
 regular_targets.py     most such targets, which are regular, at once
 fold_singularities.py  postures at which two roots meet
 clusters.py            what rounding makes of one root of third or fourth order

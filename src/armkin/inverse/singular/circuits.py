@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
 from armkin.inverse.tasks.task import Task
@@ -34,6 +35,14 @@ def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: B
     joints: (M, n) those that move. The curve is walked one way until it closes, then the other. Where another curve
     crosses it, or it is too long, all count as on it.
     """
+    on = np.ones(asked.shape, bool)
+    if task.orientation == "full":
+        known, joint = four_bars.corners(arm, q, joints)
+        k, c = np.nonzero(asked & known[:, None] & (joint >= 0)[:, None])
+        at = np.concatenate([q[k], others[k, c]])
+        side = four_bars.sides(arm, at, np.tile(joints[k], (2, 1)), np.tile(joint[k], 2)).reshape(2, -1)
+        on[k, c] = side[0] == side[1]
+        asked = asked & ~known[:, None]
     who, column = np.nonzero(asked)
     posture, met = others[who, column], np.zeros(len(who), bool)
     closed = np.zeros(len(q), bool)
@@ -45,7 +54,6 @@ def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: B
             place = np.searchsorted(rows, who[some])
             part = joints[rows], place, posture[some], target[rows]
             met[some], closed[rows] = _walk(arm, task, q[rows], *part, way)
-    on = np.ones(asked.shape, bool)
     on[who, column] = met
     return on
 

@@ -1,0 +1,130 @@
+"""Four bars: which circuit of a planar or spherical four-bar linkage a posture is on, in closed form.
+
+Where four joints move and their axes are parallel, or meet in a point, while the tool keeps its pose, tool and base
+are one bar. Such a linkage has two circuits if there is a corner that it can neither stretch nor fold: the sine of the
+angle there keeps its sign on each (Grashof 1883; Chiang, Kinematics of Spherical Mechanisms, 1988). Else it has one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import jacobian
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, TINY
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+
+Int = NDArray[np.int64]
+
+
+class _Linkages(NamedTuple):
+    """Four axes of M postures.
+
+    planar, spherical: (M,) whether they are parallel or meet. bars: (M, 4) lengths [reaches] or arcs [rad] from each
+    axis to the next. sine: (M, 4) of the angle at each axis, times a positive number.
+    """
+
+    planar: Bool
+    spherical: Bool
+    bars: Array
+    sine: Array
+
+
+def corners(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
+    """Whether the self-motions through q (M, n) are of four bars, and the joint whose sine tells two circuits apart.
+
+    joints: (M, n) those that move. Returns (M,) and (M,), -1 where there is one circuit.
+    """
+    known, joint = np.zeros(len(q), bool), np.full(len(q), -1)
+    rows = np.flatnonzero((joints.sum(axis=1) == 4) & ~(joints & arm.prismatic).any(axis=1))
+    if not len(rows):
+        return known, joint
+    which = np.nonzero(joints[rows])[1].reshape(-1, 4)
+    at = _linkages(arm, q[rows], which)
+    lowest, highest = _diagonals(at.bars, at.spherical)
+    # the diagonal beside a corner is that of the other two bars, too
+    least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
+    reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
+    length = np.where(at.spherical[:, None], np.sin(at.bars), at.bars)
+    ends = np.stack([lowest - least, lowest - most, highest - least, highest - most, length])
+    # where all bars can lie in one line, or nearly, circuits cross or all but meet: there they are walked
+    known[rows] = (at.planar | at.spherical) & (np.abs(ends) > NEAR).all(axis=(0, 2))
+    two = np.flatnonzero(~reaches.all(axis=1))
+    joint[rows[two]] = which[two, reaches[two].argmin(axis=1)]
+    return known, joint
+
+
+def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
+    """On which of two circuits postures (M, n) of four bars are: whether the sine at a joint (M,) is positive: (M,)."""
+    which = np.nonzero(joints)[1].reshape(-1, 4)
+    sine = _linkages(arm, q, which).sine
+    return np.asarray((np.where(which == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
+
+
+def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
+    """Of postures q (N, S, B, n), nan where there is none, those that stand for the circuits of four bars.
+
+    near: (N, n). The S postures of a column are of one self-motion, moved by the joints that differ. Returns (N, S, B)
+    all but those of four bars that are not the nearest to `near` of their circuit, and (N, B, n) a posture of each
+    self-motion of four bars, nan in the joints that these move, and where there is none.
+    """
+    N, _, B, n = q.shape
+    there = ~np.isnan(q[..., 0])
+    first = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)
+    with np.errstate(invalid="ignore"):
+        joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > SAME).any(axis=1))
+    k, b = np.nonzero(joints.sum(axis=2) == 4)
+    known, joint = corners(arm, first[k, 0, b], joints[k, b])
+    k, b, joint = k[known], b[known], joint[known]
+    held = np.full((N, B, n), np.nan)
+    held[k, b] = np.where(joints[k, b], np.nan, first[k, 0, b])
+    kept, own = there.copy(), there[k, :, b]  # (m, S)
+    side = np.zeros(own.shape, bool)
+    i, s = np.nonzero(own & (joint >= 0)[:, None])
+    side[i, s] = sides(arm, q[k[i], s, b[i]], joints[k[i], b[i]], joint[i])
+    motion = np.abs(newton.difference(arm, q[k, :, b], near[k, None])).sum(axis=2)
+    motion = np.where(own, motion, np.inf)
+    nearest = [np.where(side == way, motion, np.inf) for way in (False, True)]
+    kept[k, :, b] = False
+    for part in nearest:
+        some = np.isfinite(part).any(axis=1)
+        kept[k[some], part[some].argmin(axis=1), b[some]] = True
+    return kept, held
+
+
+def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
+    """The shortest and longest distance of the neighbours of each corner, of the bars on both sides of it: (M, 4)."""
+    before = np.roll(bars, 1, axis=1)
+    total = before + bars
+    arc = np.minimum(total, 2.0 * np.pi - total)
+    return np.abs(before - bars), np.where(spherical[:, None], arc, total)
+
+
+def _linkages(arm: Arm, q: Array, which: Int) -> _Linkages:
+    """Axes which (M, 4) of postures (M, n)."""
+    J = np.take_along_axis(jacobian(arm, q), which[:, None], axis=2).swapaxes(1, 2)  # (M, 4, 6)
+    axis, point = J[:, :, 3:], np.cross(J[:, :, 3:], J[:, :, :3]) / arm.reach  # feet of perpendiculars from the tip
+    after, ahead = np.roll(axis, -1, axis=1), np.roll(point, -1, axis=1) - point
+    normal = np.cross(axis, after)
+    area = np.linalg.norm(normal, axis=2)
+    planar = (area < NO_AREA).all(axis=1)
+    behind = np.roll(ahead, 1, axis=1)
+    bars, sine = np.linalg.norm(ahead, axis=2), (np.cross(behind, ahead) * axis[:, :1]).sum(axis=2)
+    # all meet in the point where the first two do
+    far = np.maximum(area[:, :1] ** 2, TINY)
+    turn = np.cross(ahead[:, 0], axis[:, 1])
+    along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far
+    centre = point[:, :1] + (along * axis[:, 0])[:, None]
+    off = np.linalg.norm(np.cross(centre - point, axis), axis=2)
+    spherical = ~planar & (area > PARALLEL).all(axis=1) & (off < NO_AREA).all(axis=1)
+    arcs = np.arctan2(area, (axis * after).sum(axis=2))
+    triple = (np.roll(axis, 1, axis=1) * normal).sum(axis=2)
+    some = spherical[:, None]
+    return _Linkages(planar, spherical, np.where(some, arcs, bars), np.where(some, triple, sine))
