@@ -7,7 +7,7 @@ import armkin
 from armkin.formula.arrays import Array
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLUSTER
-from armkin.inverse.singular.clusters import means
+from armkin.inverse.singular.roots import means
 from armkin.model.arm import Arm
 
 

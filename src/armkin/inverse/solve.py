@@ -1,7 +1,7 @@
 """`armkin.ik`: from targets to all branches within limits.
 
 The way of a target: task -> geometry -> candidate branches -> residual of each, through the
-forward kinematics -> whole turns and limits -> the few doubtful ones through `doubtful`.
+forward kinematics -> whole turns and limits -> the few doubted ones through `doubted`.
 """
 
 from __future__ import annotations
@@ -202,14 +202,14 @@ def _rows(
     goals = Goals(arm, task, target, near)
     if examine:
         doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
-    doubtful = np.flatnonzero(doubt)
-    if examine and len(doubtful):
+    doubted = np.flatnonzero(doubt)
+    if examine and len(doubted):
         solve = geometry.rows
 
         def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
-            found = q[doubtful[some]]
+            found = q[doubted[some]]
             if guesses is not None:
-                found = np.concatenate([found, guesses[doubtful[some]]], axis=1)
+                found = np.concatenate([found, guesses[doubted[some]]], axis=1)
             return found, np.zeros(found.shape[:2], bool)
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
@@ -225,11 +225,11 @@ def _rows(
             return found, np.arange(found.shape[1]) % max(B, 1)
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
-        out = examined(goals, out, doubtful, candidates, others, unsettled)
-        order = projection(arm.prismatic, out.q[doubtful]).argsort(axis=1)  # one order, whatever was found first
+        out = examined(goals, out, doubted, candidates, others, unsettled)
+        order = projection(arm.prismatic, out.q[doubted]).argsort(axis=1)  # one order, whatever was found first
         for array in (out.q, out.valid, out.within, out.branch):
-            some = array[doubtful]
-            array[doubtful] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)
+            some = array[doubted]
+            array[doubted] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)
     return out, B
 
 

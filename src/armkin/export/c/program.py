@@ -14,7 +14,7 @@ from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.numeric.tolerances import HAIR
+from armkin.inverse.numeric.tolerances import CLOSE_BY
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST
@@ -142,7 +142,7 @@ def has_form(geometry: Geometry) -> bool:
 
 def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
-    values = {**(_SINGLE if single else _DOUBLE), "HAIR": HAIR}  # answers closer than a hair may be one
+    values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be one
     lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 

@@ -1,7 +1,7 @@
 """Four bars: which circuit of a planar or spherical four-bar linkage a posture is on, in closed form.
 
 Where four joints move and their axes are parallel, or meet in a point, while the tool keeps its pose, tool and base
-are one bar. Such a linkage has two circuits if there is a corner that it can neither stretch nor fold: the sine of the
+are one bar. Such a linkage has two circuits if there is a joint that it can neither stretch nor fold: the sine of the
 angle there keeps its sign on each (Grashof 1883; Chiang, Kinematics of Spherical Mechanisms, 1988). Else it has one.
 """
 
@@ -37,7 +37,7 @@ class _Linkages(NamedTuple):
     sine: Array
 
 
-def corners(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
+def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     """Whether the self-motions through q (M, n) are of four bars, and the joint whose sine tells two circuits apart.
 
     joints: (M, n) those that move. Returns (M,) and (M,), -1 where there is one circuit.
@@ -49,7 +49,7 @@ def corners(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     which = np.nonzero(joints[rows])[1].reshape(-1, 4)
     at = _linkages(arm, q[rows], which)
     lowest, highest = _diagonals(at.bars, at.spherical)
-    # the diagonal beside a corner is that of the other two bars, too
+    # the diagonal beside a joint is that of the other two bars, too
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
     length = np.where(at.spherical[:, None], np.sin(at.bars), at.bars)
@@ -81,7 +81,7 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     with np.errstate(invalid="ignore"):
         joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > SAME).any(axis=1))
     k, b = np.nonzero(joints.sum(axis=2) == 4)
-    known, joint = corners(arm, first[k, 0, b], joints[k, b])
+    known, joint = dead_points(arm, first[k, 0, b], joints[k, b])
     k, b, joint = k[known], b[known], joint[known]
     held = np.full((N, B, n), np.nan)
     held[k, b] = np.where(joints[k, b], np.nan, first[k, 0, b])
@@ -100,7 +100,7 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
 
 
 def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
-    """The shortest and longest distance of the neighbours of each corner, of the bars on both sides of it: (M, 4)."""
+    """The shortest and longest distance of the neighbours of each joint, of the bars on both sides of it: (M, 4)."""
     before = np.roll(bars, 1, axis=1)
     total = before + bars
     arc = np.minimum(total, 2.0 * np.pi - total)

@@ -10,12 +10,12 @@ SOLUTION = 1e-9  # residual up to which joint values solve a target
 REACH = 0.1  # [rad, reaches] a component along which a joint moves by this or more is a self-motion manifold
 ACCEPTED = 2.5e-13  # residual of a closed form's candidate that needs no correction
 NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
-SEED = 1e-3  # residual up to which a candidate of a doubtful target is
+SEED = 1e-3  # residual up to which a candidate of a doubted target is
 HOPELESS = 0.3  # residual of a seed from which nothing is corrected any more
 
 # ---- when two are one
 SAME = 1e-7  # distance of joint values that rounding explains
-HAIR = 0.05  # branches this close are one if the posture between them solves the target, too
+CLOSE_BY = 0.05  # branches this close are one if the posture between them solves the target, too
 BESIDE = 0.2  # postures of self-motions this close are asked whether they are one
 TURNED = 1e-5  # joints that a self-motion holds differ by less along it
 DRIFT = 2e-3  # and those that it moves, but too slowly to be called free

@@ -129,14 +129,14 @@ def _keep(
     valid = miss <= ACCEPTED**2
     _fill(arm, part, values, valid.reshape(shape), near)
     full = bool(valid.all())
-    doubtful = _doubtful(miss, valid, doubt, full)
+    doubted = _doubted(miss, valid, doubt, full)
     if there is not None and len(there):
-        doubtful = np.union1d(doubtful, near_itself.take(goals, part, there))
+        doubted = np.union1d(doubted, near_itself.take(goals, part, there))
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
-    return doubtful
+    return doubted
 
 
 def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:
@@ -163,7 +163,7 @@ def _every_branch(B: int, N: int) -> NDArray[np.int8]:
     return np.tile(np.arange(B, dtype=np.int8), (N, 1))
 
 
-def _doubtful(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
+def _doubted(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
     """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
 
     miss, valid: (B, N); full: valid everywhere.

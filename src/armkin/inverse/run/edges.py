@@ -42,7 +42,7 @@ def as_doubts(runner: Recorded, found: list[Array], rows: NDArray[np.intp], some
 
 
 def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch:
-    """Decide what doubtful targets are: those that are regular all at once, the others posture by posture.
+    """Decide what doubted targets are: those that are regular all at once, the others posture by posture.
 
     Where a joint is free, the candidates are not all.
     """
@@ -117,7 +117,7 @@ def _on_lines(
 
 
 def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> tuple[Array, Array, Bool, NDArray[np.intp]]:
-    """Candidates of the doubtful targets, those that leave a joint free with preferred values, as near `near`.
+    """Candidates of the doubted targets, those that leave a joint free with preferred values, as near `near`.
 
     And the same with other values, nan where these change nothing; which candidates they change (K, B); and the targets
     on which the joints that the geometry calls ends are free.
@@ -146,19 +146,19 @@ def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> tuple[Array, Array
 def examined(
     goals: Goals,
     out: Batch,
-    doubtful: NDArray[np.intp],
+    doubted: NDArray[np.intp],
     candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
     others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64]]],
     unsettled: Bool | None = None,
 ) -> Batch:
-    """Examine the doubtful targets and write what is found: branches first, nan behind.
+    """Examine the doubted targets and write what is found: branches first, nan behind.
 
-    candidates: joint values (K, M, n) for some of the doubtful ones, and which depend on `near` (K, M); others: more
+    candidates: joint values (K, M, n) for some of the doubted ones, and which depend on `near` (K, M); others: more
     of them, for targets and preferred values, and whether branches seem lost or an elimination did not settle them;
     unsettled: (N,), see `components.examine`.
     """
-    for start in range(0, len(doubtful), AT_ONCE):
-        rows = doubtful[start : start + AT_ONCE]
+    for start in range(0, len(doubted), AT_ONCE):
+        rows = doubted[start : start + AT_ONCE]
         some, columns = goals.of(rows), out.q.shape[1]
         q, loose = candidates(np.arange(start, start + len(rows)))
 

@@ -4,12 +4,9 @@ local_structure.py     the residual along the direction that a posture loses, an
 components.py          candidates of targets on an edge: which are one, isolated, a boundary or a self-motion manifold
 lines.py               self-motions of two joints about one line, at once
 regular_targets.py     most such targets, which are regular, at once
-fold_singularities.py  postures at which two roots meet
-clusters.py            what rounding makes of one root of third or fourth order
-valleys.py             whether two roots are points of one curved valley
+roots.py               roots of high order: which candidates are one
 self_motions.py        whether joints can move while the target is kept, and what lies on one self-motion
-null_directions.py     the directions that a posture loses
-corners.py             postures in which self-motions meet, replaced by one of each
+meetings.py            postures in which self-motions meet, replaced by one of each
 circuits.py            the connected pieces of a self-motion of three joints or more
 legal_postures.py      edges of which only other postures than those listed are within limits
 free_postures.py       self-motions beside keep-outs: by their nearest free posture

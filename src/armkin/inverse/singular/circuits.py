@@ -37,7 +37,7 @@ def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: B
     """
     on = np.ones(asked.shape, bool)
     if task.orientation == "full":
-        known, joint = four_bars.corners(arm, q, joints)
+        known, joint = four_bars.dead_points(arm, q, joints)
         k, c = np.nonzero(asked & known[:, None] & (joint >= 0)[:, None])
         at = np.concatenate([q[k], others[k, c]])
         side = four_bars.sides(arm, at, np.tile(joints[k], (2, 1)), np.tile(joint[k], 2)).reshape(2, -1)

@@ -20,11 +20,11 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
+    CLOSE_BY,
     DOUBLE,
     DOUBLE_ROOT,
     EQUAL_RESIDUALS,
     FOLDED,
-    HAIR,
     HOPELESS,
     MOVING,
     RESTING,
@@ -35,7 +35,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     TURNED,
 )
-from armkin.inverse.singular import circuits, clusters, corners, self_motions, valleys
+from armkin.inverse.singular import circuits, meetings, roots, self_motions
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.tasks.task import Task
 
@@ -81,7 +81,7 @@ class _Settled(NamedTuple):
 
 
 def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettled: Bool | None = None) -> Examined:
-    """Correct, group and classify candidate branches of doubtful targets.
+    """Correct, group and classify candidate branches of doubted targets.
 
     goals: K targets; `near` is a branch itself where it solves its target. q: (K, B, n), nan where there is none;
     label: (B,); loose: (K, B) candidates that depend on a value preferred for a free joint; more: others, for
@@ -133,7 +133,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
     K, _, n = q.shape
     q, label, size = _onto(goals, q, label, seed)
     missed = loose & (size[:, 1:] > SOLUTION)
-    q, label, size = corners.ways_out(goals, q, label, size, OWN)
+    q, label, size = meetings.ways_out(goals, q, label, size, OWN)
     valid = size <= SOLUTION
     M = q.shape[1]
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
@@ -204,7 +204,7 @@ def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Se
             rests = resting[k[i], c] & ~which[k[i], c]
             mine[i, c] &= ~(moves[k[i], c] & (joints[i] & rests).any(axis=1))
         mine[np.arange(len(k)), b] = True
-        on = mine  # but not what is one with it in a valley beside the self-motion
+        on = mine  # but not what is one with it along a curve beside the self-motion
         mine = on | one
         group[k] = np.where(mine, b[:, None], group[k])
         other = (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
@@ -253,7 +253,7 @@ def _onto(goals: Goals, q: Array, label: Int, seed: float) -> tuple[Array, Int, 
     known = np.flatnonzero(~np.isnan(flat).any(axis=1))
     size = np.full(len(flat), np.inf)
     size[known] = newton.missing(arm, task, flat[known], goal[known])
-    mean = np.concatenate([near[:, None], clusters.means(arm, q)], axis=1).reshape(-1, n)
+    mean = np.concatenate([near[:, None], roots.means(arm, q)], axis=1).reshape(-1, n)
     better = newton.missing(arm, task, mean[known], goal[known]) < size[known]
     flat[known[better]] = mean[known[better]]
     own = np.zeros(both.shape[:2], bool)
@@ -276,7 +276,7 @@ def _joined(
     """
     with np.errstate(invalid="ignore"):
         same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-        row, column = np.nonzero(~same & (away < HAIR))
+        row, column = np.nonzero(~same & (away < CLOSE_BY))
     if len(row):
         start = q[k[row], b[row]]
         way = newton.difference(arm, q[k[row], column], start)
@@ -284,7 +284,7 @@ def _joined(
         one, other = (k[row], b[row]), (k[row], column)
         longer = size[other] * sigma[one] > size[one] * sigma[other]
         miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
-        further = valleys.joined(arm, task, start, way, miss, weakest, target[k[row]])
+        further = roots.joined(arm, task, start, way, miss, weakest, target[k[row]])
         same[row, column] = further
         for i in np.unique(row[further]):  # and those that rounding alone parts from these
             there, some = q[k[i]], np.flatnonzero(same[i])

@@ -1,4 +1,4 @@
-"""Edges within limits: a self-motion, or a root known to a hair, that has legal postures is listed by one of these.
+"""Edges within limits: a self-motion, or a root known to rounding, that has legal postures is listed by one of these.
 
 A self-motion is listed by its posture closest to `near`, which may be outside limits where others of it are not; a
 double root at a limit is off it by as much as arithmetic can tell its halves apart.
@@ -36,10 +36,10 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
     for k in edge[~out.within[edge].any(axis=1)]:
         q = out.q[k, out.valid[k]]
         beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-        hair = (beyond < OFF_LIMITS).all(axis=1)
+        at_limit = (beyond < OFF_LIMITS).all(axis=1)
         sigma, *_ = newton.null_space(arm, task, q, np.repeat(target[k : k + 1], len(q), axis=0))
-        # a joint that is held is outside; or it is a valley, whose points are not as exact as the branches
-        if not (hair | ((beyond < OFF_LIMITS) | out.free[k]).all(axis=1) & (sigma < ON_MANIFOLD)).any():
+        # a joint that is held is outside; or the residual is small along a curve, whose points are not as exact as the branches
+        if not (at_limit | ((beyond < OFF_LIMITS) | out.free[k]).all(axis=1) & (sigma < ON_MANIFOLD)).any():
             continue
         legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
@@ -49,7 +49,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
-        if miss > (0.9 * SOLUTION if hair.any() else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
+        if miss > (0.9 * SOLUTION if at_limit.any() else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)

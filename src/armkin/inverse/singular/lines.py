@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CLOSED, FOLDED, HAIR, SAME, SEED, SOLUTION, TURNED
+from armkin.inverse.numeric.tolerances import CLOSE_BY, CLOSED, FOLDED, SAME, SEED, SOLUTION, TURNED
 
 if TYPE_CHECKING:
     from armkin.inverse.answers.batch import Goals
@@ -96,7 +96,7 @@ def _apart(goals: Goals, q: Array, valid: Bool, d: Array, known: Bool) -> Bool:
         alike &= sense[:, :, None] == sense[:, None]
     pair = valid[:, :, None] & valid[:, None] & ~np.eye(q.shape[1], dtype=bool)
     same = pair & alike & (d != 0.0).any(axis=2)[:, :, None] & (held < TURNED)
-    known &= ~(pair & ~same & (held < HAIR)).any(axis=(1, 2))
+    known &= ~(pair & ~same & (held < CLOSE_BY)).any(axis=(1, 2))
     before = np.tri(q.shape[1], k=-1, dtype=bool)
     better = (motion[:, None] < motion[:, :, None]) | ((motion[:, None] == motion[:, :, None]) & before)
     return np.asarray(valid & ~(same & better).any(axis=2))

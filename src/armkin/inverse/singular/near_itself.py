@@ -16,7 +16,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, named, wider
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import HAIR, SOLUTION, THERE
+from armkin.inverse.numeric.tolerances import CLOSE_BY, SOLUTION, THERE
 from armkin.model import limits
 from armkin.model.units import radian_or_reach
 
@@ -74,7 +74,7 @@ def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]
     some = np.flatnonzero(~stays)
     if len(some):
         solves[some] = newton.missing(arm, task, near[some], target[some]) <= SOLUTION
-        some = some[solves[some] & ((away[some] < HAIR).sum(axis=1) == 1)]
+        some = some[solves[some] & ((away[some] < CLOSE_BY).sum(axis=1) == 1)]
         way = newton.difference(arm, out.q[rows[some], place[some]], near[some])
         between = near[some] + 0.5 * way * radian_or_reach(arm)
         stays[some] = newton.missing(arm, task, between, target[some]) <= SOLUTION

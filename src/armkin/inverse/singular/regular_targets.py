@@ -17,10 +17,12 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import (
     BENT,
+    CLEAR,
+    CLOSE_BY,
     CLOSED,
     CLUSTER,
+    FOLD_WAY,
     FOLDED,
-    HAIR,
     MERGED_ROOTS,
     MERGED_ROUNDING,
     NEARBY,
@@ -32,8 +34,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
-from armkin.inverse.singular import fold_singularities, self_motions
-from armkin.inverse.singular.fold_singularities import Linear
+from armkin.inverse.singular import self_motions
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -55,6 +56,66 @@ class Regular(NamedTuple):
     free: Bool
     q: Array
     changed: Bool
+
+
+class Folds(NamedTuple):
+    """Postures at which two roots meet: M of them.
+
+    To second order the tool moves along u, the direction that the Jacobian cannot reach, by half of `bend` times the
+    square of the way: if that is not zero, there is no curve of solutions, and the posture is a turning point.
+
+    weakest, second: (M,) smallest singular values. bend: (M,) curvature, nan where no single direction is lost. lost:
+    (M,) the residual along u, of which no motion takes anything away if it has the sign of bend. rest: (M,) the joint
+    motion that takes away what is left. miss: (M,) the whole residual's size. u: (M, n), V: (M, n, n) right singular
+    vectors, v the last one. bow: (M, n) the second derivative of the curve that leaves along v, on which nothing is
+    missing but along u.
+    """
+
+    weakest: Array
+    second: Array
+    bend: Array
+    lost: Array
+    rest: Array
+    miss: Array
+    u: Array
+    V: Array
+    bow: Array
+
+
+class Linear(NamedTuple):
+    """Residuals r (M, k) of M postures and their Jacobian, J = U diag(S) V, as `newton.scaled` has them."""
+
+    r: Array
+    U: Array
+    S: Array
+    V: Array
+
+
+def square(arm: Arm, task: Task) -> bool:
+    """Whether folds can be told: as many rows as joints, all of them constraints."""
+    return task.constraints == arm.n > 1 and task.orientation != "axis"
+
+
+def folds(arm: Arm, task: Task, q: Array, target: Array, linear: Linear | None = None) -> Folds:
+    """Postures q (M, n), their targets (M, m) or (M, 4, 4); linear: if known. Everything is nan if not `square`."""
+    if not square(arm, task):
+        none = np.full(len(q), np.nan)
+        return Folds(*[none] * 9)
+    if linear is None:
+        r, J = newton.scaled(arm, task, q, target)
+        linear = Linear(r, *np.linalg.svd(J))
+    r, U, S, V = linear
+    u, way = U[:, :, -1], FOLD_WAY * V[:, -1] * radian_or_reach(arm)
+    both = np.concatenate([q + way, q - way])
+    ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
+    turn = (ahead + behind - 2.0 * r) / FOLD_WAY**2
+    bend = (u * turn).sum(axis=1)
+    lost, clear = (u * r).sum(axis=1), np.maximum(S[:, :-1], TINY)
+    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / clear[:, -1]
+    bow = ((turn[:, None] @ U[:, :, :-1] / clear[:, None]) @ V[:, :-1])[:, 0]
+    return Folds(
+        S[:, -1], S[:, -2], np.where(S[:, -2] > CLEAR, bend, np.nan), lost, rest, np.linalg.norm(r, axis=1), u, V, bow
+    )
 
 
 class _Slopes(NamedTuple):
@@ -98,7 +159,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
         away = newton.wrapped_distance(arm, q[:, :, None], q[:, None])
     near_by = away < CLUSTER
     clusters = (near_by.sum(axis=2) > 2) & (at.size < SEED)
-    close = np.triu(valid[:, :, None] & valid[:, None] & (away < HAIR) & known[:, None, None], 1)
+    close = np.triu(valid[:, :, None] & valid[:, None] & (away < CLOSE_BY) & known[:, None, None], 1)
     # roots of third or fourth order: their mean is right to rounding
     k, i = np.nonzero(clusters)
     if len(k):
@@ -154,7 +215,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     """Smallest singular values (K, B) of accepted candidates, or bounds above `FOLDED`; and what weak ones are."""
     K, B, n = q.shape
     sigma = np.ones((K, B))
-    plain = fold_singularities.square(arm, task)
+    plain = square(arm, task)
     asked = valid.copy()
     if plain:
         bound, asked[valid] = _bounds(at.J[valid])
@@ -176,7 +237,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     k, b, U, S, V, own = k[some], b[some], U[some], S[some], V[some], own[some]
     if not len(k):
         return sigma, found
-    fold = fold_singularities.folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
+    fold = folds(arm, task, q[k, b], target[k], Linear(at.r[k, b], U, S, V))
     # beyond a fold, and what else is missing is so little that putting it right does not lead back
     beyond = (np.abs(fold.bend) > BENT) & (fold.weakest < WEAK)
     beyond &= (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)

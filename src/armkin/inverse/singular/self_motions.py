@@ -7,6 +7,7 @@ a self-motion that is listed already is dropped: `armkin.inverse.singular.compon
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,12 +17,14 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     BESIDE,
+    CLOSE_BY,
     DRIFT,
     GROWTH,
-    HAIR,
     HIGH,
     MOVED,
+    NO_BLOCK,
     NO_GROWTH,
+    NO_JOINT,
     SAME,
     SOLUTION,
     STALLED,
@@ -29,8 +32,7 @@ from armkin.inverse.numeric.tolerances import (
     TURNED,
     WEAK,
 )
-from armkin.inverse.singular import circuits, valleys
-from armkin.inverse.singular.null_directions import null_directions
+from armkin.inverse.singular import circuits, roots
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -59,7 +61,7 @@ def drop_contained(
         few = curve[k, mine].sum(axis=1) <= arm.n // 2
         for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            beside = mine[(away < HAIR) & few]
+            beside = mine[(away < CLOSE_BY) & few]
             one = _grows_from(arm, task, q[k, i], q[k, beside], curve[k, beside], target[k])
             if sigma[k, i] < WEAK:
                 one |= bool((away[few] < 10 * TURNED).any())
@@ -79,36 +81,36 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
 
     others: (J, n) postures of self-motions, curve: (J, n) the joints that these move. Two are one if the posture
     between them solves the target, too. The other is sought beside q, and in the direction that q loses: where two
-    directions are lost a valley leaves the self-motion, off which the residual grows.
+    directions are lost a curve of small residuals leaves the self-motion, off which the residual grows.
     """
     unit = radian_or_reach(arm)
     apart = np.where(curve, 0.0, newton.difference(arm, others, q))
     (sigma,), V, _ = newton.null_space(arm, task, q[None], target[None])
     held = np.where(curve, 0.0, V[0, -1])
     far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), TINY)
-    ahead = apart + np.where(curve, V[0, -1] * np.clip(far, -HAIR, HAIR)[:, None], 0.0)
+    ahead = apart + np.where(curve, V[0, -1] * np.clip(far, -CLOSE_BY, CLOSE_BY)[:, None], 0.0)
     start = q + np.concatenate([apart, ahead]) * unit
     goal = np.repeat(target[None], len(start), axis=0)
     there, size = newton.correct(arm, task, start, goal, steps=6, least=WEAK)
     way = newton.difference(arm, there, q)
-    near = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) < HAIR))
+    near = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) < CLOSE_BY))
     start, goal = np.repeat(q[None], len(near), axis=0), goal[near]
     miss = newton.missing(arm, task, start, goal)
-    return bool(valleys.joined(arm, task, start, way[near], miss, np.full(len(near), sigma), goal).any())
+    return bool(roots.joined(arm, task, start, way[near], miss, np.full(len(near), sigma), goal).any())
 
 
-def _leads_to(arm: Arm, task: Task, q: Array, corner: Array, target: Array) -> bool:
+def _leads_to(arm: Arm, task: Task, q: Array, meeting: Array, target: Array) -> bool:
     """Whether the self-motion through q (n,) arrives at a posture where several directions are lost at once (n,).
 
     Steps of `STEP` at most along the null direction, the way that comes closer: False where none does.
     """
     unit, goal = radian_or_reach(arm), target[None]
-    left = newton.difference(arm, corner, q)
+    left = newton.difference(arm, meeting, q)
     while (far := float(np.linalg.norm(left))) > STEP:
         _, V, _ = newton.null_space(arm, task, q[None], goal)
         ahead = V[0, -1] * np.sign(V[0, -1] @ left) * min(3 * STEP, far / 2)
         there, size = newton.correct(arm, task, (q + ahead * unit)[None], goal, steps=6, least=WEAK)
-        closer = newton.difference(arm, corner, there[0])
+        closer = newton.difference(arm, meeting, there[0])
         if size[0] > SOLUTION or not np.linalg.norm(closer) < far - STEP / 10:
             return False
         q, left = there[0], closer
@@ -226,7 +228,7 @@ def _apart(away: Array, push: Array) -> Bool:
 def _moved(away: Array, long: Bool) -> Bool:
     """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
 
-    Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back into a corner ends anywhere
+    Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back to a meeting ends anywhere
     nearby: neither is motion of a joint.
     """
     most = np.abs(away).max(axis=1)
@@ -238,7 +240,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
     who, push = null_directions(arm.n, V, nullity)
-    # Most candidates fall back at once. Where several directions are lost, a short step is drawn back into the corner.
+    # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
     several = nullity[who] > 1
     first = np.where(several, 10 * STEP, STEP)
     some, grown = _stays(arm, task, q[who], first, push, target[who])
@@ -276,3 +278,54 @@ def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
     nullity = newton.null_space(arm, task, there, target)[2]
     away = np.abs(newton.difference(arm, there, q)).max(axis=1)
     return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))
+
+
+def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
+    """Which postures to push, of M that lose as many directions as nullity (M,) says, and where: (m,), (m, n).
+
+    V: (M, n, n) right singular vectors. Each direction is there once, whichever sign it has.
+    """
+    pushes = list(_null_directions(n, V, nullity))
+    who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
+    first = (np.abs(push) > 0.1).argmax(axis=1)
+    ahead = np.sign(np.take_along_axis(push, first[:, None], axis=1))
+    _, once = np.unique(np.column_stack([who, np.rint(1e6 * push * ahead)]), axis=0, return_index=True)
+    once.sort()
+    return who[once], push[once]
+
+
+def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
+    """The same in parts, some of them several times.
+
+    In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
+    is pushed as far as the null space lets it, pairs of joints that do without the others are, and in a plane
+    of them every joint is held.
+    """
+    for index in range(int(nullity.max())):
+        who = np.flatnonzero(nullity > index)
+        yield who, V[who, n - 1 - index]
+    plane = np.flatnonzero(nullity == 2)
+    for joint in range(n if len(plane) else 0):
+        u, v = V[plane, n - 1], V[plane, n - 2]
+        hold = v[:, joint, None] * u - u[:, joint, None] * v
+        size = np.linalg.norm(hold, axis=1)
+        some = size > 0.1
+        if some.any():
+            yield plane[some], hold[some] / size[some, None]
+    many = np.flatnonzero(nullity > 1)
+    in_null = np.arange(n) >= n - nullity[many][:, None]
+    rest = np.eye(n) - np.einsum("mij,mi,mik->mjk", V[many], in_null, V[many])  # projection out of the null space
+    for i, j in itertools.combinations(range(n) if len(many) else (), 2):
+        # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
+        a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
+        some = (a * b - c * c < NO_BLOCK) & (a + b > NO_JOINT) & (np.abs(c) > NO_JOINT)
+        if some.any():
+            push = np.zeros((int(some.sum()), n))
+            push[:, i], push[:, j] = b[some], -c[some]
+            yield many[some], push / np.linalg.norm(push, axis=1, keepdims=True)
+    for joint in range(n if len(many) else 0):
+        push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
+        size = np.linalg.norm(push, axis=1)
+        some = size > 0.1
+        if some.any():
+            yield many[some], push[some] / size[some, None]

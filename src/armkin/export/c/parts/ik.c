@@ -56,7 +56,7 @@ static int arm_stay(const arm_real *near, const arm_real *stand, const arm_real 
             step -= ARM_TURN * ARM_RINT(step / ARM_TURN);
         between[j] = stand[j] + step / 2;
     }
-    if (at >= 0 && (count == ARM_BRANCHES || (least <= ARM_HAIR && arm_missed(between, goal) <= ARM_SOLUTION)))
+    if (at >= 0 && (count == ARM_BRANCHES || (least <= ARM_CLOSE_BY && arm_missed(between, goal) <= ARM_SOLUTION)))
         index = out[at].branch;
     else { /* another one: named after the nearest that is not listed */
         for (b = 0, least = ARM_INFINITY; b < ARM_BRANCHES; b++) {

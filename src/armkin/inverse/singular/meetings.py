@@ -1,7 +1,8 @@
-"""Corners: postures in which several self-motions meet, replaced by a posture of each of these.
+"""Postures in which several self-motions meet, replaced by a posture of each of these.
 
-Two or more directions are lost in a corner, and a root there is known to a hair only: of the self-motions that it
-lies on, all and none. A long step away on each of them one direction is lost, and the posture is right to rounding.
+Two or more directions are lost where they meet, and a root there is known to the root of rounding only: it lies on all
+of the self-motions and on none. A long step away on each of them one direction is lost, and the posture is right to
+rounding.
 """
 
 from __future__ import annotations
@@ -15,8 +16,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, ONE_CROSSING, SOLUTION
-from armkin.inverse.singular.null_directions import null_directions
-from armkin.inverse.singular.self_motions import STEP, follow, on_surface
+from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -29,9 +29,9 @@ Int = NDArray[np.int64]
 
 
 def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tuple[Array, Int, Array]:
-    """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those in corners.
+    """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
-    The first of a target, `near`, stays where it is. Others in corners that no self-motion leaves stay, too: roots of
+    The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
     high order, and postures of surfaces. none: the label of what is no candidate.
     """
     arm, task, target, _ = goals
@@ -61,9 +61,9 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tupl
 
 
 def _steps_out(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array, most: Array) -> tuple[Int, Array]:
-    """Postures (m, n) on self-motions that leave corners (M, n), a long step off, and whose: (m,).
+    """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
-    most: (M,) residual of what counts as on one: points of a valley beside a self-motion of double roots have more.
+    most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more.
     """
     rows = np.flatnonzero(~on_surface(arm, task, q, V, target))
     if not len(rows):
