@@ -38,7 +38,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
         at_limit = (beyond < OFF_LIMITS).all(axis=1)
         sigma, *_ = newton.null_space(arm, task, q, np.repeat(target[k : k + 1], len(q), axis=0))
-        # a joint that is held is outside; or the residual is small along a curve, whose points are not as exact as the branches
+        # a joint that is held is outside; or the curve is of small residuals, not as exact as the branches
         if not (at_limit | ((beyond < OFF_LIMITS) | out.free[k]).all(axis=1) & (sigma < ON_MANIFOLD)).any():
             continue
         legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q

@@ -1,0 +1,45 @@
+"""Targets that are singular by two joints about one line: decided at once as they are posture by posture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_every_branch import shipped
+
+import armkin
+from armkin import Status
+from armkin.inverse.singular import lines
+
+
+@pytest.mark.parametrize("name", ["puma560", "irb120"])
+def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, _ = shipped(name)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-2.5, 2.5, (16, 6))
+    q[:, 4] = 0.0
+    q[8:] = np.pi / 4 * rng.integers(-3, 4, (8, 6))
+    T, near = armkin.fk(arm, q), rng.uniform(-1.0, 1.0, 6)
+    seen = []
+    settle = lines.settle
+
+    def kept(*given: object) -> lines.Lines:
+        seen.append(settle(*given))  # type: ignore[arg-type]
+        return seen[-1]
+
+    def nothing(goals: object, *given: object) -> lines.Lines:
+        found = settle(goals, *given)  # type: ignore[arg-type]
+        return found._replace(known=np.zeros_like(found.known))
+
+    monkeypatch.setattr(lines, "settle", kept)
+    fast = armkin.ik(arm, T, near=near)
+    assert sum(found.known.sum() for found in seen) > 7
+    monkeypatch.setattr(lines, "settle", nothing)
+    slow = armkin.ik(arm, T, near=near)
+    np.testing.assert_array_equal(fast.status, slow.status)
+    np.testing.assert_array_equal(fast.free, slow.free)
+    np.testing.assert_array_equal(fast.valid, slow.valid)
+    assert (fast.status[:8] == Status.SINGULAR).all()
+    # of a line's postures that are equally near either may be listed
+    ways = [np.abs(np.remainder(s.q - near + np.pi, 2 * np.pi) - np.pi).sum(axis=2) for s in (fast, slow)]
+    np.testing.assert_allclose(*(np.sort(way, axis=1) for way in ways), atol=1e-7)
+    assert np.nanmax(fast.residual()[1]) < 1e-9
