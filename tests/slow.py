@@ -158,6 +158,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_exact_postures.py": (),
     "inverse/test_high_order_roots.py": (),
     "inverse/test_leaving.py": (),
+    "inverse/test_lines.py": (),
     "inverse/test_memory.py": ("test_memory_beyond_the_results_does_not_grow_with_the_batch",),
     "inverse/test_near.py": (),
     "inverse/test_nearly_special.py": (),
