@@ -41,5 +41,5 @@ def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.Mon
     assert (fast.status[:8] == Status.SINGULAR).all()
     # of a line's postures that are equally near either may be listed
     ways = [np.abs(np.remainder(s.q - near + np.pi, 2 * np.pi) - np.pi).sum(axis=2) for s in (fast, slow)]
-    np.testing.assert_allclose(*(np.sort(way, axis=1) for way in ways), atol=1e-7)
+    np.testing.assert_allclose(np.sort(ways[0], axis=1), np.sort(ways[1], axis=1), atol=1e-7)
     assert np.nanmax(fast.residual()[1]) < 1e-9
