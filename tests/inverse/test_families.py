@@ -142,3 +142,13 @@ def test_those_who_follow_single_branches_ask_for_a_held_joint(words: tuple[obje
     done = run(*words, stdin=b"task: pose\nmoves:\n  - line: [450, 0, 400, 180, 0, 0]\n")
     assert (done.code, done.out) == (2, "")
     assert "7 joints for the 6 constraints of task pose leave 1 degree of freedom" in done.err
+
+
+def test_a_nearly_stretched_arm_has_its_short_families() -> None:
+    """All values of J7 that answer lie within half a degree: it was called unreachable."""
+    arm = armkin.load("iiwa7")
+    q = np.deg2rad([-21.3642, 6.3411, -19.648, -0.3067, -57.4691, -59.4958, 14.8183])
+    s = armkin.ik(arm, armkin.fk(arm, np.stack([arm.home + 0.3, q])))
+    assert s.interval is not None
+    assert (s.best >= 0).all()
+    assert covers(arm, s.interval[1][s.within_limits[1]], q[6]).any()

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 AT_ONCE = 24_000  # targets of the other joints solved together
+FINER = 24  # times as many values where none had an answer
 HALVINGS = 34  # of half a degree: 3e-11 degrees
 GOLDEN = 44  # steps to the posture nearest to `near`
 FREE = np.deg2rad(0.1)  # [rad] and reaches / 573: step between postures that are asked whether they are free
@@ -297,16 +298,36 @@ class _Rows(NamedTuple):
     boundary: Bool
 
 
+def _joined(parts: list[_Rows], rows: NDArray[np.intp]) -> _Rows:
+    """Parts one below the other, in the order of rows (N,)."""
+    B, order = max(part.q.shape[1] for part in parts), np.argsort(rows)
+    q, interval, legal, branch = (
+        np.concatenate([_wider(np.asarray(part[i]), B, none) for part in parts])[order]
+        for i, none in enumerate((np.nan, np.nan, 0.0, -1.0))
+    )
+    return _Rows(q, interval, legal, branch, np.concatenate([part.boundary for part in parts])[order])
+
+
 def _wider(values: Array, B: int, none: float) -> Array:
     out = np.full((len(values), B, *values.shape[2:]), none)
     out[:, : values.shape[1]] = values
     return out
 
 
-def _of_chunk(find: _Follower) -> _Rows:
-    N, K = len(find.target), find.free.samples
+def _of_chunk(find: _Follower, finer: int = 1) -> _Rows:
+    """Of some targets; what has no answer is asked again alone: all of a nearly stretched arm's lie within a degree."""
+    N, K = len(find.target), find.free.samples * finer
     t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
     found = find.along(t)
+    none = np.flatnonzero(~found.valid.any(axis=(1, 2)))
+    if finer == 1 and find.labelled and len(none) and N > 1:
+        parts = [_of_chunk(find._replace(target=find.target[[k]], near=find.near[[k]])) for k in none]
+        rest = np.setdiff1d(np.arange(N), none)
+        if len(rest):
+            parts.append(_of_chunk(find._replace(target=find.target[rest], near=find.near[rest])))
+        return _joined(parts, np.concatenate([none, rest]))
+    if finer == 1 and find.labelled and len(none):
+        return _of_chunk(find, FINER)
     pieces = _pieces(find, t, found)
     q = _nearest(find, pieces, float(t[1] - t[0])) if len(pieces.row) else pieces.start
     if not find.labelled and len(q):  # an elimination's answers near singular postures are less exact
