@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,49 @@ def test_no_module_has_the_name_of_a_public_function() -> None:
     """Importing such a module would put it where the function was."""
     modules = {path.stem for path in (ROOT / "src/armkin").iterdir()}
     assert not modules & set(armkin.__all__)
+
+
+def test_every_public_function_is_called_after_all_modules_are_imported(tmp_path: Path) -> None:
+    """A submodule that is imported becomes a name of its package: it may replace none that people call."""
+    code = """
+import importlib, inspect, pkgutil
+import numpy as np
+import armkin
+for module in pkgutil.walk_packages(armkin.__path__, "armkin."):
+    if "__main__" not in module.name:
+        importlib.import_module(module.name)
+arm, panda = armkin.load("three_dof"), armkin.load("panda")
+q = np.array([0.1, 0.2, 0.3])
+T, p = armkin.fk(arm, q), armkin.fk(arm, q)[:3, 3]
+many = np.random.default_rng(1).uniform(-1, 1, (30, 3))
+calls = {
+    "calibrate": lambda f: f(arm, many, armkin.fk(arm, many)[:, :3, 3]),
+    "load": lambda f: f("three_dof"),
+    "lock": lambda f: f(panda, {"J3": 0.0}),
+    "unlock": lambda f: f(panda, {"J3": 0.0}, np.zeros(6)),
+    "closest": lambda f: f(arm, [2000, 0, 0]),
+    "ik": lambda f: f(arm, p),
+    "method": lambda f: f(arm),
+    "compile": lambda f: f,  # a compiler is asked for elsewhere
+    "path": lambda f: f(arm, [[350, 0, 300], [350, 50, 300]], start=armkin.ik(arm, [350, 0, 300]).q[0]),
+    "time_law": lambda f: f(arm, np.linspace(0, 0.1, 20)[:, None] * [1, 1, 1]),
+    "joints": lambda f: f(arm, [100, 200, 300]),
+    "reach": lambda f: f(arm, grid=200.0, azimuths=6),
+    "place": lambda f: f(arm, [[300, 0, 300]], step=400.0, yaw=3.0),
+    "workspace": lambda f: f(arm, 100),
+}
+called = 0
+for name in armkin.__all__:
+    function = getattr(armkin, name)
+    assert not inspect.ismodule(function), name
+    if inspect.isfunction(function):
+        assert calls.get(name, lambda f: f(arm, q))(function) is not None, name
+        called += 1
+print(called)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 20
 
 
 @pytest.mark.parametrize(

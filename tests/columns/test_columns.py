@@ -183,6 +183,23 @@ def test_another_job_is_refused_and_loses_nothing(rows: Path, tmp_path: Path, mo
     assert ik(rows, out, "--resume").code == 3
 
 
+def test_a_changed_robot_is_refused_and_loses_nothing(
+    rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, out = tmp_path / "arm.yaml", tmp_path / "out.csv"
+    text = Path(THREE_DOF).read_text()
+    robot.write_text(text)
+    with monkeypatch.context() as patch:
+        stop_after(4, patch, KeyboardInterrupt())
+        run("ik", robot, "--batch", rows, "--out", out)
+    robot.write_text(text.replace("a: 197", "a: 198"))
+    refused = run("ik", robot, "--batch", rows, "--out", out, "--resume")
+    assert refused.code == 2
+    assert "belongs to another job: robot" in refused.err
+    robot.write_text(text)
+    assert run("ik", robot, "--batch", rows, "--out", out, "--resume").code == 3
+
+
 def test_two_runs_do_not_share_a_folder(rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out.csv"
     with monkeypatch.context() as patch:
