@@ -153,3 +153,4 @@ def test_where_no_way_leads_it_says_so() -> None:
     with pytest.raises(UsageError, match="none of x, y, z, rx, ry, rz"):
         jog_line(arm, arm.home, "phi", "base", 0.2)
     assert axes(armkin.load("planar_2dof")) == ("x", "y")
+    assert axes(armkin.load("panda")) == ()

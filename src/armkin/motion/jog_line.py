@@ -32,8 +32,13 @@ Frame = Literal["base", "tool"]
 
 
 def axes(arm: Arm) -> tuple[str, ...]:
-    """The axes of a tip that may be jogged: the task's own numbers; of a pose x y z and turns about these."""
+    """The axes of a tip that may be jogged: the task's own numbers; of a pose x y z and turns about these.
+
+    None of an arm with a joint to spare: a line of its tip is no one motion.
+    """
     task = task_for(arm, None)
+    if arm.n > task.constraints:
+        return ()
     if task.orientation == "full":
         return ("x", "y", "z", "rx", "ry", "rz")
     return task.labels if task.orientation == "none" else task.labels[: task.position]
