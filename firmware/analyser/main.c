@@ -346,6 +346,10 @@ void pin_function(uint8_t pin, uint8_t function, uint8_t pad) {
     REG(IO_CTRL(pin)) = function;
 }
 
+bool at_rest(void) {
+    return true;
+}
+
 __attribute__((noinline)) int main(void) {
     clocks_setup();
     usb_setup();

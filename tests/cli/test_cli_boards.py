@@ -68,7 +68,8 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         moved = run("send", grbl, -3, 85, -85, "--port", pty.name, "--assume-home", "--json")
         planned = armkin.pulses(armkin.load(grbl), np.deg2rad([-3, 85, -85])).tolist()
         assert moved.json["pulses"] == board.steps[:3] == planned
-        assert "GRBL has no checksum" in moved.err
+        assert "GRBL has no checksum" in refused.err  # what a kind cannot promise is said once a day
+        assert "GRBL has no checksum" not in moved.err
         again = run("status", grbl, "--port", pty.name, "--json").json
         assert (again["position"], again["pulses"]) == ("known", moved.json["pulses"])
         board.boot()

@@ -91,7 +91,7 @@ CASES: dict[str, tuple[int, list[str], bytes]] = {
     "no task fits": (2, ["ik", PAN, "1", "2", "3"], b""),
     "unknown task": (2, ["ik", DOF, "1", "2", "3", "--task", "xyzzy"], b""),
     "task of another arm": (2, ["ik", DOF, "1", "2", "3", "4", "--task", "xyz_yaw"], b""),
-    "too many joints for the task": (2, ["ik", PANDA, "400", "0", "400", "180", "0", "0"], b""),
+    "too many joints for the task": (2, ["ik", PANDA, "400", "0", "400", "--task", "xyz"], b""),
     "unreachable": (3, ["ik", DOF, "900", "0", "0"], b""),
     "far beyond reach": (3, ["ik", DOF, "1e9", "-1e9", "1e9"], b""),
     "branch outside limits": (3, ["ik", DOF, "390", "80", "300", "--branch", "right"], b""),

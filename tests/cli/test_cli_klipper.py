@@ -33,7 +33,7 @@ def test_a_new_klipper_is_told_where_the_arm_stands_then_moved(tmp_path: Path) -
         moved = run("send", ROBOT, -3, 85, -85, "--port", port.name, "--assume-home", "--json")
         assert moved.code == 0, moved.err
         assert moved.json["pulses"] == pins(board) == [-107, -597, 333]
-        assert "a stop takes effect when Klipper has carried out what it holds" in moved.err
+        assert "a stop takes effect when Klipper has carried out what it holds" in lost.err  # once a day
         told = run("status", ROBOT, "--port", port.name, "--json").json
         assert (told["position"], told["state"], told["settings"]) == ("known", "ready", [])
         assert "position is known" in run("send", ROBOT, 0, 90, -90, "--port", port.name, "--assume-home").err

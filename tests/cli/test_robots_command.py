@@ -12,7 +12,7 @@ def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
     found = {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
     assert list(found) == list(catalogue.names())
     assert found["three_dof"]["can"] == {"ik": True, "pulses": True, "simulate": True, "send": True, "home": False}
-    assert found["panda"]["lacks"]["ik"] == ["hold 1 joint with --lock"]
+    assert found["panda"]["can"]["ik"]
     assert found["ur5e"]["target_labels"] == ["x", "y", "z", "roll", "pitch", "yaw"]
     lines = run("robots").out.splitlines()
     can = ["ik", "pulses", "simulate", "send", "home"]

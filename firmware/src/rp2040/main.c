@@ -3,6 +3,7 @@
 #include "../chip.h"
 #include "../core/hal.h"
 #include "../core/link.h"
+#include "../core/motion.h"
 #include "../core/protocol.h"
 #include "pico.h"
 
@@ -20,6 +21,10 @@ static void milliseconds(void) {
             servo_frame();
         }
     }
+}
+
+bool at_rest(void) {
+    return motion.state == IDLE;
 }
 
 __attribute__((noinline)) int main(void) {  // not into start(), which stays in the flash

@@ -13,6 +13,7 @@ void serial_setup(void);
 uint8_t serial_get(const uint8_t **bytes);  // so many that came, in a row; the call takes them
 void serial_pump(void);  // bytes to send, as the line takes them
 
+bool at_rest(void);  // the program's: whether it may be left for the boot drive
 void usb_setup(void);
 uint8_t usb_get(const uint8_t **bytes);
 bool usb_ready(void);  // for a packet of at most 63 bytes

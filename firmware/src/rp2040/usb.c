@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "../chip.h"
-#include "../core/motion.h"
 #include "pico.h"
 #include "usb_words.h"
 
@@ -284,7 +283,7 @@ uint8_t usb_get(const uint8_t **bytes) {
     static uint16_t given;  // they may be written over now
     if (to_boot_drive) {
         to_boot_drive = false;
-        if (motion.state == IDLE) {  // a moving arm does not stop for it
+        if (at_rest()) {  // a moving arm does not stop for it
             become_boot_drive();
         }
     }

@@ -20,7 +20,7 @@ COMMANDS = {
     "zero": "Record where the zero of bus servos is.",
     "workspace": "Where the tip can reach: bounds, volume, a cloud of points.",
     "reach": "Where the arm reaches, with which orientations.",
-    "place": "Where to put an arm, so that it reaches all targets.",
+    "place": "Where to put an arm, for all targets or a whole path.",
     "plot": "A picture of the arm.",
     "teach": "A page in the browser: see the arm, choose a branch, send it.",
     "robots": "The robots that come with armkin, and what each can do.",

@@ -42,7 +42,7 @@ def place(
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
     json: Json = False,
 ) -> None:
-    """Where to put an arm, so that it reaches all targets, or carries a whole path on one branch.
+    """Where to put an arm, for all targets or a whole path.
 
     Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
     one is farthest from places that do not reach all. Of a path the best places are planned. Exit code 3: no place

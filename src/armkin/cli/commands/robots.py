@@ -57,9 +57,8 @@ def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
         task = task_for(arm)
     except UsageError as error:
         return None, [], [str(error)]
-    # More joints than the target has numbers: `--lock` or `--sweep` must hold some.
-    free = arm.n - task.constraints
-    return task.name, list(task.labels), [f"hold {free} joint{'s' * (free > 1)} with --lock"] if free > 0 else []
+    free = arm.n - task.constraints  # of one joint to spare ik lists families; of more it asks for held ones
+    return task.name, list(task.labels), [f"hold {free} joints with --lock"] if free > 1 else []
 
 
 def _text(found: list[ShippedRobot]) -> str:
