@@ -346,10 +346,6 @@ void pin_function(uint8_t pin, uint8_t function, uint8_t pad) {
     REG(IO_CTRL(pin)) = function;
 }
 
-bool at_rest(void) {
-    return true;
-}
-
 __attribute__((noinline)) int main(void) {
     clocks_setup();
     usb_setup();
@@ -372,6 +368,7 @@ __attribute__((noinline)) int main(void) {
             continue;
         }
         const uint8_t *bytes;
+        usb_boot_drive(true);
         if (usb_get(&bytes) && *bytes == 'c') {
             clear();
         }

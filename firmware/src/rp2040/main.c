@@ -23,10 +23,6 @@ static void milliseconds(void) {
     }
 }
 
-bool at_rest(void) {
-    return motion.state == IDLE;
-}
-
 __attribute__((noinline)) int main(void) {  // not into start(), which stays in the flash
     const uint8_t cause = reset_cause();
     clocks_setup();
@@ -42,6 +38,7 @@ __attribute__((noinline)) int main(void) {  // not into start(), which stays in 
         const uint8_t *bytes;
         awake = false;
         watchdog_feed();
+        usb_boot_drive(motion.state == IDLE);  // a moving arm does not stop for it
         const uint8_t count = serial_get(&bytes);
         for (uint8_t n = 0; n < count;) {
             n += link_bytes(bytes + n, count - n);

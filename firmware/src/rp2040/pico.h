@@ -13,8 +13,8 @@ void serial_setup(void);
 uint8_t serial_get(const uint8_t **bytes);  // so many that came, in a row; the call takes them
 void serial_pump(void);  // bytes to send, as the line takes them
 
-bool at_rest(void);  // the program's: whether it may be left for the boot drive
 void usb_setup(void);
+void usb_boot_drive(bool may);  // if it was asked for: now, or, if it may not be, never
 uint8_t usb_get(const uint8_t **bytes);
 bool usb_ready(void);  // for a packet of at most 63 bytes
 void usb_send(const uint8_t *data, uint8_t length);

@@ -279,14 +279,17 @@ static void become_boot_drive(void) {
     start(0, 0);
 }
 
-uint8_t usb_get(const uint8_t **bytes) {
-    static uint16_t given;  // they may be written over now
+void usb_boot_drive(bool may) {
     if (to_boot_drive) {
         to_boot_drive = false;
-        if (at_rest()) {  // a moving arm does not stop for it
+        if (may) {
             become_boot_drive();
         }
     }
+}
+
+uint8_t usb_get(const uint8_t **bytes) {
+    static uint16_t given;  // they may be written over now
     if (given) {
         ring_tail = (ring_tail + given) & RING_MASK;
         given = 0;

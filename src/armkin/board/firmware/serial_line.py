@@ -55,6 +55,11 @@ class Line:
             if isinstance(reply, Ack | Info | Status):
                 yield reply
 
+    @property
+    def unanswered(self) -> int:
+        """STATUS? written since the last one that was answered."""
+        return len(self._asked_at)
+
     def asked(self, tag: int) -> None:
         """Note that a STATUS? of this tag is being written."""
         self._asked_at[tag] = self.port.now()

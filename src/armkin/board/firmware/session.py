@@ -21,6 +21,7 @@ _POLL_SOON = 0.01  # [s] while waiting for credit, which only answers bring, and
 _ENDS = 50  # [ms] of motion that the queue holds when its end is near
 _GIVE_UP = 1.5  # [s] without any answer,
 _TURN = 0.1  # [s] of which one turn counts at most: a program that had to wait longer for its own turn was deaf
+_BEHIND = 16  # questions without an answer
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
 _LISTENS = 0.2  # [s] after the opening: by then a Mega's boot loader listens
@@ -165,6 +166,8 @@ class Session:
         self._window.send()
         soon = ends or self._window.out_of_credit
         quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
+        if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
+            quick = _POLL
         if now - self._asked >= quick:
             self._ask()
         self._hear(timeout)
