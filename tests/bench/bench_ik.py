@@ -51,6 +51,7 @@ ROWS = [
     Row("labvolt_5150", "pose", "eaik", faster=5),
     Row("jaco_j2n6s300", tool="ssik", share=0.1, one=0),
     Row("ur5e", share=0.05, batch=160, one=2500, off=1e-4),
+    Row("three_dof", batch=20, one=150, off=1e-4),
     Row("moveo", share=0.05, batch=200, one=0),
     Row("cobra600"),
     Row("ra02"),

@@ -14,6 +14,7 @@ import armkin
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.kinds import board_of
+from armkin.board.ports import note_path
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.robot_file.edit import replaced
@@ -54,6 +55,7 @@ def test_a_dry_run_of_grbl_plans_what_ours_plans(grbl: str) -> None:
 def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
     board = Grbl(axes=4)
     with PtyPort(board) as pty:
+        Path(f"{note_path(pty.name)}.told").unlink(missing_ok=True)  # of another board that had this name today
         refused = run("send", grbl, -30, 5, -5, "--port", pty.name, "--assume-home")
         assert (refused.code, refused.out) == (5, "")
         assert "settings do not fit three_dof_grbl: $100" in refused.err
