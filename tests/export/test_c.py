@@ -273,10 +273,6 @@ def crooked(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.
     return build(parse("\n".join(["name: crooked", "convention: standard", task, "joints:", *rows])))
 
 
-def off_its_class(robot: str, old: str, new: str) -> armkin.Arm:
-    return build(parse((ROBOTS / f"{robot}.yaml").read_text().replace(old, new, 1)))
-
-
 def test_five_joints_and_the_tool_s_axis_have_a_form(tmp_path: Path) -> None:
     """None of its postures is far from singular: those farthest from it are taken."""
     assert built(tmp_path, crooked(5)) == "8 postures, 0 failed\n"

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.errors import UsageError
-from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.tracking import follow
@@ -24,7 +22,7 @@ from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
-from armkin.inverse.tasks.task import read_targets
+from armkin.inverse.tasks.task import read_near, read_targets
 from armkin.keep_out.clearance import clear
 from armkin.model import units
 from armkin.model.arm import actual
@@ -242,11 +240,7 @@ def families(
     """
     task = free.task
     goal, lead, off = read_targets(task, targets)
-    close = arm.home if near is None else arrays.real(near, "near")
-    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
-        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
-    if not np.isfinite(close).all():
-        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    close = read_near(arm, near, lead)
     each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
     true = actual(arm)
     turned = free if true is arm else redundancy(true, task.name)

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
@@ -39,7 +38,7 @@ from armkin.inverse.numeric.tolerances import (
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual
-from armkin.inverse.tasks.task import Task, read_targets
+from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.model.limits import outside
@@ -76,11 +75,7 @@ def position_first(ik: Ik, arm: Arm, targets: ArrayLike, *, near: ArrayLike | No
     check(arm, "pose")
     task = task_for(arm, "pose")
     goal, lead, rounding = read_targets(task, targets)
-    close = arm.home if near is None else arrays.real(near, "near")
-    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
-        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
-    if not np.isfinite(close).all():
-        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    close = read_near(arm, near, lead)
     each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
     true = actual(arm)
     found: list[Array] = []

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
@@ -38,7 +37,7 @@ from armkin.inverse.singular import free_postures, legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.fitting import task_for
-from armkin.inverse.tasks.task import Task, around, distance, read_targets, shaped
+from armkin.inverse.tasks.task import Task, around, distance, read_near, read_targets, shaped
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -102,11 +101,7 @@ def ik(
         )  # fmt: skip
     definition, geometry = solver(arm, task)
     given, lead = shaped(definition, values)
-    close = arm.home if near is None else arrays.real(near, "near")
-    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
-        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
-    if not np.isfinite(close).all():
-        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    close = read_near(arm, near, lead)
     many = close.ndim == 1 and len(given) != 1
     each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Entry
 from armkin.inverse.closed.elbow import together
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
@@ -137,15 +137,6 @@ def steps(
         return None  # sums without the last joints, or of parts of turns
     newton = NewtonSteps(arm, task, off)
     return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
-
-
-def four(q: Array) -> Bool:
-    """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
-    angle = np.exp(1j * q)
-    with np.errstate(invalid="ignore"):
-        near = np.abs(angle[:, :, None] - angle[:, None]).max(axis=3) < APART_ROOTS
-    there = ~np.isnan(q[:, :, 0])
-    return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
 
 def _merged(pairs: list[Pair], unit: list[float]) -> Entry:

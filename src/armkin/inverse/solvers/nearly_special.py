@@ -29,6 +29,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     ALIKE,
     ANSWERED,
+    APART_ROOTS,
     AT_LEAST,
     BLURRED,
     HOPELESS,
@@ -89,7 +90,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         for k, (part, _) in zip(starts, parts, strict=True):
             q[k : k + len(part), : part.shape[1]] = part
         doubt = np.concatenate([doubt for _, doubt in parts])
-        complete = newton_steps.four(q) if counted else np.zeros(len(target), bool)
+        complete = _four(arm, q) if counted else np.zeros(len(target), bool)
         return Rows(q, doubt & ~complete, complete)  # four roots apart are simple ones
 
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
@@ -223,6 +224,14 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
             again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < ALIKE
             q[again.any(axis=1), i] = np.nan
     return _packed(q, own)
+
+
+def _four(arm: Arm, q: Array) -> Bool:
+    """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
+    with np.errstate(invalid="ignore"):
+        near = newton.wrapped_distance(arm, q[:, :, None], q[:, None]) < APART_ROOTS
+    there = ~np.isnan(q[:, :, 0])
+    return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
 
 def _packed(q: Array, own: int) -> Array:

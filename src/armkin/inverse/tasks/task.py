@@ -77,6 +77,16 @@ class Targets(NamedTuple):
     rounding: Array
 
 
+def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
+    """Joint values to stay close to, (n,) or (*lead, n) [rad | mm]; by default home. Raises UsageError for others."""
+    close = arm.home if near is None else arrays.real(near, "near")
+    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
+        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
+    if not np.isfinite(close).all():
+        raise UsageError("near holds nan or infinity; every joint value must be finite")
+    return close
+
+
 def read_targets(task: Task, targets: ArrayLike) -> Targets:
     """Targets as `ik` takes them: (..., m), or (..., 4, 4) for poses.
 
