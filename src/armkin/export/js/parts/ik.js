@@ -1,6 +1,7 @@
 const ACCEPTED = 1e-24; // squared residual of a candidate that needs no correction
 const NEARBY = 1e-12; // and of one that is worth correcting
 const LARGEST = 1e15; // mm, rad: of a target; its powers in polynomials stay finite
+const STARTS = 48; // postures from which self-motions are searched for
 const DEGREES = 180 / Math.PI;
 
 const givenNumbers = new Float64Array(ARM.orientation === 'full' ? 16 : ARM.labels.length);
@@ -110,7 +111,21 @@ function solutions(goal, near) {
   // of two roots in one an elimination may see none: beside the target both are real on one side
   let sure = true;
   for (let k = 0; !CLOSED_FORM && k < 8; k++) sure = !seed(beside(goal, k), near, Infinity) && sure;
-  const found = components(seeds, goal);
+  let found = components(seeds, goal);
+  if (!CLOSED_FORM && found.status === 'singular') {
+    // a self-motion takes all roots of an elimination, and a target beside it has none there: others are searched for
+    for (let k = 1; k <= STARTS; k++) {
+      const start = ARM.unit.map((unit, j) => unit * Math.PI * (2 * ((k * Math.sqrt(2 + 3 * j + j * j)) % 1) - 1));
+      let one = newton(start, goal, 25);
+      if (one.missed > SOLUTION && one.missed < 1e-2) {
+        // Newton's method does not end on a curve of double roots; they nearly always stand at multiples of 45 degrees
+        const even = one.q.map((x, j) => (ARM.slides[j] ? x : (Math.PI / 4) * rint(x / (Math.PI / 4))));
+        one = newton(even, goal, 10);
+      }
+      if (one.missed <= SOLUTION && !seeds.some((other) => apart(other.q, one.q) < 1e-7)) seeds.push({ q: one.q, branch: 0, path: undefined });
+    }
+    found = components(seeds, goal);
+  }
   return { ...found, complete: found.complete && (CLOSED_FORM || (sure && found.status === 'exact')) };
 }
 
@@ -139,18 +154,29 @@ function components(seeds, goal) {
   const moves = new Array(ARM.joints).fill(false);
   // regular points of a self-motion first: its singular ones are met on the way
   const ranked = seeds.map((seed) => ({ seed, count: lost(seed.q, SPLIT).V.length })).sort((a, b) => a.count - b.count);
+  /** @type {Row[]} */
+  const met = []; // where self-motions cross
   for (const { seed } of ranked) {
-    if (rows.some((row) => (row.path ? onPath(seed.q, row.path, goal) : joined(row.q, seed.q, goal)))) continue;
-    const { kind, paths, crossed, moves: along } = structure(seed.q, goal);
+    const known = (/** @type {Row} */ row) => (row.path ? onPath(seed.q, row.path, goal) : joined(row.q, seed.q, goal));
+    const crosses = met.includes(seed);
+    if (!crosses && rows.some(known)) continue;
+    const { kind, paths, crossings, moves: along } = structure(seed.q, goal, rows.flatMap((row) => (row.path ? [row.path] : [])));
+    for (const q of crossings) {
+      if (met.some((other) => apart(other.q, q) < SPLIT)) continue;
+      const found = { ...seed, q };
+      met.push(found);
+      if (q !== seed.q) ranked.push({ seed: found, count: 2 }); // other self-motions begin there
+    }
+    if (crosses && kind !== 'curve') continue;
     along?.forEach((x, j) => (moves[j] = moves[j] || x > FREE));
     if (kind === 'boundary' && status === 'exact') status = kind;
     if (kind === 'curve' || kind === 'surface') status = 'singular';
-    complete = complete && !crossed;
+    complete = complete && !crossings.length;
     if (kind === 'exact' || kind === 'boundary') {
       rows.push(seed);
       continue;
     }
-    if (rows.some((row) => straight(row.q, seed.q, goal))) continue;
+    if (!crosses && rows.some((row) => straight(row.q, seed.q, goal))) continue;
     if (kind === 'surface') rows.push(seed);
     for (const path of paths) {
       if (rows.some((row) => row.path && oneCurve(path, row.path, goal))) continue;
@@ -158,7 +184,10 @@ function components(seeds, goal) {
       spread(path).forEach((x, j) => (moves[j] = moves[j] || x > FREE * 1000));
     }
   }
-  return { rows, status, complete, free: moves.flatMap((yes, j) => (yes ? [j] : [])) };
+  // beside a crossing of self-motions the residual hardly grows: what solves the target there is one with them
+  const paths = rows.flatMap((row) => row.path ?? []);
+  const kept = rows.filter((one) => one.path || !paths.some((p) => apart(p, one.q) < STRIDE) || lost(one.q, SPLIT).V.length < 2);
+  return { rows: kept, status, complete, free: moves.flatMap((yes, j) => (yes ? [j] : [])) };
 }
 
 /** Whether two postures are in one component: so is the way between them. @param {Numbers} a @param {Numbers} b @param {Float64Array} goal */

@@ -24,13 +24,14 @@ function lost(q, most) {
 /**
  * A self-motion of one dimension, or as much of it as REACH needs to be one: from a posture both ways.
  * @param {number[]} q @param {number[]} v the direction that is lost there @param {Numbers} goal
- * @returns {{path: number[][], extent: number, crossed: boolean}} crossed: another self-motion may meet it
+ * @returns {{path: number[][], extent: number, crossings: number[][]}} crossings: postures where another self-motion may meet it
  */
 function follow(q, v, goal) {
   /** @type {number[][][]} */
   const halves = [];
+  /** @type {Map<number[], number>} */
+  const seconds = new Map(); // of each posture the second smallest singular value, where that is small
   let closed = false;
-  let crossed = false;
   for (const sign of [1, -1]) {
     const path = [q];
     halves.push(path);
@@ -50,7 +51,7 @@ function follow(q, v, goal) {
         break;
       }
       const { V, S } = lost(next.q, STRIDE);
-      crossed = crossed || S.length > 1;
+      if (S.length > 1) seconds.set(next.q, S[S.length - 2]);
       const along = V.map((u) => dot(u, move) / size);
       const turned = next.q.map((_, j) => V.reduce((sum, u, k) => sum + along[k] * u[j], 0));
       const length = Math.sqrt(dot(turned, turned));
@@ -62,7 +63,25 @@ function follow(q, v, goal) {
     if (closed) break;
   }
   const path = closed ? halves[halves.length - 1] : [...halves[1].slice(1).reverse(), ...halves[0]];
-  return { path, extent: Math.max(...spread(path)), crossed };
+  const round = closed ? [...path.slice(0, -1), ...path.slice(0, 3)] : path;
+  const at = round.map((p) => seconds.get(p) ?? STRIDE);
+  const least = [...at.keys()].filter((k) => k > 0 && at[k] < at[k - 1] && at[k] <= at[k + 1] && at[k - 1] > SPLIT);
+  const crossings = least.map((k) => crossing(round.slice(k - 1, k + 2), goal)).filter((p) => lost(p, SPLIT).V.length > 1);
+  return { path, extent: Math.max(...spread(path)), crossings };
+}
+
+/** Where along three postures of a self-motion the Jacobian loses a second direction most. @param {number[][]} path @param {Numbers} goal */
+function crossing([a, b, c], goal) {
+  const [back, on] = [between(a, b), between(c, b)];
+  const at = (/** @type {number} */ t) => newton(t < 0 ? stepped(b, back, -t) : stepped(b, on, t), goal, 4, SPLIT / 10).q;
+  const square = (/** @type {number} */ t) => decompose(slope(at(t))).S[ARM.joints - 2] ** 2; // a parabola beside a crossing
+  let [t, h] = [0, 0.5];
+  for (let round = 0; round < 4; round++) {
+    const [low, middle, high] = [square(t - h), square(t), square(t + h)];
+    t += Math.min(Math.max((h * (low - high)) / (2 * (low - 2 * middle + high) || 1), -h), h);
+    h /= 8;
+  }
+  return at(t);
 }
 
 /** How far each joint moves along a path [rad, reaches], whole turns included. @param {number[][]} path */
@@ -115,23 +134,25 @@ function ways(V) {
 
 /**
  * What the solution set is around a posture that solves the target.
- * @param {number[]} q @param {Numbers} goal
- * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossed: boolean, moves?: number[]}} paths of the
- *   self-motions through it; of a surface, how far each joint moves along it
+ * @param {number[]} q @param {Numbers} goal @param {number[][][]} known self-motions that need not be followed again
+ * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossings: number[][], moves?: number[]}} paths of the
+ *   self-motions through it, and where others meet them; of a surface, how far each joint moves along it
  */
-function structure(q, goal) {
+function structure(q, goal, known) {
   const { V } = lost(q, SPLIT);
-  if (!V.length) return { kind: 'exact', paths: [], crossed: false };
+  if (!V.length) return { kind: 'exact', paths: [], crossings: [] };
   if (V.length === 1) {
-    const { path, extent, crossed } = follow(q, V[0], goal);
-    if (extent >= REACH) return { kind: 'curve', paths: [path], crossed };
-    return { kind: folds(q, V[0], goal) ? 'boundary' : 'exact', paths: [], crossed: false };
+    const { path, extent, crossings } = follow(q, V[0], goal);
+    if (extent >= REACH) return { kind: 'curve', paths: [path], crossings };
+    return { kind: folds(q, V[0], goal) ? 'boundary' : 'exact', paths: [], crossings: [] };
   }
   // several directions: self-motions that cross here are met again beside it
   /** @type {number[][][]} */
   const paths = [];
   /** @type {number[][]} */
   const wide = []; // ways to postures that lose several directions, too
+  /** @type {number[][]} */
+  const crossings = [q];
   let solved = 0;
   for (const way of ways(V)) {
     const there = newton(stepped(q, way, 2 * STRIDE), goal, 12);
@@ -140,16 +161,18 @@ function structure(q, goal) {
     solved++;
     const beside = lost(there.q, SPLIT / 10).V;
     if (beside.length > 1) wide.push(between(there.q, q));
-    if (beside.length !== 1 || paths.some((path) => onPath(there.q, path, goal))) continue;
-    const { path, extent } = follow(there.q, beside[0], goal);
-    if (extent >= REACH && !paths.some((other) => oneCurve(path, other, goal))) paths.push(path);
+    if (beside.length !== 1 || [...known, ...paths].some((path) => onPath(there.q, path, goal))) continue;
+    const { path, extent, crossings: met } = follow(there.q, beside[0], goal);
+    if (!(extent >= REACH) || paths.some((other) => oneCurve(path, other, goal))) continue;
+    paths.push(path);
+    crossings.push(...met);
   }
   if (wide.length > 0.7 * solved && !paths.length) {
     const mean = decompose(wide);
     if (!(mean.S[1] > 0.1 * mean.S[0])) paths.push(follow(q, mean.V[0], goal).path); // along one of them, the other stays lost
-    else return { kind: 'surface', paths: [], crossed: true, moves: q.map((_, j) => Math.max(0, ...wide.map((way) => Math.abs(way[j]) - STRIDE / 10))) };
+    else return { kind: 'surface', paths: [], crossings, moves: q.map((_, j) => Math.max(0, ...wide.map((way) => Math.abs(way[j]) - STRIDE / 10))) };
   }
-  return { kind: paths.length ? 'curve' : solved ? 'exact' : 'boundary', paths, crossed: true };
+  return { kind: paths.length ? 'curve' : solved ? 'exact' : 'boundary', paths, crossings };
 }
 
 /** Whether a posture lies on a self-motion. @param {number[]} q @param {number[][]} path @param {Numbers} goal */
