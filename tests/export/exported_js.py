@@ -24,7 +24,7 @@ const asked = JSON.parse(readFileSync('asked.json', 'utf8'));
 const began = process.hrtime.bigint();
 const ik = asked.targets.map((target, k) => arm.ik(target, asked.near[k]));
 const seconds = Number(process.hrtime.bigint() - began) / 1e9;
-const told = { ik, seconds };
+const told = { ik, seconds, redundant: arm.redundant };
 for (const name of ['fk', 'jacobian', 'target', 'pulses']) if (arm[name]) told[name] = asked.q.map(arm[name]);
 if (arm.clearance) told.clearance = asked.q.map(arm.clearance);
 if (arm.joints) told.joints = told.pulses.map(arm.joints);
@@ -33,7 +33,12 @@ writeFileSync('told.json', JSON.stringify(told));
 
 
 def ask(
-    arm: armkin.Arm, folder: Path, q: np.ndarray, near: np.ndarray | None = None, targets: np.ndarray | None = None
+    arm: armkin.Arm,
+    folder: Path,
+    q: np.ndarray,
+    near: np.ndarray | None = None,
+    targets: np.ndarray | None = None,
+    task: str | None = None,
 ) -> dict[str, Any]:
     """What the exported module says of postures (N, n): fk, jacobian, target, pulses, and ik of targets."""
     node = shutil.which("node")
@@ -41,7 +46,7 @@ def ask(
     goals = goals_of(arm, q) if targets is None else targets
     close = np.broadcast_to(arm.home, q.shape) if near is None else near
     asked = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
-    (folder / "arm.mjs").write_text(module(arm), encoding="utf-8")
+    (folder / "arm.mjs").write_text(module(arm, task), encoding="utf-8")
     (folder / "asked.json").write_text(json.dumps(asked))
     (folder / "ask.mjs").write_text(_ASK)
     subprocess.run([node, "ask.mjs"], cwd=folder, check=True, timeout=300)

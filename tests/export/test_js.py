@@ -12,8 +12,11 @@ import armkin
 from armkin.errors import UsageError
 from armkin.export.js.program import module
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.residuals import residual
-from armkin.inverse.tasks.task import nearest_rotation
+from armkin.inverse.tasks.task import nearest_rotation, targets_of
+
+ROOT = Path(__file__).parents[2]
 
 # a robot of every class that a module can hold, and how many random and typed postures it is asked
 ARMS = (
@@ -73,6 +76,8 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
         ("thor", [135, 0, 0, 0, -135, 180]),  # the elbow stretched over the base: a self-motion of double roots
         ("thor", [90, 180, 180, 90, 0, 0]),  # and with the wrist straight: a surface of them
         ("fanuc_crx10ia", [135, -135, -90, 0, -45, 0]),  # four self-motions, two of which cross at a corner
+        ("fanuc_crx10ia", [-90, 90, -90, 90, -180, -45]),  # two self-motions of double roots that never meet
+        ("wx250s", [-90, 90, 90, -90, -90, 0]),  # rings of four self-motions, each of which crosses two others
     ],
 )
 def test_self_motions_that_meet_are_those_of_python(name: str, degrees: list[float], tmp_path: Path) -> None:
@@ -159,6 +164,49 @@ def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
     assert "\u2028" not in text
 
 
+@pytest.mark.parametrize(
+    ("name", "task", "count"), [("panda", None, 30), ("iiwa7", None, 20), ("planar_3dof", "xy", 20)]
+)
+def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
+    name: str, task: str | None, count: int, tmp_path: Path
+) -> None:
+    arm = armkin.load(name)
+    spare = redundancy(arm, task)
+    assert spare is not None
+    rng = np.random.default_rng(8)
+    q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
+    targets = targets_of(spare.task, armkin.fk(arm, q), q)
+    told = ask(arm, tmp_path, q, near=q, targets=targets, task=task)
+    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(told["target"]) - targets).max() < 1e-9
+    j, joint = spare.joint, arm.joint_names[spare.joint]
+    assert told["redundant"] == joint
+    for posture, target, answer in zip(q, targets, told["ik"], strict=True):
+        rest = armkin.lock(arm, {joint: posture[j]})
+        s = armkin.ik(rest, target[None], task, near=np.delete(posture, j))
+        assert {row["joints"][j] for row in answer["branches"]} == {posture[j]}
+        for row in answer["branches"]:
+            del row["joints"][j]
+        assert not differences(rest, [answer], s)
+
+
+def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:
+    arm = armkin.load("panda", scene=str(ROOT / "examples" / "scenes" / "ur5e.yaml"))
+    q = np.array([[0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 0.5], [0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 3.0]])
+    told = ask(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
+    inside, outside = told["ik"]
+    assert (inside["best"], inside["closest"]) == (0, None)
+    hit = [bool(row["hits"]) for row in inside["branches"] if row["within_limits"]]
+    assert hit == sorted(hit)
+    apart = armkin.clearance(arm, np.array([row["joints"] for row in inside["branches"]]))
+    assert np.abs(apart.mm - [row["clearance_mm"] for row in inside["branches"]]).max() < 1e-9
+    assert outside["best"] is None
+    assert {row["violations"][-1]["joint"] for row in outside["branches"]} == {"J7"}
+
+
 def test_an_arm_that_only_python_solves_has_no_module() -> None:
-    with pytest.raises(UsageError, match="7 joints"):
-        module(armkin.load("panda"))
+    panda = armkin.load("panda")
+    link = np.concatenate([panda.link, np.broadcast_to(np.eye(4), (1, 4, 4))])
+    link[-1, 2, 3], link[-2, 0, 3] = 100.0, 50.0
+    with pytest.raises(UsageError, match="8 joints"):
+        module(armkin.model.arm.from_links(link, [False] * 8))

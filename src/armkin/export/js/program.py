@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +19,16 @@ from armkin.export.js import elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual
+from armkin.model.lock import lock
+from armkin.model.rotation import inverse
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.solvers.redundant import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -41,6 +47,12 @@ def module(arm: Arm, task_name: str | None = None) -> str:
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.
     """
+    if spare := redundancy(actual(arm), task_name):
+        return _with_one_held(arm, actual(arm), spare)
+    return _of_all(arm, task_name, driven=not motors.undriven(arm))
+
+
+def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
     task, named = solver(turned, task_name)
     geometry = plain_form(turned, task, named)
@@ -54,7 +66,7 @@ def module(arm: Arm, task_name: str | None = None) -> str:
         f"// {_about(arm, task, geometry)}",
         part("head"),
         *_exported(arm, task),
-        *_data(arm, turned, task, geometry, branches),
+        *_data(arm, turned, task, geometry, branches, driven),
         _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
         _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
         _of_joints("targetOf", formulas.target(turned, task)),
@@ -62,8 +74,43 @@ def module(arm: Arm, task_name: str | None = None) -> str:
         *map(part, _SOLVER),
         *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
         solve,
+        part("poses"),
         part("module").replace("@TARGET@", _target_is(task)),
-        *([part("pulses")] if _driven(arm) else []),
+        *([part("pulses")] if driven else []),
+    ]
+    return "\n".join(parts)
+
+
+def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
+    """The module of an arm with one joint to spare: the redundant joint is held, the module of the others solves."""
+    name, task = arm.joint_names[spare.joint], spare.task
+    others = replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
+    inner = _of_all(others, task.name, driven=False).replace(part("head"), "")
+    inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
+    way = arm.link[-1] if spare.joint else inverse(arm.link[0])
+    driven = not motors.undriven(arm)
+    redundant = {
+        "joint": spare.joint,
+        "before": inverse(way).ravel().tolist(),
+        "after": way.ravel().tolist(),
+        "sums": task.sums[:, 0].tolist(),
+    }
+    parts = [
+        f"// {_about(arm, task, spare.geometry)} while {name} is held",
+        part("head"),
+        *_exported(arm, task),
+        "/** The joint that the target leaves free: `ik` holds it. */",
+        f"export const redundant = {_text(name)};",
+        *_data(arm, turned, task, spare.geometry, 0, driven),
+        f"const REDUNDANT = {_text(redundant)};",
+        f"const OTHERS = (() => {{\n{inner}return {{ ik, branch_names }};\n}})();",
+        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
+        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
+        _of_joints("targetOf", formulas.target(turned, task)),
+        *_keep_outs(arm, turned),
+        part("poses"),
+        part("redundant").replace("@TARGET@", _target_is(task)),
+        *([part("pulses")] if driven else []),
     ]
     return "\n".join(parts)
 
@@ -125,13 +172,13 @@ def _exported(arm: Arm, task: Task) -> list[str]:
     ]
 
 
-def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int) -> list[str]:
+def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, driven: bool) -> list[str]:
     """What the parts read of the arm."""
     fields: dict[str, Any] = {
         "name": arm.name,
         "joints": arm.n,
         "branches": branches,
-        "names": branch_names(turned, task, geometry, branches),
+        "names": branch_names(turned, task, geometry, branches) if branches else [],
         "method": geometry.name,
         "slides": turned.prismatic.tolist(),
         "lower": turned.lower.tolist(),
@@ -150,7 +197,7 @@ def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int) 
     data = [_ARM_IS, "const ARM = {", *lines, "};", f"const ROTATION = {_ROUNDED!r};"]
     data.append(f"const CLOSED_FORM = {_text(geometry.pairs is not None)};")
     data.append(f"const CALIBRATED = {_text(bool((arm.ratio != 1.0).any()))};")
-    if _driven(arm):
+    if driven:
         values = {
             "gain": arm.motor_gain.tolist(),
             "bias": arm.motor_bias.tolist(),
@@ -179,10 +226,6 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
         _of_joints("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
         part("keep_out"),
     ]
-
-
-def _driven(arm: Arm) -> bool:
-    return not motors.undriven(arm)
 
 
 def _text(value: Any) -> str:

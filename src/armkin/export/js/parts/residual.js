@@ -1,6 +1,3 @@
-const pose16 = new Float64Array(16);
-const slopes = new Float64Array(6 * ARM.joints);
-
 /**
  * What joint values miss of a target: lengths in reaches, angles in rad.
  * @param {Numbers} q @param {Numbers} goal @returns {number[]}
