@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ import pytest
 from hypothesis import settings
 
 from slow import SLOW
+
+# Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # The same examples in every run: what fails, fails for everybody. `--hypothesis-profile=explore` looks for new ones.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -44,8 +48,14 @@ _NO_COMPILER = "needs avr-gcc, simavr, arm-none-eabi-gcc and npm: scripts/test i
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--long`: the fuzzers' million."""
-    parser.addoption("--long", action="store_true", help="a million inputs for the fuzzers (tests/fuzz)")
+    """`--long`: full counts where the gate takes a sample."""
+    parser.addoption("--long", action="store_true", help="full counts for a sample: the fuzzers' million, fifty kills")
+
+
+@pytest.fixture(scope="session")
+def sample(pytestconfig: pytest.Config) -> Callable[[int, int], int]:
+    """How many of something a test takes: `sample(full, few)` is all of them with --long, else a few."""
+    return max if pytestconfig.getoption("--long") else min
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -64,17 +74,21 @@ def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark slow tests, and those of the firmware; without its compiler they are skipped, and say why."""
+    """Mark slow tests, and those of the firmware; without its compiler they are skipped, and say why.
+
+    Slow ones come first where there are several workers, so that these end together.
+    """
     for item in items:
         if _is_slow(item):
             item.add_marker(pytest.mark.slow)
         if not _needs_emulator(item):
             continue
         item.add_marker(pytest.mark.emulator)
-        # One worker has them all: they keep real time, and share what is compiled.
-        item.add_marker(pytest.mark.xdist_group("emulator"))
+        item.add_marker(pytest.mark.xdist_group(item.path.name))  # one worker has a file: it shares what is compiled
         if any(shutil.which(tool) is None for tool in _TOOLS):
             item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: not _is_slow(item))
 
 
 def _is_slow(item: pytest.Item) -> bool:
@@ -90,11 +104,12 @@ def _needs_emulator(item: pytest.Item) -> bool:
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """`-n auto`, which is the default here: all cores for folders, one process for a few named tests.
+    """`-n auto`, which is the default here: three for two cores for folders, one process for a few named tests.
 
     Snapshots are written by one process, too.
     """
     named = [word for word in config.invocation_params.args if "::" in word or word.endswith(".py")]
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS") or 0 < len(named) <= 2:
         return 0
-    return min(os.cpu_count() or 1, 8)
+    # a third of the tests wait for a board that keeps real time
+    return min(3 * (os.cpu_count() or 1) // 2, 8)

@@ -13,12 +13,12 @@ sys.path.append(str(Path(__file__).parents[1] / "firmware"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests in a browser: one worker has all of them. Without a browser they fail, and say what to install."""
+    """Mark the tests in a browser. Without one they fail, and say what to install."""
     for item in items:
         used = vars(item.module).values() if isinstance(item, pytest.Function) else ()
         if any(getattr(one, "__module__", None) == "browsing" for one in used):
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.xdist_group("emulator"))
+            item.add_marker(pytest.mark.xdist_group(item.path.name))  # one worker has a file: it shares a browser
 
 
 @pytest.fixture
