@@ -200,6 +200,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_a_picture_of_the_section_and_a_slice",
         "test_arcs_are_what_each_pose_says",
         "test_engines_and_kills_change_no_byte",
+        "test_the_share_under_keep_outs_is_what_another_count_finds",
     ),
     "reachability/test_workspace.py": (
         "test_a_full_disk_leaves_no_file",
@@ -224,6 +225,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_look.py": ("test_every_robot_has_a_scene_and_a_first_picture",),
     "teach/test_teach_program.py": ("test_what_is_played_is_where_the_tip_is_however_long_it_takes",),
     "teach/test_teach_safety.py": (),
+    "teach/test_teach_slice.py": (),
     "test_examples.py": ("test_an_example_runs_from_any_folder",),
     "test_lowest_versions.py": (),
     "test_package.py": (),

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import monte_carlo
 import numpy as np
 import pytest
 
 import armkin
 from armkin.errors import UsageError
 from armkin.reachability import map as maps
+from armkin.reachability import voxels
 from armkin.reachability.answers import TURN, Question, answered
 from armkin.reachability.cells import Grid
 from command_line import ROOT, Result, run
@@ -98,6 +100,48 @@ def test_keep_outs_take_orientations_away_and_are_asked_pose_by_pose() -> None:
     assert (blocked.share <= free.share + 1e-12).all()
     assert blocked.reached < free.reached
     assert np.allclose(blocked.share_any, free.share_any)
+
+
+def test_the_share_under_keep_outs_is_what_another_count_finds() -> None:
+    """Cells at random, asked again by multi-start Newton on screws and points along the bodies; then the volume."""
+    scene = ROOT / "examples/scenes/three_dof.yaml"
+    said = run("info", "three_dof", "--scene", scene, "--json").json
+    cells = monte_carlo.cells(armkin.load("three_dof", scene=scene), scene, said, grid=30.0, count=120, starts=20)
+    assert cells.known > 0.97
+    assert cells.different == 0
+    assert 0.05 < cells.share < 0.6
+    volume = monte_carlo.volume(armkin.load("three_dof", scene=scene), scene, said, grid=30.0, count=250, starts=20)
+    assert abs(volume.map - volume.counted) < 4 * volume.sigma
+
+
+def test_an_arm_of_seven_joints_is_asked_pose_by_pose() -> None:
+    grid = Grid(armkin.load("iiwa7"), 300.0, 1, 2, 1, False)
+    question = Question(grid)
+    assert not question.arcs
+    ring = np.array([[1, 1]])
+    found = {name: float(values[0]) for name, values in answered(question, ring).items()}
+    T = grid.targets(np.repeat(ring, 2, 0), np.zeros(2), np.arange(2), np.zeros(2))
+    legal = armkin.ik(grid.arm, T).within_limits.sum(axis=1)
+    assert found["share"] == (legal > 0).mean() > 0
+    assert found["branches"] == legal.sum() / (legal > 0).sum()
+    assert found["manipulability"] > 0
+
+
+def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
+    found = armkin.reach(armkin.load("puma560"), grid=150.0, azimuths=7, directions=3, rolls=2, measures=False)
+    grid, F = found.grid, found.grid.frame
+    centres = np.stack([found.x_mm, found.y_mm, found.z_mm], axis=1)
+    local = (centres - F[:3, 3]) @ F[:3, :3]
+    rng = np.random.default_rng(5)
+    r, z = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
+    turn = np.arctan2(local[:, 1], local[:, 0]) + rng.uniform(-0.999, 0.999, len(r)) * np.pi / 7
+    r, z = r + rng.uniform(-74.9, 74.9, len(r)), z + rng.uniform(-74.9, 74.9, len(r))
+    inside = voxels.rows_at(grid, np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1))
+    assert np.array_equal(inside, np.arange(found.cells))
+    assert (voxels.rows_at(grid, np.array([[5000.0, 0, 0], [0, 0, -5000.0]])) == -1).all()
+    side = voxels.section(grid)
+    assert (side.row % 7 == np.where(side.places[:, 0] >= 0, 0, side.row % 7)).all()
+    assert side.table(found.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
 
 
 def reach(*more: object) -> Result:

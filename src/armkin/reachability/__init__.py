@@ -10,6 +10,7 @@ Where, with which orientations, by how many branches:
 
 cells.py     rings of cells about joint 1's axis, and the orientations in each
 answers.py   what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
+voxels.py    cubic voxels of the cells, for pictures
 map.py       `reach`: all rings, in chunks, by any engine
 place.py     `place`: where to put an arm for given targets or a path; place_file.py: its columns
 from_place.py  what an arm reaches from a place; standing.py: the arm there, among what stands with the targets

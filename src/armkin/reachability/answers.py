@@ -4,7 +4,8 @@ One solve stands for many poses. Turning a target about joint 1's axis adds to j
 tool's z axis adds to the last joint alone where that joint's axis is the tool's z: within real limits each branch of
 one solve is legal on an arc of azimuths and on an arc of rolls. An arc is kept as its first index and its length, and
 as a word of bits, one a roll; the union of the branches' arcs is a few operations on words. Where the axes do not allow
-it, and for targets on an edge, poses are solved one by one, and the same words are filled in from them.
+it, and for targets on an edge, poses are solved one by one, and the same words are filled in from them. Of an arm with
+one joint more than its task a branch is a legal interval of a family, and measures are those of its listed posture.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import jacobian
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import isolated as ik
+from armkin.inverse.solve import ik
 from armkin.model.limits import SLACK
 from armkin.motors import joints_per_pulse
 from armkin.reachability.cells import STRAIGHT, Grid

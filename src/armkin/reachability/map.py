@@ -20,6 +20,8 @@ from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.files import check, whole
 from armkin.formula.arrays import Array
+from armkin.inverse.solvers.recognise import solver
+from armkin.model.arm import actual
 from armkin.reachability import keeping
 from armkin.reachability.answers import TURN, Question, answered
 from armkin.reachability.cells import Grid
@@ -27,7 +29,9 @@ from armkin.reachability.cells import Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SOLVES = 40_000  # of a chunk: about a second with all measures
+SOLVES = 40_000  # of a chunk: about a second with all measures and a closed form
+SLOWER = 40  # times, by elimination
+FAMILIES = 1_000  # times, where the answers of a pose are curves
 BLOCK = 2_048  # solves at once: their words stay in the cache
 KEEP = 5_000_000  # cells that a result with a file still holds as arrays
 UNITS = {
@@ -123,9 +127,17 @@ def reach(
 def chunks(question: Question) -> Iterator[Chunk]:
     """All rings, some at a time; the same ones for every engine."""
     rings = question.grid.rings
-    each = max(SOLVES // question.solves_a_ring, 1)
+    each = max(SOLVES // _cost(question) // question.solves_a_ring, 1)
     for number, start in enumerate(range(0, len(rings), each)):
         yield Chunk(number, rings[start : start + each])
+
+
+def _cost(question: Question) -> int:
+    """How many times as long as by a closed form a solve takes, roughly."""
+    arm, task = question.grid.arm, question.grid.task
+    if arm.n > task.constraints:
+        return FAMILIES
+    return 1 if solver(actual(arm), task.name)[1].pairs is not None else SLOWER
 
 
 def work(question: Question, chunk: Chunk) -> tuple[int, Table]:

@@ -51,6 +51,10 @@ class Actions:
             from armkin.teach.own_solver import own_solver
 
             return own_solver(self.arm)
+        if name == "reach":
+            from armkin.teach.reach_slice import reach_slice
+
+            return reach_slice(self.arm)
         if name == "stop":  # whoever holds the key may stop the arm
             if self.board is not None:
                 self.board.stop()

@@ -12,6 +12,7 @@ import { get } from "./dom.js";
 import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
 import { Pointing } from "./pointing.js";
+import { Slice } from "./slice.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
@@ -52,6 +53,7 @@ export class View {
     this.way = null;
     /** @type {import("three").Points | null} */
     this.cloud = null;
+    this.slice = new Slice(this);
     this.shapes = new Shapes(arm);
     this.tube = new MeshLambertMaterial();
     this.drum = new MeshLambertMaterial();
@@ -219,7 +221,7 @@ export class View {
   legend() {
     const apart = this.arm.obstacles?.length ? ", obstacles apart" : "";
     const reach = this.cloud?.visible ? `; points: the tip in ${POSTURES} poses spread within the limits${apart}` : "";
-    get("legend").textContent = `a square is ${this.step} mm${reach}`;
+    get("legend").textContent = `a square is ${this.step} mm${reach}${this.slice.words}`;
   }
 
   /** Draw the tip's way through a program. @param {number[][]} tips @param {number[]} [hit] where it hits something */

@@ -1,0 +1,54 @@
+"""The slice of reach on the page: the cells of `armkin.reach` in the plane of the arm's links, as cubic voxels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from browsing import chromium, opened, until
+from served import serving
+
+import armkin
+from armkin.errors import UsageError
+from armkin.teach.actions import Actions
+from armkin.teach.reach_slice import ACROSS, DIRECTIONS, reach_slice
+
+
+def test_voxels_are_shown_and_hidden_again() -> None:
+    arm = armkin.load("three_dof")
+    with serving(Actions(arm)) as server, chromium() as browser, opened(browser, server.address) as page:
+        slice_button = page.get_by_role("button", name="Slice")
+        slice_button.click()
+        until(page, "document.getElementById('legend').innerText.includes('share of 1 orientations')")
+        assert slice_button.get_attribute("aria-pressed") == "true"
+        slice_button.click()
+        until(page, "!document.getElementById('legend').innerText.includes('voxels')")
+
+
+def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
+    arm = armkin.load("puma560")
+    found = reach_slice(arm)
+    centres = np.reshape(found["centres"], (-1, 3))
+    assert found["size"] == pytest.approx(arm.reach / ACROSS)
+    assert found["of"] == DIRECTIONS
+    assert len(centres) == len(found["shares"]) > 20
+    assert (centres[:, 1] == 0).all()
+    F = np.array(found["frame"])
+    for i in (0, len(centres) // 2, len(centres) - 1):
+        back = centres[i, 0] < 0
+        turned = np.diag([-1.0, -1.0, 1.0]) if back else np.eye(3)  # the cell's own frame: x outwards
+        n = np.arange(DIRECTIONS)
+        z = 1 - (2 * n + 1) / DIRECTIONS
+        away = np.stack([np.sqrt(1 - z**2) * f(n * np.pi * (3 - np.sqrt(5))) for f in (np.cos, np.sin)] + [z], axis=1)
+        T = np.tile(np.eye(4), (DIRECTIONS, 1, 1))
+        for one, direction in zip(T, away, strict=True):
+            x = np.cross(direction, [0.3, 0.5, 0.1])  # the roll is free: joint 6 turns all round
+            x /= np.linalg.norm(x)
+            one[:3, :3] = F[:3, :3] @ turned @ np.stack([x, np.cross(direction, x), direction], axis=1)
+            one[:3, 3] = F[:3, 3] + F[:3, :3] @ centres[i]
+        assert armkin.ik(arm, T).within_limits.any(axis=1).mean() == pytest.approx(found["shares"][i], abs=1e-4)
+
+
+def test_seven_joints_hold_one_and_no_task_is_told() -> None:
+    assert reach_slice(armkin.load("iiwa7"))["held"] == "J3"
+    with pytest.raises(UsageError, match="no task fits"):
+        reach_slice(armkin.load("pan_tilt"))
