@@ -49,7 +49,7 @@ MAY_IMPORT: dict[str, str] = {
     " errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers inverse motors"
     " path_file",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
-    " inverse inverse/answers inverse/tasks motion path_file",
+    " inverse inverse/answers inverse/solvers inverse/tasks motion path_file",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "keep_out keep_out/shapes"
