@@ -10,6 +10,7 @@ scene.py            what the page draws: links, bodies, limits
 pose_answers.py     one pose or one target: branches, limits, pulses
 board.py            the actions on the board; board_thread.py: the thread that owns the port
 one_file.py         the page without a server, in one HTML file; local/: what answers in the server's place
+reach_slice.py      where it reaches in the plane of its links, for the page
 own_solver.py       the arm's solver for the browser itself
 static/             the page itself; static/vendor/three is three.js, byte for byte
 """
