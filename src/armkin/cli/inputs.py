@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def load(robot: str, scene: str | None = None) -> Arm:
-    """The arm of a robot file, or of a shipped robot, in its scene."""
+def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
+    """The arm of a robot file, or of a shipped robot, in its scene; tool: what `--tool` says."""
     from armkin.keep_out.loading import load
     from armkin.robot_file.catalogue import locate
 
@@ -33,9 +33,15 @@ def load(robot: str, scene: str | None = None) -> Arm:
     files.keep(locate(robot))
     if scene is not None:
         files.keep(scene)
-    arm = load(robot, scene)
+    arm = load(robot, scene, tool=None if tool is None else _six(tool))
     unit_notes.robot_file(arm)
     return arm
+
+
+def _six(tool: str) -> list[float]:
+    """`--tool X,Y,Z[,R,P,Y]` as six numbers [mm, deg]."""
+    names = ("x", "y", "z", "roll", "pitch", "yaw")[: 3 if tool.count(",") == 2 else 6]
+    return [*comma_separated(tool, names, "--tool"), 0.0, 0.0, 0.0][:6]
 
 
 def percent(text: str, option: str) -> float:

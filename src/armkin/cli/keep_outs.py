@@ -26,9 +26,9 @@ NoScene = Annotated[
 _SHOWN = 4001  # postures of a motion in which hits that are ignored are looked for
 
 
-def moving(robot: str, scene: str | None, ignore: bool = False) -> Arm:
+def moving(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
     """The arm of a command that moves it; radii that are assumed are named."""
-    return marked(inputs.load(robot, scene), ignore)
+    return marked(inputs.load(robot, scene, tool), ignore)
 
 
 def marked(arm: Arm, ignore: bool) -> Arm:

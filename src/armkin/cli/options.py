@@ -35,6 +35,10 @@ Scene = Annotated[
     str | None,
     typer.Option("--scene", metavar="FILE", help="Keep-outs in a file of their own, added to the robot's."),
 ]
+Tool = Annotated[
+    str | None,
+    typer.Option("--tool", metavar="X,Y,Z[,R,P,Y]", help="After the last joint, in place of the robot file's tool."),
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
 JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]
 Batch = Annotated[

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _LARGEST = 32_000_000  # [bytes] of standard input: some 50,000 answers
+_TOOL = ("xyz", "rpy")
 _NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
 
 
@@ -26,6 +27,7 @@ class Piped:
     poses: list[Pose]
     scene: str | None = None
     scene_sha256: str | None = None
+    tool: list[float] | None = None  # x, y, z, roll, pitch, yaw [mm, deg]
 
 
 @dataclass(frozen=True)
@@ -60,24 +62,35 @@ def read(robot: str | None) -> Piped:
     scenes = {(answer.get("scene"), answer.get("scene_sha256")) for answer in answers}
     if len(scenes) > 1:
         raise UsageError("the answers on standard input are of different scenes: send one at a time")
-    return Piped(first["robot_file"], first["robot_sha256"], [_pose(answer) for answer in answers], *scenes.pop())
+    tool = first.get("tool")
+    if any(answer.get("tool") != tool for answer in answers):
+        raise UsageError("the answers on standard input are of different tools: send one at a time")
+    poses = [_pose(answer) for answer in answers]
+    if tool is not None and not (isinstance(tool, dict) and all(isinstance(tool.get(key), list) for key in _TOOL)):
+        raise UsageError("the answer on standard input is damaged: its tool is no xyz and rpy")
+    tool = None if tool is None else [number for key in _TOOL for number in _numbers(tool[key])]
+    return Piped(first["robot_file"], first["robot_sha256"], poses, *scenes.pop(), tool)
 
 
-def poses(robot: str | None, words: Sequence[str] | None, scene: str | None = None) -> tuple[Arm, list[list[float]]]:
+def poses(
+    robot: str | None, words: Sequence[str] | None, scene: str | None = None, tool: str | None = None
+) -> tuple[Arm, list[list[float]]]:
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
-    if not words and (found := joint_values(robot, scene)) is not None:
+    if not words and (found := joint_values(robot, scene, tool)) is not None:
         return found
-    arm = inputs.load(inputs.named(robot), scene)
+    arm = inputs.load(inputs.named(robot), scene, tool)
     return arm, [inputs.joints(arm, words)]
 
 
-def joint_values(robot: str | None, scene: str | None = None) -> tuple[Arm, list[list[float]]] | None:
+def joint_values(
+    robot: str | None, scene: str | None = None, tool: str | None = None
+) -> tuple[Arm, list[list[float]]] | None:
     """The arm and joint values [deg | mm] of what `fk`, `ik` or `pulses` with --json has printed.
 
     robot: a robot given as well, which must be the same. None if there is a robot and nothing on standard
     input. Answers of ik without a branch within limits are skipped, with a warning.
     """
-    found = answers(robot, scene)
+    found = answers(robot, scene, tool)
     if found is None:
         return None
     arm, parsed = found
@@ -95,7 +108,9 @@ def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
     return values
 
 
-def answers(robot: str | None, scene: str | None = None) -> tuple[Arm, list[dict[str, Any]]] | None:
+def answers(
+    robot: str | None, scene: str | None = None, tool: str | None = None
+) -> tuple[Arm, list[dict[str, Any]]] | None:
     """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
     text = _text()
     if not text.strip():
@@ -107,7 +122,7 @@ def answers(robot: str | None, scene: str | None = None) -> tuple[Arm, list[dict
         if robot is None or text.lstrip()[:1] == "{":
             raise
         raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
-    arm = inputs.load(robot or parsed[0]["robot_file"], scene)
+    arm = inputs.load(robot or parsed[0]["robot_file"], scene, tool)
     for answer in parsed:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]

@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 def head(arm: Arm) -> Head:
     """What every JSON object begins with: the robot, its file as given and the file's hash; the scene's, too."""
     found: Head = {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
-    found.update(scene(arm))
+    found.update(given(arm))
     return found
 
 
-def scene(arm: Arm) -> Any:
-    """The keys of an answer that was made in a scene; none without."""
-    return {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
+def given(arm: Arm) -> Any:
+    """The keys of an answer that was made in a scene, or with another tool than the robot file's; none without."""
+    found: dict[str, Any] = {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
+    if arm.tool is not None:
+        found["tool"] = {"xyz": list(arm.tool[:3]), "rpy": list(arm.tool[3:])}
+    return found
 
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:

@@ -27,6 +27,7 @@ def goals(
     lock: Sequence[str] | None = None,
     near: str | None = None,
     scene: str | None = None,
+    tool: str | None = None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     import numpy as np
@@ -39,10 +40,10 @@ def goals(
     if target is None and (branch is not None or task is not None or near is not None or lock):
         raise UsageError("--branch, --task, --near and --lock belong to --target")
     if not given:
-        return _from_pipe(robot, scene)
+        return _from_pipe(robot, scene, tool)
     if robot is None:
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
-    arm = inputs.load(robot, scene)
+    arm = inputs.load(robot, scene, tool)
     if target is not None:
         from armkin.inverse.tasks.fitting import task_for
 
@@ -112,17 +113,22 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
     return Goals(joints, rows)
 
 
-def _from_pipe(robot: str | None, scene: str | None) -> tuple[Arm, Goals]:
+def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[Arm, Goals]:
     import numpy as np
 
     import armkin
 
     answer = piped_answers.read(robot)
-    arm = inputs.load(answer.robot_file, scene)
+    arm = inputs.load(answer.robot_file, scene, tool)
     if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
         raise FileError(
             f"the answer on standard input was computed in the scene {answer.scene}; "
             + (f"{arm.scene} is another one, or it has changed" if arm.scene else f"give --scene {answer.scene}")
+        )
+    if answer.tool is not None and answer.tool != list(arm.tool or ()):
+        raise FileError(
+            "the answer on standard input was computed with another tool; "
+            f"give --tool {','.join(map(repr, answer.tool))}"
         )
     if arm.sha256 != answer.robot_sha256:
         raise FileError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -13,10 +14,16 @@ if TYPE_CHECKING:
     from armkin.robot_file.scene import Scene
 
 
-def load(path: str | PathLike[str], scene: str | PathLike[str] | None = None) -> Arm:
+def load(
+    path: str | PathLike[str],
+    scene: str | PathLike[str] | None = None,
+    *,
+    tool: Sequence[float] | None = None,
+) -> Arm:
     """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
 
-    scene: a file whose keep-outs are added to the robot's. Raises FileError if a file cannot be read and
+    scene: a file whose keep-outs are added to the robot's. tool: x, y, z, roll, pitch, yaw [mm, deg] after the last
+    joint, in place of the file's, as on the command line. Raises FileError if a file cannot be read and
     RobotFileError if it is not valid, or if a keep-out is hit in every posture.
 
     >>> load("three_dof").joint_names
@@ -29,12 +36,12 @@ def load(path: str | PathLike[str], scene: str | PathLike[str] | None = None) ->
         from armkin.robot_file.scene import read
 
         around = read(scene)
-    return checked(file, around)
+    return checked(file, around, tool)
 
 
-def checked(file: RobotFile, around: Scene | None = None) -> Arm:
+def checked(file: RobotFile, around: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
-    arm = build(file, around)
+    arm = build(file, around, tool)
     if arm.keep_out:
         from armkin.keep_out.guard import check
 

@@ -58,6 +58,7 @@ class Arm:
     ignores_keep_out: bool = False  # motions are not proved: on the operator's word
     scene: str = ""  # the scene's file, as given
     scene_sha256: str = ""  # of its bytes
+    tool: tuple[float, ...] | None = None  # x, y, z, roll, pitch, yaw [mm, deg] in place of the file's
     of_scene: int = 0  # how many of `keep_out`, its last ones, are the scene's
     whole: tuple[Arm, Mapping[str, float]] | None = None  # with keep-outs: what `lock` was given
     gripper: Gripper | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -27,10 +28,15 @@ def load(path: str | PathLike[str]) -> Arm:
     return build(robot_file.read(path))
 
 
-def build(file: RobotFile, scene: Scene | None = None) -> Arm:
-    """The arm of a validated robot file, with a scene's keep-outs behind the file's own."""
+def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+    """The arm of a validated robot file, with a scene's keep-outs behind the file's own.
+
+    tool: x, y, z, roll, pitch, yaw [mm, deg] after the last joint, in place of the file's.
+    """
+    if tool is not None:
+        file = file.with_tool(tool)
     base = transform(file.base.xyz, file.base.rpy)
-    tool = transform(file.tool.xyz, file.tool.rpy)
+    end = transform(file.tool.xyz, file.tool.rpy)
     before, after, frame = [], [], []
     for joint in file.joints:
         if file.convention == "screws":
@@ -41,7 +47,8 @@ def build(file: RobotFile, scene: Scene | None = None) -> Arm:
         before.append(pre @ flip)
         after.append(flip @ post)
         frame.append(flip @ at)
-    end = tool if file.zero_pose is None else transform(file.zero_pose.xyz, file.zero_pose.rpy) @ tool
+    if file.zero_pose is not None:
+        end = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ end
     link = [base @ before[0]]
     link += [after[i] @ before[i + 1] for i in range(len(before) - 1)]
     link.append(after[-1] @ end)
@@ -70,6 +77,7 @@ def build(file: RobotFile, scene: Scene | None = None) -> Arm:
         poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
         motors=file.motor_list(),
         **_keep_outs(file, scene),
+        tool=None if tool is None else tuple(map(float, tool)),
         homing=tuple(j.homing for j in file.joints),
         hard_limits=tuple(j.homing is not None and j.hard_limits is not False for j in file.joints),
         gripper=file.gripper,

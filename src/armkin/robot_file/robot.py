@@ -1,12 +1,14 @@
 """The robot file whole: the keys of ``model``, held to the rules of ``checks``."""
 
+from collections.abc import Sequence
 from typing import Self
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from armkin.errors import UsageError
 from armkin.robot_file import checks
-from armkin.robot_file.model import RobotKeys
+from armkin.robot_file.model import Pose, RobotKeys
 
 
 class RobotFile(RobotKeys):
@@ -24,6 +26,14 @@ class RobotFile(RobotKeys):
     def sha256(self) -> str:
         """SHA-256 of the file's bytes; empty for a model made in memory."""
         return self._sha256
+
+    def with_tool(self, numbers: Sequence[float]) -> Self:
+        """The same file with another tool: x, y, z, roll, pitch, yaw [mm, deg]. Raises UsageError for what is none."""
+        try:
+            tool = Pose(xyz=tuple(numbers[:3]), rpy=tuple(numbers[3:]))  # type: ignore[arg-type]
+        except ValidationError as error:
+            raise UsageError(f"tool {list(numbers)}: {error.errors()[0]['msg']}", argument="tool") from None
+        return self.model_copy(update={"tool": tool})
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -14,6 +14,12 @@ class Head(TypedDict):
     scene_sha256: Annotated[NotRequired[str], "of its bytes"]
 
 
+class Tooled(TypedDict):
+    """What answers begin with that may be asked for another tool."""
+
+    tool: Annotated[NotRequired[dict[str, list[float]]], "with --tool: xyz, rpy, in place of the robot file's"]
+
+
 class Violation(TypedDict):
     """A joint outside its limits."""
 
@@ -41,7 +47,7 @@ class Frame(TypedDict):
     rotation: Annotated[list[list[float]], "3 x 3, row by row"]
 
 
-class Fk(Head, Near):
+class Fk(Head, Tooled, Near):
     """Where the tool is."""
 
     joints: Annotated[list[float], "as given [deg or mm]"]
@@ -94,7 +100,7 @@ class Pulses(Head, _From, Near):
     tried: Annotated[NotRequired[int], "with --best: pulse vectors compared"]
 
 
-class Workspace(Head):
+class Workspace(Head, Tooled):
     """Where the tip can reach."""
 
     samples: int

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NotRequired, TypedDict
 
-from armkin.cli.answers.arm import Head, Near, Violation
+from armkin.cli.answers.arm import Head, Near, Tooled, Violation
 
 
 class Family(TypedDict):
@@ -37,7 +37,7 @@ class Closest(Near):
     branch: Annotated[str | None, "the branch it is, where only the branch asked for will not do"]
 
 
-class Ik(Head):
+class Ik(Head, Tooled):
     """All joint values that reach a target."""
 
     task: str

@@ -4,16 +4,16 @@
 from typing import Annotated, Literal, NotRequired, TypedDict
 
 from armkin.board.summaries import Summary, Where
-from armkin.cli.answers.arm import Head
+from armkin.cli.answers.arm import Head, Tooled
 
 
-class DryRun(Head, Summary):
+class DryRun(Head, Tooled, Summary):
     """`send --dry-run`."""
 
     dry_run: Literal[True]
 
 
-class Send(Head):
+class Send(Head, Tooled):
     """`send`: the plan, and where the arm stands after it."""
 
     port: str
@@ -95,7 +95,7 @@ PathClearance = TypedDict(
 )
 
 
-class Path(Head):
+class Path(Head, Tooled):
     """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
 
     task: str

@@ -19,6 +19,7 @@ from armkin.cli.options import (
     Resume,
     RobotOrPipe,
     Scene,
+    Tool,
     Workers,
 )
 from armkin.cli.render import fixed
@@ -37,6 +38,7 @@ def fk(
     frames: Annotated[bool, typer.Option("--frames", help="Also the base's and every joint's frame.")] = False,
     compiled: Compiled = False,
     scene: Scene = None,
+    tool: Tool = None,
     json: JsonLines = False,
     batch: Batch = None,
     out: BatchOut = None,
@@ -47,9 +49,9 @@ def fk(
     """Where the tool is for given joint values."""
     if batch is not None:
         inputs.no_numbers(q)
-        arm, values = inputs.load(inputs.named(robot), scene), list[list[float]]()
+        arm, values = inputs.load(inputs.named(robot), scene, tool), list[list[float]]()
     else:
-        arm, values = _poses(robot, q, scene)
+        arm, values = _poses(robot, q, scene, tool)
         if len(values) == 1:
             inputs.one_alone(workers, cluster, resume)
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
@@ -65,6 +67,7 @@ def fk(
         "command": "fk",
         "robot file": arm.sha256,
         "scene": arm.scene_sha256,
+        "tool": arm.tool,
         "frames": frames,
         "compiled": compiled,
     }
@@ -95,14 +98,16 @@ class Questions:
         return _answers(self.arm, chunk, self.frames, self.compiled)
 
 
-def _poses(robot: str | None, q: list[str] | None, scene: str | None) -> tuple[Arm, list[list[float]]]:
+def _poses(
+    robot: str | None, q: list[str] | None, scene: str | None, tool: str | None
+) -> tuple[Arm, list[list[float]]]:
     """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
     if q:
-        arm = inputs.load(inputs.named(robot), scene)
+        arm = inputs.load(inputs.named(robot), scene, tool)
         return arm, [inputs.joints(arm, q)]
     from armkin.cli import piped_answers
 
-    return piped_answers.poses(robot, q, scene)
+    return piped_answers.poses(robot, q, scene, tool)
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
@@ -116,7 +121,7 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
-    in_scene = render.scene(arm)
+    in_scene = render.given(arm)
     joints = chunk.values.tolist()
     joint_units, head = units.names(arm), render.head(arm)
     for i, pose in enumerate(T):

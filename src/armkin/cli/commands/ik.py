@@ -26,6 +26,7 @@ from armkin.cli.options import (
     Sweep,
     Target,
     TaskName,
+    Tool,
     Workers,
 )
 from armkin.cli.rows import Chunk, one_row
@@ -62,6 +63,7 @@ def ik(
         typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
     ] = False,
     scene: Scene = None,
+    tool: Tool = None,
     compiled: Compiled = False,
     workers: Workers = 1,
     json: JsonLines = False,
@@ -79,8 +81,8 @@ def ik(
     from armkin.inverse.position_first import check as position_first_is_for
     from armkin.inverse.tasks.fitting import task_for
 
-    given = None if target or batch is not None else piped_answers.joint_values(robot, scene)
-    arm = inputs.load(inputs.named(robot), scene) if given is None else given[0]
+    given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
+    arm = inputs.load(inputs.named(robot), scene, tool) if given is None else given[0]
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
     held = lock_and_sweep.locks(arm, lock)
@@ -117,6 +119,7 @@ def ik(
             "command": "ik",
             "robot file": arm.sha256,
             "scene": arm.scene_sha256,
+            "tool": arm.tool,
             "task": what.name,
             "near": request.near_out,
             "branch": branch,
@@ -275,8 +278,8 @@ def _answer(
         "closest": _closest(request, goal, found, nearest) if best is None and with_closest else None,
         "free_joints": found.free,
     }
+    answer.update(render.given(arm))
     if arm.keep_out:
-        answer.update(render.scene(arm))
         answer["branches_free"] = sum(branch.may_be_taken for branch in found.branches)
     return answer
 

@@ -13,7 +13,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName
+from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName, Tool
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -63,6 +63,7 @@ def path(
     ] = None,
     near: Near = None,
     scene: Scene = None,
+    tool: Tool = None,
     no_scene: NoScene = False,
     ignore_keep_out: Ignore = False,
     start: Annotated[
@@ -107,7 +108,7 @@ def path(
 
     import armkin
 
-    arm = keep_outs.moving(robot, scene, ignore_keep_out)
+    arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
     locked = {
         name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
         for name, value in lock_and_sweep.locks(arm, lock).items()

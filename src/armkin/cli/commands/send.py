@@ -12,7 +12,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -60,6 +60,7 @@ def send(
         str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
     ] = None,
     scene: Scene = None,
+    tool: Tool = None,
     no_scene: NoScene = False,
     ignore_keep_out: Ignore = False,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
@@ -126,11 +127,11 @@ def send(
         if robot is None:
             raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
         link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
-        arm = keep_outs.moving(robot, scene, ignore_keep_out)
+        arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
         sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene)
+    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene, tool)
     arm = keep_outs.marked(arm, ignore_keep_out)
     if accel is not None:
         arm = _accelerated(arm, number(accel, "--accel"))

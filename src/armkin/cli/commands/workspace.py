@@ -11,7 +11,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import is_number, whole
-from armkin.cli.options import Cluster, Compiled, Json, Robot, Scene, Workers
+from armkin.cli.options import Cluster, Compiled, Json, Robot, Scene, Tool, Workers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def workspace(
         ),
     ] = None,
     scene: Scene = None,
+    tool: Tool = None,
     compiled: Compiled = False,
     workers: Workers = 1,
     cluster: Cluster = None,
@@ -71,7 +72,7 @@ def workspace(
     from armkin.reachability import cloud
     from armkin.reachability.sampling import MOST
 
-    arm = inputs.load(robot, scene)
+    arm = inputs.load(robot, scene, tool)
     measures = list(dict.fromkeys(measure or ()))
     if out is not None:
         cloud.check(out)
@@ -146,7 +147,7 @@ def _answer(found: Workspace) -> Answer:
         "measures": {name: list(ends) for name, ends in found.measures.items()},
         "seconds": found.seconds,
     }
-    answer.update(render.scene(found.arm))
+    answer.update(render.given(found.arm))
     if found.free is not None:
         answer["free_share"] = found.free / found.samples
     if found.extent is not None:
