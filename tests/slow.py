@@ -171,6 +171,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_subproblems.py": ("test_a_circle_and_a_conic",),
     "inverse/test_sweep.py": ("test_what_is_dropped_is_not_shown",),
     "inverse/test_three_prismatic.py": (),
+    "inverse/test_tool_down.py": (),
     "inverse/test_truth.py": (),
     "inverse/test_workers.py": ("test_results_do_not_depend_on_the_workers",),
     "keep_out/test_fuzz_moves.py": (),

@@ -1,4 +1,4 @@
-"""Double roots that two solutions share: their two vectors, however mixed, give both solutions back."""
+"""Roots that several solutions share: their vectors, however mixed, give all of them back."""
 
 from __future__ import annotations
 
@@ -16,56 +16,64 @@ from armkin.inverse.elimination import equal_roots
 from armkin.inverse.solvers.recognise import solver
 
 
-def product(q: float, k: float) -> Array:
+def powers(q: complex) -> Array:
     f = q / 2
-    return np.outer([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)], [1.0, np.cos(k), np.sin(k)])
+    return np.array([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)])
 
 
-def mixed(one: Array, other: Array, weights: Array) -> tuple[Array, Array]:
-    """Two matrices (1, 4, 3) that span the same plane, orthonormal."""
-    vectors = np.linalg.qr((weights @ np.stack([one.ravel(), other.ravel()])).T)[0].T
-    return vectors[0].reshape(1, 4, 3), vectors[1].reshape(1, 4, 3)
+def product(q: complex, k: complex, wide: bool) -> Array:
+    return np.outer(powers(q), powers(k) if wide else [1.0, np.cos(k), np.sin(k)])
 
 
+def mixed(vectors: list[Array], weights: Array) -> Array:
+    """Matrices (1, d, 4, 3 or 4) that span the same space, orthonormal."""
+    flat = weights @ np.stack([v.ravel() for v in vectors])
+    return np.linalg.qr(flat.T)[0].T.reshape(1, len(vectors), *vectors[0].shape)
+
+
+@pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize(
-    ("first", "second"),
+    "solutions",
     [
-        ((0.3, -1.2), (2.0, 0.4)),
-        ((0.3, -1.2), (0.3, 0.4)),  # the dialytic joint is alike, too
-        ((0.3, 0.4), (2.0, 0.4)),  # and the third
-        ((0.3, -1.2), (0.3 + np.pi, -1.2)),
-        ((0.3, -1.2), (0.3 + np.pi, -1.2 + np.pi)),
-        ((np.pi, np.pi / 2), (0.0, -np.pi / 2)),
+        [(0.3, -1.2), (2.0, 0.4)],
+        [(0.3, -1.2), (0.3, 0.4)],  # the dialytic joint is alike, too
+        [(0.3, 0.4), (2.0, 0.4)],  # and the third
+        [(0.3, -1.2), (0.3 + np.pi, -1.2)],
+        [(0.3, -1.2), (0.3 + np.pi, -1.2 + np.pi)],
+        [(np.pi, np.pi / 2), (0.0, -np.pi / 2)],
+        [(0.3, -1.2), (0.3, 1.9), (-2.0, -1.2), (-2.0, 1.9)],  # four of a CRX-10iA with axis 6 upright
     ],
 )
-def test_both_products_come_back_from_any_mixture(first: tuple[float, float], second: tuple[float, float]) -> None:
+def test_all_products_come_back_from_any_mixture(solutions: list[tuple[float, float]], wide: bool) -> None:
     rng = np.random.default_rng(0)
+    wanted = [product(*solution, wide) for solution in solutions]
     for _ in range(20):
-        a, b = mixed(product(*first), product(*second), rng.normal(size=(2, 2)))
-        weights, good = equal_roots.products(a, b)
+        v = mixed(wanted, rng.normal(size=(len(wanted), len(wanted))))
+        weights, real, good = equal_roots.products(v)
         assert good.all()
-        found = [weights[0, i, 0] * a[0] + weights[0, i, 1] * b[0] for i in (0, 1)]
-        for wanted in (product(*first), product(*second)):
-            cosines = [abs((f * wanted).sum()) / np.linalg.norm(f) / np.linalg.norm(wanted) for f in found]
-            assert max(cosines) == pytest.approx(1.0, abs=1e-12)
+        assert real.all()
+        found = (weights[0] @ v.reshape(len(wanted), -1)).reshape(-1, *wanted[0].shape)
+        for one in wanted:
+            cosines = [abs((f * one).sum()) / np.linalg.norm(f) / np.linalg.norm(one) for f in found]
+            assert max(cosines) == pytest.approx(1.0, abs=1e-10)
 
 
-def test_a_plane_without_two_products_gives_none() -> None:
+@pytest.mark.parametrize("wide", [False, True])
+def test_complex_solutions_are_told_and_others_are_left(wide: bool) -> None:
     rng = np.random.default_rng(1)
-    one = product(0.3, -1.2)
-    for other in (rng.normal(size=(4, 3)), product(0.3, -1.2) + 1e-3 * rng.normal(size=(4, 3))):
-        assert not equal_roots.products(*mixed(one, other, rng.normal(size=(2, 2))))[1].any()
-    # two complex solutions: real and imaginary part of their products
-    f, k = 0.3 + 0.4j, -1.2 + 0.2j
-    z = np.outer([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)], [1.0, np.cos(k), np.sin(k)])
-    assert not equal_roots.products(*mixed(z.real, z.imag, rng.normal(size=(2, 2))))[1].any()
+    z = product(0.3 + 0.4j, -1.2 + 0.2j, wide)  # of two complex solutions real and imaginary part are in the span
+    real, good = equal_roots.products(mixed([z.real, z.imag], rng.normal(size=(2, 2))))[1:]
+    assert good.all()
+    assert not real.any()
+    z = product(0.3 + 1e-6j, -1.2 + 1e-6j, wide)  # two real ones, or two complex ones: rounding hides which
+    assert not equal_roots.products(mixed([z.real, 1e6 * z.imag], rng.normal(size=(2, 2))))[2].any()
 
 
-def test_pairs_are_two_roots_and_not_three() -> None:
+def test_groups_are_equal_roots_of_one_pose() -> None:
     pose = np.array([0, 0, 0, 1, 1, 1, 2, 2])
     x = np.array([1.0, 0.2, 1.0 + 1e-12, 0.5, 0.5 + 1e-12, 0.5 - 1e-12, 1.0, 0.2])
-    first, second = equal_roots.pairs(pose, x)
-    assert [set(pair) for pair in zip(first, second, strict=True)] == [{0, 2}]
+    assert [[set(rows) for rows in same.tolist()] for same in equal_roots.groups(pose, x)] == [[{0, 2}], [{3, 4, 5}]]
+    assert equal_roots.groups(pose[:0], x[:0]) == []
 
 
 def test_round_postures_that_share_a_joint_are_complete() -> None:

@@ -1,8 +1,9 @@
-"""Two solutions that share the hidden joint: their root is double, and its two vectors are any mixtures of theirs.
+"""Solutions that share the hidden joint: their root is multiple, and its vectors are any mixtures of theirs.
 
-A solution's vector is a product (cos 3f, sin 3f, cos f, sin f)(1, cos k, sin k), see `pencil`. Whatever quadratic
-vanishes on products (those of the twisted cubic, Harris 1992, "Algebraic Geometry", example 1.10, and the circle)
-vanishes on both solutions, which makes it a multiple of one quadratic in the two weights of a mixture.
+A solution's vector is a product of (cos 3f, sin 3f, cos f, sin f) with the same of another joint or with
+(1, cos k, sin k), see `pencil`. In (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f, the last three entries are
+tan f times the first three, so that the mixtures' last entries are a matrix times their first ones, whose eigenvectors
+mix the solutions back and whose eigenvalues are tan f: the rotational invariance of ESPRIT (Roy & Kailath 1989).
 """
 
 from __future__ import annotations
@@ -11,48 +12,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import ALIKE_QUADRATICS, EQUAL_ROOTS
+from armkin.inverse.numeric.tolerances import APART_VECTORS, EQUAL_ROOTS, TWIN_ROOTS, UPRIGHT
 
 # (cos 3f, sin 3f, cos f, sin f) to (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f
 _CUBIC: Array = 0.25 * np.array([[1, 0, 3, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, -1, 0, 3]], dtype=float)
-_TWISTED = ((0, 2, 1, 1), (1, 3, 2, 2), (0, 3, 1, 2))  # quadratics of these: y0 y2 = y1^2 and so on
+_TURN = 0.4137  # [rad] by which f is turned: no joint stands where tan f is infinite then
+_SECOND = 0.6180  # share of the second joint: solutions that have the first one alike are told apart by it
 
 Int = NDArray[np.int64]
 
 
-def pairs(pose: Int, x: Array) -> tuple[Int, Int]:
-    """Rows of candidates whose roots x are equal, and equal to no third one of their pose."""
+def groups(pose: Int, x: Array) -> list[Int]:
+    """Rows of candidates whose roots x are equal, and close to no other, (G, d) for each number d > 1 of them."""
     angle = 2 * np.arctan(x)
     order = np.lexsort((angle, pose))
-    close = np.zeros(len(pose) + 1, dtype=np.bool_)
-    close[1:-1] = (np.diff(pose[order]) == 0) & (np.diff(angle[order]) < EQUAL_ROOTS)
-    alone = close[1:-1] & ~close[:-2] & ~close[2:]
-    first = np.flatnonzero(alone)
-    return order[first], order[first + 1]
+    away = np.where(np.diff(pose[order]) == 0, np.diff(angle[order]), np.inf)
+    away = np.concatenate([[np.inf], away, [np.inf]])[: len(pose) + 1]
+    first = np.flatnonzero(away[:-1] >= EQUAL_ROOTS)
+    size = np.diff(np.append(first, len(pose)))
+    alone = (away[first] > TWIN_ROOTS) & (away[first + size] > TWIN_ROOTS)
+    return [order[first[alone & (size == d)][:, None] + np.arange(d)] for d in np.unique(size[size > 1]).tolist()]
 
 
-def products(a: Array, b: Array) -> tuple[Array, Bool]:
-    """Weights (M, 2, 2) of two products, a row each, in the span of vectors a and b (M, 4, 3); whether they are (M,).
+def products(v: Array) -> tuple[Array, Bool, Bool]:
+    """Of mixtures v (G, d, 4, 3 or 4), orthonormal in the pencil's own vectors, of which these are linear maps:
 
-    a and b are orthonormal in the pencil's own vectors, of which these are linear maps.
+    weights (G, d, d), a row for each vector that may be a product; (G, d) which of these are real; (G,) whether every
+    product in the span is one of them.
     """
-    plain = np.stack([a, b], axis=1)  # (M, 2, 4, 3)
-    cubic = np.einsum("ij,mwjk->mwik", _CUBIC, plain)
-    # bilinear forms (M, 2, 2) of the weights that vanish on products: of each column, then of each row
-    forms = [_form(cubic[:, :, i], cubic[:, :, j]) - _form(cubic[:, :, k], cubic[:, :, m]) for i, j, k, m in _TWISTED]
-    one, cosine, sine = np.moveaxis(plain, 3, 0)
-    forms.append(_form(one, one) - _form(cosine, cosine) - _form(sine, sine))
-    rows = np.concatenate(forms, axis=1)  # (M, 13, 3)
-    _, size, V = np.linalg.svd(rows)
-    q = V[:, 0]
-    disc = q[:, 1] ** 2 - 4.0 * q[:, 0] * q[:, 2]
-    good = (size[:, 1] < ALIKE_QUADRATICS * size[:, 0]) & (disc > ALIKE_QUADRATICS)
-    # q0 s^2 + q1 s t + q2 t^2 = 0 without cancellation
-    large = -0.5 * (q[:, 1] + np.copysign(np.sqrt(np.maximum(disc, 0.0)), q[:, 1]))
-    weights = np.stack([np.stack([large, q[:, 0]], axis=1), np.stack([q[:, 2], large], axis=1)], axis=1)
-    return weights, good
+    cubic = np.einsum("ij,gdjk->gdik", _CUBIC, v)
+    along, fit = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
+    if v.shape[3] == 4:
+        cubic = np.einsum("ij,gdkj->gdik", _CUBIC, v)
+        second, also = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
+    else:  # (1 + cos, sin) and (sin, 1 - cos): tan k/2 leads from one to the other
+        one, cosine, sine = np.moveaxis(v, 3, 0)
+        second, also = _quotient(np.stack([one + cosine, sine], axis=2), np.stack([sine, one - cosine], axis=2))
+    good = fit & also
+    tangent, vectors = np.linalg.eig(np.where(good[:, None, None], along + _SECOND * second, np.eye(v.shape[1])))
+    slant = np.abs(tangent.imag) / (1 + np.abs(tangent) ** 2)
+    apart = np.abs(tangent[:, :, None] - tangent[:, None, :]) + np.eye(v.shape[1])
+    good &= (apart > UPRIGHT).all(axis=(1, 2)) & ~((slant > 0) & (slant < UPRIGHT)).any(axis=1)
+    return np.ascontiguousarray(vectors.real.swapaxes(1, 2)), np.asarray(slant == 0), np.asarray(good)
 
 
-def _form(u: Array, v: Array) -> Array:
-    """Coefficients (M, k, 3) of s^2, s t and t^2 in (s u0 + t u1)(s v0 + t v1), for each of k entries (M, 2, k)."""
-    return np.stack([u[:, 0] * v[:, 0], u[:, 0] * v[:, 1] + u[:, 1] * v[:, 0], u[:, 1] * v[:, 1]], axis=2)
+def _quotient(low: Array, high: Array) -> tuple[Array, Bool]:
+    """X' (G, d, d) of high = X low for the rows (G, d, ...) of mixtures, turned by `_TURN`; whether X is determined."""
+    shape = (*low.shape[:2], low.shape[2] * low.shape[3])
+    c, s = np.cos(_TURN), np.sin(_TURN)
+    below, above = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)
+    square = below @ below.swapaxes(1, 2)
+    size = np.linalg.eigvalsh(square)
+    good = size[:, 0] > APART_VECTORS**2 * size[:, -1]
+    square = np.where(good[:, None, None], square, np.eye(low.shape[1]))
+    return np.linalg.solve(square, below @ above.swapaxes(1, 2)), good

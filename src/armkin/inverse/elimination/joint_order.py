@@ -6,7 +6,8 @@ are called a, b, m1, m2, m3, e and the links after them La .. Le:
 
     Ja La Jb Lb J1 L1 J2 L2 J3 L3 Je Le = I.
 
-One of the middle joints m1, m2, m3 is hidden (it becomes the eigenvalue), one dialytic, one the third.
+One of the middle joints m1, m2, m3 is hidden (it becomes the eigenvalue), one dialytic, one the third; a wide role
+is dialytic in the third, too.
 """
 
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ class Role:
     backward: the loop is walked against its direction: links inverted, joint values negated.
     slot: which of the links La, Lb, L1, L2, L3, Le (0..5) carries the pose.
     hidden, dialytic: which of m1, m2, m3 (0..2) play these parts.
+    wide: the third is dialytic, too.
     """
 
     order: tuple[int, ...]
@@ -34,6 +36,7 @@ class Role:
     slot: int
     hidden: int
     dialytic: int
+    wide: bool = False
 
     @property
     def third(self) -> int:
@@ -46,13 +49,17 @@ class Role:
         return self.slot in (0, 5)
 
 
-def roles(prismatic: Bool, slot: int, hidden: tuple[int, ...]) -> list[Role]:
-    """All roles with the pose in ``slot`` and one of ``hidden`` (0..2) hidden; e is revolute."""
+def roles(prismatic: Bool, slot: int, hidden: tuple[int, ...], wide: bool = False) -> list[Role]:
+    """All roles with the pose in ``slot`` and one of ``hidden`` (0..2) hidden; e is revolute.
+
+    Of wide ones one for each hidden joint: the two others play the same part.
+    """
     found = []
     for backward in (False, True):
         order = tuple((slot - i) % 6 if backward else (_X - slot + i) % 6 for i in range(6))
         if not prismatic[order[5]]:
-            found += [Role(order, backward, slot, h, j) for h in hidden for j in range(3) if j != h]
+            dialytic = {h: [j for j in range(3) if j != h][: 1 if wide else 2] for h in hidden}
+            found += [Role(order, backward, slot, h, j, wide) for h in hidden for j in dialytic[h]]
     return found
 
 

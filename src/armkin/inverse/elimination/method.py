@@ -5,7 +5,7 @@ linear in products of the joints' sines and cosines (Raghavan and Roth 1990, "Ki
 manipulator of general geometry"; here by the features of `line_features`, in which rigid motions
 are matrices).  Two joints are eliminated by a null space, two by the dialytic step, and the last one is the
 eigenvalue of a matrix pencil (Manocha and Canny 1994, "Efficient inverse kinematics for general 6R
-manipulators") of size 12 to 24: `pencil`.  Every candidate is then moved onto the true chain by
+manipulators") of size 12 to 32: `pencil`.  Every candidate is then moved onto the true chain by
 Newton's method; what does not close the chain to 1e-10 is no answer.
 
 Why the answers are complete.
@@ -16,13 +16,15 @@ x is infinite.
 (iii) If the pencil is regular all its eigenvalues are computed, backward stably; each gives its joints if its
 eigenspace has dimension one.
 (iv) Regularity depends on the arm: a pair of parallel axes makes most roles identically singular.  `prepare`
-measures it on random poses, and only roles that give their generating joints back are used.
+measures it on random poses, and only roles that give their generating joints back are used.  Where the pose makes
+axes 6 and 1 parallel, or lets them meet, it is measured on such poses, and wide roles are tried, too: these are
+regular with two such pairs in the loop.
 (v) There remain poses on which (iii) fails: roots at infinity, equal roots of different solutions, roots that
 rounding turned into complex pairs, poses on which the pencil is singular.  They show: entries above 1e6,
 roots closer than 1e-4 with rough vectors, two roots that lead to one answer, real roots that lead to none, or
 to one whose value of the hidden joint is not theirs; but not roots at a distance from all others whose vector is no
 product v: by (ii) they stand for nothing.  Nor double ones with one vector, nor complex pairs off the real line by
-more than rounding: `roots`.  A double root that two solutions share gives both, `equal_roots`.
+more than rounding: `roots`.  A root that several solutions share gives all of them, `equal_roots`.
 Such a pose is solved again, with another offset and other hidden joints, then moved by 1e-6 to 1e-3: an isolated
 solution moves along with its pose and Newton's method leads it back, while what was degenerate is so no
 longer.  This goes on until a pass shows none of these, or nine are done; all passes' answers count.  A self-motion
@@ -34,31 +36,28 @@ self-motion is a curve of solutions of which only some points are given: such po
 Three prismatic joints leave the orientation to the three others: `slides`, in closed form.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination import closed_loop, roots, three_prismatic
+from armkin.inverse.elimination import roots, three_prismatic
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.joint_order import Role, roles
 from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
-from armkin.inverse.elimination.pencil import Pencil, build
-from armkin.inverse.elimination.polish import Polished, jacobian, pose_error, refine, tip
+from armkin.inverse.elimination.pencil import Pencil
+from armkin.inverse.elimination.plans import TILT, Elimination, Kind, kinds, prepare
+from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
 from armkin.inverse.numeric.tolerances import (
     ALONE,
     BLURRED_ROOT,
     CLOSE_RESIDUAL,
     ELIMINATED,
-    ERROR_FLOOR,
     EXAMINED,
     GRAZING,
     NO_PRODUCT,
     OWN_ROOT,
     PAIRED,
-    RANK,
     SAME_KEY,
     SAME_ROOT,
     SEED,
@@ -68,73 +67,14 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.model.rotation import inverse
 
+__all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
+
 Int = NDArray[np.int64]
 
 CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13 MB
 BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
-PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
-TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
 GUESSES = 8  # postures close to answers that are kept of a pose
-SAMPLES = 11  # random poses on which roles are compared
-# log10 of a role's raw error: nothing better needed, good enough, unfit
-EXCELLENT, HEALTHY, USELESS = -9.5, -8.0, -5.0
-
-
-@dataclass(frozen=True)
-class Elimination:
-    """A 6-joint chain prepared for `solve`: read-only, so that threads may share it.
-
-    loop: the scaled chain.  plans: the pencils of the main pass and of the passes for poses that it leaves
-    open; none if three joints are prismatic.  score: log10 of the main pencil's raw error.
-    """
-
-    loop: Loop
-    plans: tuple[Pencil, ...]
-    score: float
-
-    @property
-    def complete(self) -> bool:
-        """Whether the completeness argument of the module's text holds: a regular pencil was found."""
-        return self.score < HEALTHY
-
-
-def prepare(link: Array, prismatic: Bool) -> Elimination:
-    """Choose how to walk a chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]``.
-
-    Args:
-        link: (7, 4, 4) [mm].
-        prismatic: (6,): Z is a shift along z instead of a turn about it.
-    """
-    closed = closed_loop.close(link, prismatic)
-    if np.sum(prismatic) >= 3:
-        return Elimination(closed, (), -np.inf)
-    rng = np.random.default_rng(5)
-    q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
-    q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
-    frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
-    goal = np.tile(np.eye(4), (SAMPLES, 1, 1))
-    goal[:, :3] = np.moveaxis(frame, -1, 0)
-    size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
-    # Collinear axes, say: no solution is isolated and no role can do better.
-    redundant = bool(np.all(size[:, -1] < RANK))
-    rated: list[_Rating] = []
-    # The first slots nearly always do; some arms with two prismatic joints need the others.
-    for slot, hidden in _SEARCH:
-        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
-        if _enough(rated, redundant, len(hidden) > 1):
-            break
-    rated.sort(key=lambda rating: rating.cost)
-    first = rated[0].pencil
-    others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
-    # Equal roots of one joint are rarely equal in another: hide another joint early.
-    hidden_joint = first.hidden_joint
-    others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
-    again = build(first.role, closed.links, closed.prismatic, PSI[1])
-    plans = [first, *others[:1], again, *others[1:]]
-    while len(plans) < len(SHAKES):
-        plans.append(plans[-2])
-    return Elimination(closed, tuple(plans[: len(SHAKES)]), rated[0].error)
 
 
 def left_open(elimination: Elimination, samples: int = 48) -> float:
@@ -154,60 +94,6 @@ def left_open(elimination: Elimination, samples: int = 48) -> float:
         if len(goal):
             goal = goal[_attempt(closed, elimination.plans[number], goal, number)[1]]
     return len(goal) / samples
-
-
-class _Rating(NamedTuple):
-    """How well a role does on an arm: the raw error is the 90th percentile of log10 over random poses."""
-
-    cost: float
-    error: float
-    pencil: Pencil
-
-
-# Where the pose is carried (slot of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
-_SEARCH: list[tuple[int, tuple[int, ...]]] = [
-    *((slot, (0,)) for slot in (1, 0, 5)),
-    *((slot, (1, 2)) for slot in (1, 0, 5)),
-    *((slot, (0, 1, 2)) for slot in (2, 3, 4)),
-]
-
-
-def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
-    """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
-    quick ones are all known, any that is healthy."""
-    sound = [rating for rating in rated if rating.error < EXCELLENT and rating.pencil.size <= 16]
-    if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
-        return True
-    tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
-    return tried_all and (redundant or any(rating.error < HEALTHY for rating in rated))
-
-
-def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
-    """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
-    pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    nearest, spurious = _raw_error(pencil, closed, q, goal)
-    if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
-        return _Rating(20.0 + pencil.size, 0.0, pencil)
-    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
-    # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
-    cost = 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
-    return _Rating(max(error, -11.0) + cost, error, pencil)
-
-
-def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
-    """Distance of the nearest candidate before any Newton step, and whether there are real roots that solve
-    nothing, both (N,)."""
-    found = roots.seeds(pencil, inverse(goal), TILT[0])
-    difference = np.abs(found.q - q[found.pose])
-    turned = np.abs(np.mod(difference + np.pi, 2 * np.pi) - np.pi)
-    distance = np.where(closed.prismatic, difference, turned).max(axis=1, initial=0.0)
-    nearest = np.ones(q.shape[0])
-    np.minimum.at(nearest, found.pose, distance)
-    target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
-    spurious = found.rough.copy()
-    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > STRAY)]] = True
-    return nearest, spurious
 
 
 class Branches(NamedTuple):
@@ -270,32 +156,36 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
 def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
-    found, guesses = [], [_none()]
+    found, guesses = [_none()], [_none()]
     touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
-    open_poses = np.arange(goal.shape[0])
-    for number, pencil in enumerate(elimination.plans):
-        shaken[open_poses] |= SHAKES[number] > 0
-        still = np.zeros(open_poses.size, dtype=np.bool_)
-        for begin in range(0, open_poses.size, CHUNK):
-            part = open_poses[begin : begin + CHUNK]
-            answers, unsettled, touch, near = _attempt(elimination.loop, pencil, goal[part], number)
-            found.append(answers._replace(pose=part[answers.pose]))
-            if number > 0:
-                guesses.append(near._replace(pose=part[near.pose]))
-            still[begin : begin + CHUNK] = unsettled
-            touching[part] |= touch
-        open_poses = open_poses[still]
-        if open_poses.size == 0:
-            break
     settled = np.ones(goal.shape[0], dtype=np.bool_)
-    settled[open_poses] = False
-    return concatenate(found) if found else _none(), concatenate(guesses), touching, settled, shaken
+    kind = kinds(elimination.loop, goal)
+    for one in Kind:
+        open_poses = np.flatnonzero(kind == one)
+        for number, pencil in enumerate(elimination.of_kind(one) if open_poses.size else ()):
+            shaken[open_poses] |= SHAKES[number] > 0
+            still = np.zeros(open_poses.size, dtype=np.bool_)
+            for begin in range(0, open_poses.size, CHUNK):
+                part = open_poses[begin : begin + CHUNK]
+                answers, unsettled, touch, near = _attempt(elimination.loop, pencil, goal[part], number)
+                found.append(answers._replace(pose=part[answers.pose]))
+                if number > 0:
+                    guesses.append(near._replace(pose=part[near.pose]))
+                still[begin : begin + CHUNK] = unsettled
+                touching[part] |= touch
+            open_poses = open_poses[still]
+            if open_poses.size == 0:
+                break
+        settled[open_poses] = False
+    return concatenate(found), concatenate(guesses), touching, settled, shaken
 
 
 def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
     """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
     careful, shake = number > 0, SHAKES[number]
-    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful], part=careful)
+    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
+    if shake == 0:
+        seed = _without_empty(closed, seed, goal)
     target = goal[seed.pose]
     if careful:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
@@ -310,11 +200,8 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     maybe = seed.tilt < pair
     near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
     missed = ~good & ((seed.tilt < UPRIGHT) | near)
-    # A simple root, or a double one with one vector, whose vector is no product stands for nothing: a solution's vector
-    # is a product, and such a root has no other vector.
-    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE) & (done.guess > STRAY) & (shake == 0)
-    touch = good & ~empty & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
-    unsure = good & (seed.tilt > 0) & maybe & ~empty
+    touch = good & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
+    unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.
     strayed = good & (seed.tilt == 0) & (done.guess > STRAY + 30 * shake)
     # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
@@ -326,15 +213,14 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     # unless several solutions share the middle joints: these are one root
     some = np.flatnonzero(strayed & own)
     own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
-    missed &= ~empty
-    strayed &= ~(own | empty)
+    strayed &= ~own
     unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
     answers = _answers(closed, seed.pose, done, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
-    stands = good & maybe & ~empty
+    stands = good & maybe
     pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > BLURRED_ROOT + 10 * shake
     order = np.lexsort((hidden, pose))
     close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < SAME_ROOT)
@@ -342,7 +228,7 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
     # Two real roots that led to one answer: one of them stands for another.
-    real = answers.take((seed.tilt[good] == 0) & ~empty[good])
+    real = answers.take(seed.tilt[good] == 0)
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
     twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
@@ -353,6 +239,21 @@ def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     unsettled[real.pose[order][1:][twice]] = True
     guesses = _answers(closed, seed.pose, done, ~good & (done.residual < SEED))
     return answers, unsettled, touching, guesses
+
+
+def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array) -> roots.Seeds:
+    """Seeds without roots that stand for nothing.
+
+    A simple root, or a double one with one vector, is one if its vector is no product: a solution's vector is a
+    product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
+    """
+    some = np.flatnonzero((seed.defect > NO_PRODUCT) & (seed.gap > ALONE))
+    target = np.ascontiguousarray(np.moveaxis(goal[seed.pose[some], :3], 0, -1))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
+    kept = np.ones(len(seed.pose), np.bool_)
+    kept[some[pose_error(frame, target)[1] > STRAY]] = False
+    pose, q, hidden, tilt, rough, defect, gap = seed
+    return roots.Seeds(pose[kept], q[kept], hidden[kept], tilt[kept], rough, defect[kept], gap[kept])
 
 
 def _shaken(goal: Array, size: float) -> Array:

@@ -25,6 +25,14 @@ complement of [Re K, Im K], M v = 0 for real x is the same as
     (5)  v = Re(K (a1 - i a2) / (x - i)) + W w,  a = [a1, a2],
 
 a pencil of size 24 - 2 r: the spurious roots x = +-i of the classical 24 x 24 problem are gone.
+
+Wide roles.  Two parallel pairs of axes in the loop, or two pairs that meet, make the twelve equations singular for
+every choice of joints: M has two null vectors at every x.  Of an arm with parallel axes 2 and 3 the tool's pose makes
+such a pair of axes 6 and 1 when its axis stands along the arm's first, tool up or down, or meets it.  A wide role
+multiplies the six equations by the half angles of both other joints: 24 equations in the 16 products
+v = (cos 3f, sin 3f, cos f, sin f)(cos 3g, sin 3g, cos g, sin g), f = qj/2, g = qk/2, of which a solution's is the only
+null vector.  `mix` makes sixteen of them; what it adds are roots whose vector is no product.  Everything else is
+as above with sixteen in the place of twelve, and a pencil of size 32 - 2 r.
 """
 
 from dataclasses import dataclass
@@ -54,10 +62,10 @@ class Pencil:
     prismatic: (6,) by part.  links: (6, 4, 4) by part; that of the pose is not used.
     left: what stands before the pose's Rep in N left, (m 3^i, 15); unused if the pose is at an end.
     right: what stands behind it, (15, 3^(3 - i)); unused in slots La, Lb, Le, where `columns` contains it.
-    columns: (27 or 15, 2 c) from the monomials of (2), or from features, to the columns of (4), for both
-    dialytic multipliers.
-    mix: (12, 2 m) orthonormal rows, if the arm has m > 6 equations.
-    K_re, K_im, W: (12, r), (12, r), (12, 12 - 2 r).
+    columns: (27 or 15, f c) from the monomials of (2), or from features, to the columns of (4), for each of f = 2
+    dialytic multipliers, 4 of a wide role.
+    mix: (p, f m) orthonormal rows, if there are more equations than products: p = 12, 16 of a wide role.
+    K_re, K_im, W: (p, r), (p, r), (p, p - 2 r).
     """
 
     role: Role
@@ -83,6 +91,11 @@ class Pencil:
         """Number of eigenvalues."""
         return 2 * int(self.K_re.shape[1] + self.W.shape[1])
 
+    @property
+    def products(self) -> int:
+        """Number of products v."""
+        return int(self.W.shape[0])
+
 
 def build(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
     """Prepare a role of the arm with the links ``arm`` (5, 4, 4) between its joints for the offset psi."""
@@ -90,15 +103,16 @@ def build(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
     cut = end_joints.prepare(role, part, links)
     left, right = _sides(role, part, links, cut.N)
     constant = role.slot in (0, 1, 5)
-    K = _spurious(role, part, right) if constant and not part[2 + role.hidden] else np.empty((12, 0))
+    p, factors = (16, 4) if role.wide else (12, 2)
+    K = _spurious(role, part, right) if constant and not part[2 + role.hidden] else np.empty((p, 0))
     both = np.concatenate([K.real, K.imag], axis=1)
-    W = np.linalg.qr(both, mode="complete")[0][:, both.shape[1] :] if both.size else np.eye(12)
+    W = np.linalg.qr(both, mode="complete")[0][:, both.shape[1] :] if both.size else np.eye(p)
     columns = _columns(role, part, psi, K, W)
     if constant:
         columns, right = right @ columns, np.empty((15, 0))
-    rows, mix = 15 - cut.rank, None
-    if rows > 6:
-        mix = np.linalg.qr(np.random.default_rng(1).standard_normal((2 * rows, 12)))[0].T
+    rows, mix = factors * (15 - cut.rank), None
+    if rows > p:
+        mix = np.linalg.qr(np.random.default_rng(1).standard_normal((rows, p)))[0].T
     return Pencil(role, psi, part, links, cut, left, right, columns, mix, K.real, K.imag, W)
 
 
@@ -120,23 +134,32 @@ def _sides(role: Role, part: Bool, links: Array, N: Array) -> tuple[Array, Array
 
 
 @cache
-def _dialytic(hidden: int, dialytic: int, sliding: bool) -> Array:
-    """Monomials of (2) to M_0, M_1, M_2 (the coefficients of 1, b1, b2 of h): (3, 27, 2, 12).
+def _dialytic(hidden: int, dialytic: int, sliding: bool, wide: bool, third_sliding: bool) -> Array:
+    """Monomials of (2) to M_0, M_1, M_2 (the coefficients of 1, b1, b2 of h): (3, 27, 2, 12), wide (3, 27, 4, 16).
 
-    sliding: the dialytic joint is prismatic.
+    sliding, third_sliding: the dialytic joint, the third one is prismatic.
     """
     multipliers = _POWERS if sliding else _HALF_ANGLE
+    others = (_POWERS if third_sliding else _HALF_ANGLE) if wide else np.eye(3)[None]
     unit = np.eye(27).reshape(27, 3, 3, 3)
     unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
-    products: Array = np.einsum("xhjk,sjp->hxspk", unit, multipliers).reshape(3, 27, 2, 12)
+    products: Array = np.einsum("xhjk,sjp,tkr->hxstpr", unit, multipliers, others)
+    products = products.reshape(3, 27, 2 * len(others), 4 * others.shape[2])
     products.flags.writeable = False
     return products
 
 
+def _coefficients(role: Role, part: Bool) -> Array:
+    """`_dialytic` of a role and the joint types by part (6,)."""
+    sliding, third_sliding = bool(part[2 + role.dialytic]), bool(part[2 + role.third])
+    return _dialytic(role.hidden, role.dialytic, sliding, role.wide, third_sliding)
+
+
 def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128]:
-    """K, the null space of M(i) that no pose changes, (12, r) orthonormal, from (2) as (15, 27)."""
-    coefficients = _dialytic(role.hidden, role.dialytic, bool(part[2 + role.dialytic]))
-    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, 30, 12)
+    """K, the null space of M(i) that no pose changes, (p, r) orthonormal, from (2) as (15, 27)."""
+    coefficients = _coefficients(role, part)
+    products = coefficients.shape[3]
+    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, -1, products)
     _, size, vectors = np.linalg.svd(M_c + 1j * M_s)  # M(i) but for a factor, whatever psi
     null = vectors[size < NULL * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.
@@ -146,8 +169,8 @@ def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128
 
 
 def _columns(role: Role, part: Bool, psi: float, K: NDArray[np.complex128] | Array, W: Array) -> Array:
-    """Monomials of (2) to the columns [Re N1, Im N1, M2 W | Re N0, Im N0, M1 W, M0 W] of (4), (27, 2 c)."""
-    A, B, C = _dialytic(role.hidden, role.dialytic, bool(part[2 + role.dialytic]))
+    """Monomials of (2) to the columns [Re N1, Im N1, M2 W | Re N0, Im N0, M1 W, M0 W] of (4), (27, f c)."""
+    A, B, C = _coefficients(role, part)
     if part[2 + role.hidden]:
         M2, M1, M0 = A + B * psi + C * psi**2, B + 2 * psi * C, C
     else:

@@ -39,8 +39,8 @@ class Seeds(NamedTuple):
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
     tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
     defect: (M,) squared sine of the angle between the eigenvector and the product that a solution's is; 0 where slides
-    move.  gap: (M,) distance from the pose's nearest other root but for a twin (see `_gaps`), as an angle; 0 where the
-    pencil is not well scaled.
+    move.  gap: (M,) distance from the pose's nearest other root but for a twin (see `_gaps`), as an angle; inf of a
+    multiple root whose solutions are all known; 0 where the pencil is not well scaled.
     """
 
     pose: Int
@@ -55,11 +55,11 @@ class Seeds(NamedTuple):
 def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
     """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``.
 
-    part: whether double roots are taken apart that two solutions share.
+    part: whether roots are taken apart that several solutions share.
     """
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
-    lead = pencil.W.shape[0]
+    lead = pencil.products
     count = equations.shape[2] - lead
     rest = np.empty((X.shape[0], lead, count + 1))
     rest[:, :, :count], rest[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
@@ -70,27 +70,29 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     G = G[:, :, :count]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
-    companion[:, :12] = -G
-    companion[:, 12:, 2 * r : 12] = np.eye(w)
+    companion[:, :lead] = -G
+    companion[:, lead:, 2 * r : lead] = np.eye(w)
     roots, vectors = np.linalg.eig(companion)
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
     pose, which = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
-    candidates = _Candidates(pose, which, roots[pose, which].real, tilt[pose, which], vectors.real[pose, :, which])
+    x, u = roots[pose, which].real, vectors.real[pose, :, which]
+    candidates = _Candidates(pose, which, x, tilt[pose, which], u, np.zeros(len(pose), np.bool_))
     if part and not pencil.prismatic[2:5].any():
         candidates = _parted(pencil, candidates, vectors)
-    pose, which, x, slant, u = candidates
+    pose, which, x, slant, u, parted = candidates
     middle, defect = _middle_joints(pencil, x, u)
     near = np.flatnonzero((np.abs(middle) < INFINITE).all(axis=0))
     if near.size < pose.size:
-        pose, which, slant, middle, defect = pose[near], which[near], slant[near], middle[:, near], defect[near]
+        pose, which, slant, parted = pose[near], which[near], slant[near], parted[near]
+        middle, defect = middle[:, near], defect[near]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
-    gap = np.zeros(pose.size)
-    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWIN_ROOTS) & steady[pose])
+    gap = np.where(parted & steady[pose], np.inf, 0.0)
+    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWIN_ROOTS) & steady[pose] & ~parted)
     gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
@@ -111,39 +113,41 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
 
 
 class _Candidates(NamedTuple):
-    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size)."""
+    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size).
+
+    parted: (M,) of a multiple root, whose vectors are those of all that share it.
+    """
 
     pose: Int
     which: Int
     x: Array
     tilt: Array
     u: Array
+    parted: Bool
 
 
 def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
-    """The same, a double root that two solutions share with the vectors of these: see `equal_roots`."""
+    """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
     count = len(seen.pose)
     # rounding made a complex pair of some
     twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < EQUAL_ROOTS))
-    pose, which, x, tilt, u = (np.concatenate([part, part[twin]]) for part in seen)
+    pose, which, x, tilt, u, parted = (np.concatenate([part, part[twin]]) for part in seen)
     u[count:] = vectors.imag[seen.pose[twin], :, seen.which[twin]]
-    a, b = equal_roots.pairs(pose, x)
-    first = u[a] / np.linalg.norm(u[a], axis=1, keepdims=True)
-    second = u[b] - first * (first * u[b]).sum(axis=1, keepdims=True)
-    size = np.linalg.norm(second, axis=1)
-    some = np.flatnonzero(size > APART_VECTORS * np.linalg.norm(u[b], axis=1))
-    a, b, first, second = a[some], b[some], first[some], second[some] / size[some, None]
-    good = np.zeros(len(a), dtype=np.bool_)
-    if len(a):
-        weights, good = equal_roots.products(_vector(pencil, x[a], first), _vector(pencil, x[a], second))
-        both = weights[good] @ np.stack([first[good], second[good]], axis=1)
-        u[a[good]], u[b[good]] = both[:, 0], both[:, 1]
-        tilt[a[good]] = tilt[b[good]] = 0.0
     kept = np.arange(len(pose)) < count
-    kept[a[good]] = kept[b[good]] = True
+    for rows in filter(len, equal_roots.groups(pose, x)):
+        d = rows.shape[1]
+        span = u[rows] / np.linalg.norm(u[rows], axis=2, keepdims=True)
+        _, size, basis = np.linalg.svd(span, full_matrices=False)
+        middle = np.repeat(x[rows].mean(axis=1), d)
+        of_products = _vector(pencil, middle, basis.reshape(-1, basis.shape[2])).reshape(-1, d, 4, pencil.products // 4)
+        weights, real, good = equal_roots.products(of_products)
+        good &= size[:, -1] > APART_VECTORS * size[:, 0]
+        part = rows[good].ravel()
+        u[part] = (weights[good] @ basis[good]).reshape(len(part), u.shape[1])
+        tilt[part], parted[part], kept[part] = 0.0, True, real[good].ravel()
     order = np.flatnonzero(kept)
     order = order[np.argsort(pose[order], kind="stable")]
-    return _Candidates(pose[order], which[order], x[order], tilt[order], u[order])
+    return _Candidates(pose[order], which[order], x[order], tilt[order], u[order], parted[order])
 
 
 def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which: Int) -> Array:
@@ -170,7 +174,7 @@ def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which:
 
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
-    """The twelve rows of (4), (N, 12, c), and the factors (N or 1, 5, 15) of back substitution."""
+    """The rows of (4), (N, p, c), and the factors (N or 1, 5, 15) of back substitution."""
     N, recover = eliminate(pencil.ends, Y)
     if pencil.role.at_an_end:
         rows = N @ pencil.columns
@@ -179,12 +183,13 @@ def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
         if pencil.right.size:
             rows = (rows @ pencil.right).reshape(Y.shape[0], -1, 27)
         rows = rows @ pencil.columns
-    rows = rows.reshape(Y.shape[0], 2 * rows.shape[1], -1)
+    factors = 4 if pencil.role.wide else 2
+    rows = rows.reshape(Y.shape[0], factors * rows.shape[1], -1)
     return (rows if pencil.mix is None else pencil.mix @ rows), recover
 
 
 def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
-    """The twelve products v (M, 4, 3) that the roots x (M,) and the pencil's eigenvectors (M, size) stand for."""
+    """The products v, (M, 4, 3) or (M, 4, 4), of the roots x (M,) and the pencil's eigenvectors (M, size)."""
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
     x = x[:, None]
@@ -194,7 +199,7 @@ def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
     if r:
         square = x * x + 1
         v += ((a1 * x + a2) / square) @ pencil.K_re.T - ((a1 - a2 * x) / square) @ pencil.K_im.T
-    return v.reshape(-1, 4, 3)
+    return v.reshape(-1, 4, pencil.products // 4)
 
 
 def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
@@ -216,17 +221,26 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
         value[pencil.role.dialytic] = 2 * np.arctan2(four[:, 3], four[:, 2])
     if pencil.prismatic[third]:
         value[pencil.role.third] = _ratio(three)
+    elif pencil.role.wide:
+        value[pencil.role.third] = 2 * np.arctan2(three[:, 3], three[:, 2])
     else:
         sign = np.where(three[:, 0] < 0, -1.0, 1.0)
         value[pencil.role.third] = np.arctan2(sign * three[:, 2], sign * three[:, 1])
     if pencil.prismatic[dialytic] or pencil.prismatic[third]:
         return value, np.zeros(v.shape[0])
-    f, k = 0.5 * value[pencil.role.dialytic], value[pencil.role.third]
-    powers = np.stack([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)], axis=1)
-    inner = v[:, :, 0] + v[:, :, 1] * np.cos(k)[:, None] + v[:, :, 2] * np.sin(k)[:, None]
-    # a product's square is 2 x 2: of the powers, and of (1, cos, sin)
-    along = (inner * powers).sum(axis=1) ** 2 / (4.0 * np.maximum(size.sum(axis=(1, 2)), TINY))
+    k = value[pencil.role.third]
+    other = _half_powers(k) if pencil.role.wide else np.stack([np.ones_like(k), np.cos(k), np.sin(k)], axis=1)
+    inner = (v * other[:, None, :]).sum(axis=2)
+    # a product's square is 2 x 2: of the powers of either joint, and of (1, cos, sin)
+    along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2 / (
+        4.0 * np.maximum(size.sum(axis=(1, 2)), TINY)
+    )
     return value, np.maximum(1.0 - along, 0.0)
+
+
+def _half_powers(q: Array) -> Array:
+    """(cos 3f, sin 3f, cos f, sin f) of f = q/2: (M,) -> (M, 4)."""
+    return np.stack([np.cos(1.5 * q), np.sin(1.5 * q), np.cos(0.5 * q), np.sin(0.5 * q)], axis=1)
 
 
 def _ratio(powers: Array) -> Array:

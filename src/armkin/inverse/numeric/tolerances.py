@@ -52,6 +52,7 @@ FAR = 20  # reaches that a target of a sliding arm may be away for its branches 
 
 # ---- numeric elimination, lengths in the closed loop's own unit
 ELIMINATED = 1e-10  # residual of an answer
+BESIDE_SPECIAL = 0.01  # [rad, scaled length] axes 6 and 1 this near parallel or meeting: the usual pencils are ill
 GRAZING = 3e-9  # the same where two roots all but meet: about 1e-9 of the reach
 APART_ROOTS = 1e-3  # [rad, reaches] roots that seeds lead to are surely two if they are farther apart
 NO_DETERMINANT = 1e-30  # square of a determinant [reaches a radian] that no step is divided by
@@ -126,7 +127,6 @@ FLAT_GRADIENT = 1e-8  # largest component of the gradient at a minimum; cost in 
 ONE_CROSSING = 1e-4  # [rad, reaches] postures where one pair of self-motions crosses are no further apart
 EQUAL_ROOTS = 1e-7  # [rad] roots no further apart may be one that two solutions share
 APART_VECTORS = 1e-4  # sine between two vectors of such a root; those of one that has one vector are 1e-7 apart
-ALIKE_QUADRATICS = 1e-5  # of the quadratics' size: by how much they may differ from multiples of one
 OWN_ROOT = 1e-6  # [rad, scaled length] how far a root may be off the answer that it stands for
 ALONE = 1e-3  # distance from which on a root is no half of a double one
 CONVERGED = 1e-14  # a residual that further steps cannot be expected to lower

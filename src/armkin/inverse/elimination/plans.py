@@ -1,0 +1,229 @@
+"""Which pencils solve an arm's poses, one after the other: roles rated on poses of known joints.
+
+Most poses of an arm are alike, and one list of pencils serves them. Where axes 6 and 1 stand parallel or meet, tool up
+or down above all, the usual roles are singular or all but; these poses have a list of their own, with wide roles,
+prepared when the first such pose comes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.elimination import closed_loop, roots
+from armkin.inverse.elimination.closed_loop import Loop
+from armkin.inverse.elimination.joint_order import Role, roles
+from armkin.inverse.elimination.pencil import Pencil, build
+from armkin.inverse.elimination.polish import jacobian, pose_error, refine, tip
+from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, ELIMINATED, ERROR_FLOOR, RANK, SHAKES, STRAY, TINY
+from armkin.model.rotation import inverse
+
+PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
+TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
+SAMPLES = 11  # random poses on which roles are compared
+STEEP = 30.0  # norm of the inverse Jacobian above which a posture says little of a role
+STARTS = 20  # random postures from which a pose of a kind is sought, for each that is wanted
+# log10 of a role's raw error: nothing better needed, good enough, unfit
+EXCELLENT, HEALTHY, USELESS = -9.5, -8.0, -5.0
+
+
+class Kind(IntEnum):
+    """What a pose makes of axes 6 and 1."""
+
+    PLAIN = 0
+    PARALLEL = 1
+    MEETING = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """A 6-joint chain prepared for `solve`: read-only, so that threads may share it.
+
+    loop: the scaled chain.  plans: the pencils of the main pass and of the passes for poses that it leaves
+    open; none if three joints are prismatic.  score: log10 of the main pencil's raw error.
+    """
+
+    loop: Loop
+    plans: tuple[Pencil, ...]
+    score: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether the completeness argument of `method`'s text holds: a regular pencil was found."""
+        return self.score < HEALTHY
+
+    def of_kind(self, kind: Kind) -> tuple[Pencil, ...]:
+        """The pencils of poses of a kind."""
+        if kind == Kind.PARALLEL:
+            return self._parallel
+        return self._meeting if kind == Kind.MEETING else self.plans
+
+    @cached_property
+    def _parallel(self) -> tuple[Pencil, ...]:
+        return _of_special_poses(self, Kind.PARALLEL)
+
+    @cached_property
+    def _meeting(self) -> tuple[Pencil, ...]:
+        return _of_special_poses(self, Kind.MEETING)
+
+
+def kinds(closed: Loop, goal: Array) -> NDArray[np.int64]:
+    """The `Kind` of poses (N, 4, 4) of the loop's chain, (N,): all but parallel counts as parallel."""
+    out = np.zeros(len(goal), np.int64)
+    if closed.prismatic[[0, 5]].any():
+        return out
+    x, y = goal[:, 0, 2], goal[:, 1, 2]  # of axis 6; axis 1 is z
+    sine = np.hypot(x, y)
+    apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, TINY)
+    out[apart < BESIDE_SPECIAL] = Kind.MEETING
+    out[sine < BESIDE_SPECIAL] = Kind.PARALLEL
+    return out
+
+
+def prepare(link: Array, prismatic: Bool) -> Elimination:
+    """Choose how to walk a chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]``.
+
+    Args:
+        link: (7, 4, 4) [mm].
+        prismatic: (6,): Z is a shift along z instead of a turn about it.
+    """
+    closed = closed_loop.close(link, prismatic)
+    if np.sum(prismatic) >= 3:
+        return Elimination(closed, (), -np.inf)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
+    q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
+    goal, size = _poses(closed, q)
+    # Collinear axes, say: no solution is isolated and no role can do better.
+    redundant = bool(np.all(size < RANK))
+    rated: list[_Rating] = []
+    # The first slots nearly always do; some arms with two prismatic joints need the others.
+    for slot, hidden in _SEARCH:
+        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
+        if _enough(rated, redundant, len(hidden) > 1):
+            break
+    rated.sort(key=lambda rating: rating.cost)
+    return Elimination(closed, _sequence(closed, rated), rated[0].error)
+
+
+def _poses(closed: Loop, q: Array) -> tuple[Array, Array]:
+    """Poses (N, 4, 4) of the loop's chain at q (N, 6), and their Jacobians' smallest singular values (N,)."""
+    frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    goal = np.tile(np.eye(4), (len(q), 1, 1))
+    goal[:, :3] = np.moveaxis(frame, -1, 0)
+    size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
+    return goal, np.asarray(size[:, -1], np.float64)
+
+
+def _sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
+    """The pencils of all passes, from ratings in their order."""
+    first = rated[0].pencil
+    others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
+    # Equal roots of one joint are rarely equal in another: hide another joint early.
+    hidden_joint = first.hidden_joint
+    others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
+    again = build(first.role, closed.links, closed.prismatic, PSI[1])
+    plans = [first, *others[:1], again, *others[1:]]
+    while len(plans) < len(SHAKES):
+        plans.append(plans[-2])
+    return tuple(plans[: len(SHAKES)])
+
+
+def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...]:
+    """Pencils for poses of a kind: those of all others if they do, else the best of these and of wide ones."""
+    closed = elimination.loop
+    q = _postures(closed, kind)
+    if len(q) < SAMPLES:  # the arm cannot stand there
+        return elimination.plans
+    goal = _poses(closed, q)[0]
+    usual = list({id(pencil): pencil for pencil in elimination.plans}.values())
+    rated = [_rate(closed, pencil.role, q, goal) for pencil in usual if pencil.psi == PSI[0]]
+    if rated[0].error < HEALTHY:
+        return elimination.plans
+    for slot, hidden in _WIDE:
+        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
+        if len([rating for rating in rated if rating.error < EXCELLENT]) >= 3:
+            break
+    rated.sort(key=lambda rating: rating.cost)
+    return _sequence(closed, rated)
+
+
+def _postures(closed: Loop, kind: Kind) -> Array:
+    """Regular postures (N, 6) at random poses of a kind, at most `SAMPLES`."""
+    rng = np.random.default_rng(7)
+    count = SAMPLES * STARTS
+    q = rng.uniform(-np.pi, np.pi, (2, count, 6))
+    q[:, :, closed.prismatic] /= np.pi
+    goal = _poses(closed, q[0])[0]
+    if kind is Kind.PARALLEL:
+        c, s = np.cos(q[0, :, 0]), np.sin(q[0, :, 0])
+        up = np.where(rng.random(count) < 0.5, 1.0, -1.0)
+        goal[:, :3, :3] = 0.0
+        goal[:, 0, 0], goal[:, 1, 0], goal[:, 0, 1], goal[:, 1, 1], goal[:, 2, 2] = c, s, -s * up, c * up, up
+    else:
+        along = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
+        goal[:, :2, 3] = along * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)
+    done = refine(closed.chain, closed.prismatic, q[1], goal, 20, damped=True)
+    good = (done.residual < ELIMINATED) & (done.weakness < STEEP)
+    return done.q[good][:SAMPLES]
+
+
+class _Rating(NamedTuple):
+    """How well a role does on an arm: the raw error is the 90th percentile of log10 over random poses."""
+
+    cost: float
+    error: float
+    pencil: Pencil
+
+
+# Where the pose is carried (slot of `Role`) and which of m1, m2, m3 is hidden, in the order of trial.
+_SEARCH: list[tuple[int, tuple[int, ...]]] = [
+    *((slot, (0,)) for slot in (1, 0, 5)),
+    *((slot, (1, 2)) for slot in (1, 0, 5)),
+    *((slot, (0, 1, 2)) for slot in (2, 3, 4)),
+]
+_WIDE = _SEARCH[:6]
+
+
+def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
+    """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
+    quick ones are all known, any that is healthy."""
+    sound = [rating for rating in rated if rating.error < EXCELLENT and rating.pencil.size <= 16]
+    if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
+        return True
+    tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
+    return tried_all and (redundant or any(rating.error < HEALTHY for rating in rated))
+
+
+def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
+    """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
+    pencil = build(role, closed.links, closed.prismatic, PSI[0])
+    nearest, spurious = _raw_error(pencil, closed, q, goal)
+    if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
+        return _Rating(20.0 + pencil.size, 0.0, pencil)
+    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
+    # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
+    cost = 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
+    return _Rating(max(error, -11.0) + cost, error, pencil)
+
+
+def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
+    """Distance of the nearest candidate before any Newton step, and whether there are real roots that solve
+    nothing, both (N,)."""
+    found = roots.seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
+    difference = np.abs(found.q - q[found.pose])
+    turned = np.abs(np.mod(difference + np.pi, 2 * np.pi) - np.pi)
+    distance = np.where(closed.prismatic, difference, turned).max(axis=1, initial=0.0)
+    nearest = np.ones(q.shape[0])
+    np.minimum.at(nearest, found.pose, distance)
+    target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
+    spurious = found.rough.copy()
+    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > STRAY)]] = True
+    return nearest, spurious
