@@ -99,6 +99,22 @@ def test_four_rows_do_no_harm() -> None:
     assert worse <= 1  # of 12; tests/bench/bench_calibration.py counts 200
 
 
+@pytest.mark.parametrize(("name", "rows", "moved"), [("yaw_two_link", 6, 10), ("yaw_two_link", 4, 4), ("ur5e", 6, 7)])
+def test_few_rows_show_that_the_base_stands_elsewhere(name: str, rows: int, moved: int) -> None:
+    """The file was kept, 20 to 77 mm off, where base and tool alone leave 4 to 18: 8 of 12 at six rows, 11 at four."""
+    arm = armkin.load(name)
+    shares = []
+    for seed in range(12):
+        rng = np.random.default_rng(500 + seed)
+        true = built(arm, seed)
+        c, unseen = commands(arm, rows, rng), commands(arm, 300, rng)
+        found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
+        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], true.tips(unseen)) for a in (found.arm, arm))
+        shares.append(after / before)
+    assert np.sum(np.array(shares) < 0.75) >= moved
+    assert max(shares) < 1.05
+
+
 @pytest.mark.parametrize("seed", [37, 63, 76, 90, 105, 130, 152])
 def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
     """Seeds of tests/bench/bench_calibration.py (1 mm of noise) where cross-validation alone chose a harmful fit."""

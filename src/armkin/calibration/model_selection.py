@@ -2,12 +2,14 @@
 
 The levels are those of Roth, Mooring and Ravani (An overview of robot calibration, 1987), finer: the file as it is;
 the base and the tool; the joints' zeros; their ratios; the links' lengths; their twists. A richer level is taken when
-it predicts rows it has not seen better than the simpler one, by more than chance (5-fold cross-validation).
+it predicts rows it has not seen better than the simpler one, by more than chance (5-fold cross-validation). Of fewer
+than ten rows chance says little; there base and tool, which are usually the greatest errors, are taken if they predict
+the rows clearly better and the rows determine them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +26,7 @@ GAIN = 0.97  # the first level above the file is taken if it leaves at most this
 CERTAIN = 0.5  # [standard errors] that the first level must gain besides; later levels: 0
 FEW = 18.0  # every level must gain FEW / rows standard errors more than that
 MANY = 10  # [rows] with fewer a fit can look good by chance: OPEN holds for it, too
+CLEAR = 0.7  # with fewer than MANY rows: the share of the file's error on unseen rows that base and tool may leave
 OPEN = 0.5  # share of the file's error: what the covariance of a fit to few rows may leave open at the tip
 CAP = 4.0  # errors above this many medians count as this many: one wrong row does not decide
 
@@ -37,13 +40,16 @@ class Choice:
     fit: Fit
 
 
-def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
-    """The level that the rows justify, fitted to all of them."""
+def choose(
+    model: Model, data: Measured, fixed: Collection[str] = (), tick: Callable[[int, int], object] = lambda *_: None
+) -> Choice:
+    """The level that the rows justify, fitted to all of them; tick: how many fits are done, and of how many."""
     parts = _parts(len(data))
     # Fit all that is free first: every level starts from the pose of its base.
     sets = [free_at(model, level, data, fixed) for level in range(len(LEVELS))]
     errors = np.empty((len(LEVELS), len(data)))
     fits: list[Fit | None] = []
+    count = 1 + len(parts)
     for level, free in enumerate(sets):
         if level and np.array_equal(free, sets[level - 1]):
             errors[level] = errors[level - 1]
@@ -52,17 +58,21 @@ def choose(model: Model, data: Measured, fixed: Collection[str] = ()) -> Choice:
         start = fits[-1].p if fits and fits[-1] is not None else None
         whole = fit(model, data, free, start)
         fits.append(whole)
-        for held in parts:
+        for part, held in enumerate(parts):
+            tick(level * count + part + 1, len(LEVELS) * count)
             used = np.setdiff1d(np.arange(len(data)), held)
             p = fit(model, data.rows(used), free, start, steps=12).p if len(free) else whole.p
             errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
-    level = 0
+    level, sure = 0, False  # sure: the level is better than the file by more than chance
     for richer in range(1, len(LEVELS)):
-        if np.array_equal(sets[richer], sets[level]) or not _better(errors[level], errors[richer], first=level == 0):
+        if np.array_equal(sets[richer], sets[level]):
+            continue
+        better = _better(errors[level], errors[richer], first=not sure)
+        if not better and not (richer == 1 and _clearly(errors)):
             continue
         candidate = fits[richer]
         if len(data) >= MANY or (candidate is not None and _settled(model, candidate, errors[0])):
-            level = richer
+            level, sure = richer, better
     chosen = fits[level]
     assert chosen is not None
     return Choice(level, errors, chosen)
@@ -90,6 +100,12 @@ def _parts(count: int) -> list[NDArray[np.intp]]:
 def _settled(model: Model, candidate: Fit, before: Array) -> bool:
     """Whether the fit's covariance leaves less of the tip's place open than OPEN times the file's error."""
     return left_open(model, candidate) < OPEN * float(np.sqrt(np.mean(before**2)))
+
+
+def _clearly(errors: Array) -> bool:
+    """Whether few rows, each predicted without itself, are met clearly better with another base and tool."""
+    file, placed = np.sqrt(np.mean(errors[:2] ** 2, axis=1))
+    return errors.shape[1] < MANY and bool(placed <= CLEAR * file)
 
 
 def _better(simple: Array, rich: Array, *, first: bool) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -71,11 +71,19 @@ class Calibration:
         return f"<Calibration of {self.arm.name}: {rows}, {self.rms('before'):.3g} -> {self.rms('after'):.3g} mm>"
 
 
-def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str] = ()) -> Calibration:
+def calibrate(
+    arm: Arm,
+    q: ArrayLike,
+    measured: ArrayLike,
+    *,
+    fix: Iterable[str] = (),
+    tick: Callable[[int, int], object] = lambda *_: None,
+) -> Calibration:
     """The arm that explains measured tips, as far as the rows justify it.
 
     q: (M, n) [rad | mm] as commanded; measured: (M, 3) [mm] points or (M, 4, 4) poses; fix: kinds that stay as the
-    file has them (base, tool, zeros, ratios, lengths, twists). Rows that do not fit the others are forgotten. Raises
+    file has them (base, tool, zeros, ratios, lengths, twists); tick: called with the fits that are done, and how many
+    there will be. Rows that do not fit the others are forgotten. Raises
     UsageError for rows that cannot be right: too few, on a line, a joint that never moves, other units or columns.
 
     >>> import armkin, numpy as np
@@ -91,7 +99,7 @@ def calibrate(arm: Arm, q: ArrayLike, measured: ArrayLike, *, fix: Iterable[str]
     check(arm, data)
     corrections = model(arm)
     hold, held = holding(arm, fixed)
-    choice = choose(corrections, data, hold)
+    choice = choose(corrections, data, hold, tick)
     _must_explain(data, choice)
     found = choice.fit
     new, tool = corrections.corrected(found.p)

@@ -77,7 +77,7 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
     import json
 
     found = {
-        "error": "\n".join(_plain(line, _LONGEST["error"]) for line in message.splitlines()),
+        "error": _one_line(message, "error"),
         "kind": kind,
         "exit_code": exit_code,
         **(fields or {}),
@@ -85,7 +85,7 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
     if advice:
         found["next"] = advice
     for word in ("warning", "note"):
-        if said := [text for which, text in _waiting if which == word]:
+        if said := [_one_line(text, word) for which, text in _waiting if which == word]:
             found[f"{word}s"] = said
     _waiting.clear()
     _print(json.dumps(_plain_values(found)))
@@ -96,6 +96,15 @@ def flush() -> None:
     for word, message in _waiting or ():
         _say(word, message)
     for_programs(False)
+
+
+def _one_line(message: str, word: str) -> str:
+    """A message for programs; what is a line of its own for people follows a semicolon, or a sentence's end."""
+    lines = [_plain(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    text = "".join(lines[:1])
+    for line in lines[1:]:
+        text += f" {line}" if text[-1] in ".?!;:" else f"; {line}"
+    return text
 
 
 def _whole(message: str) -> str:

@@ -70,7 +70,8 @@ def calibrate(
     q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
     if poses:
         tips = units.targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
-    found = armkin.calibrate(arm, q, tips, fix=kinds)
+    with output.progress("fits") as tick:
+        found = armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
     if out is not None:
         with output.destination(out) as write:
             write(_file(found, arm))
