@@ -25,7 +25,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "board/test_conformance.py": (),
     "firmware/test_conformance_on_chips.py": (),
     "board/test_curves.py": ("test_a_path_at_random_arrives_at_exact_counts",),
-    "board/test_false_replies.py": ("test_90_lies_to_a_moving_command_end_it_in_bounded_time",),
+    "board/test_false_replies.py": ("test_lies_to_a_moving_command_end_it_in_bounded_time",),
     "board/test_feetech_machine.py": ("test_random_moves_arrive_and_stay_near_their_line",),
     "board/test_grbl_machine.py": ("test_200_random_moves_are_read_back_exact",),
     "board/test_klipper.py": ("test_200_random_moves_are_read_back_exact_and_keep_their_time",),

@@ -20,7 +20,7 @@ def lowest(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with exactly the lowest versions, and armkin in it."""
     venv = tmp_path_factory.mktemp("lowest")
     subprocess.run([sys.executable, "-m", "venv", venv], check=True)
-    pip = [str(venv / "bin/pip"), "install", "-q", "--disable-pip-version-check"]
+    pip = [str(venv / "bin/pip"), "install", "-q", "--no-compile", "--disable-pip-version-check"]
     names = [re.sub(r">=", "==", dependency) for dependency in PROJECT["dependencies"]]
     subprocess.run([*pip, *names], check=True, capture_output=True)
     subprocess.run([*pip, "--no-deps", str(ROOT)], check=True, capture_output=True)
