@@ -38,11 +38,12 @@ def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
 
 
 def test_each_value_is_prepared_once_for_all_rows() -> None:
-    request = replace(SWEPT, swept={"q1": [1.25, 2.5, 3.75]})
-    before = solver.cache_info().misses
-    for first in range(0, 40, 10):
-        choose.solve(request, TARGETS[first : first + 10])
-    assert solver.cache_info().misses - before == 3
+    for joint, most in (("q2", 3), ("q1", 1)):  # of q1, the redundant one, all values have one arm
+        request = replace(SWEPT, swept={joint: [1.25, 2.5, 3.75]})
+        before = solver.cache_info().misses
+        for first in range(0, 40, 10):
+            choose.solve(request, TARGETS[first : first + 10])
+        assert solver.cache_info().misses - before <= most
 
 
 def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPatch) -> None:

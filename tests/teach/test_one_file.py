@@ -134,6 +134,26 @@ def test_a_name_runs_as_no_script(browser: Browser, tmp_path: Path) -> None:
         assert page.evaluate("window.bad") is None
 
 
+def test_the_redundant_joint_turns_within_its_interval_while_the_tip_stays(browser: Browser, tmp_path: Path) -> None:
+    arm = armkin.load("panda")
+    start = np.deg2rad([20, -30, 10, -110, 20, 90, 40])
+    with opened(browser, written(tmp_path, "panda") + "#q=20,-30,10,-110,20,90,40") as page:
+        slider = page.get_by_role("slider", name="J7, the tip stays")
+        expect(page.locator("#held-range")).to_contain_text("within limits")
+        low, high = map(float, re.findall(r"-?[\d.]+", page.inner_text("#held-range")))
+        s = armkin.ik(arm, armkin.fk(arm, start), near=start)
+        assert s.interval is not None
+        assert [low, high] == pytest.approx(np.rad2deg(s.interval[s.best]), abs=0.01)
+        for value, turned in ((0.5 * (low + high), 0.5 * (low + high)), (low - 30, low), (high + 20, high)):
+            slider.evaluate("(bar, v) => { bar.value = v; bar.dispatchEvent(new Event('input')); }", value)
+            settled(page)
+            q = np.deg2rad([float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()])
+            assert np.rad2deg(q[6]) == pytest.approx(turned, abs=0.02)
+            assert np.abs(armkin.fk(arm, q) - armkin.fk(arm, start)).max() < 5e-3
+            assert np.clip(q, arm.lower, arm.upper) == pytest.approx(q, abs=1e-4)
+            expect(page.locator("#answer")).to_contain_text("exact: ")
+
+
 def test_an_arm_without_a_module_has_no_page() -> None:
     with pytest.raises(UsageError):
-        html(armkin.load("panda"))
+        html(armkin.load("pan_tilt"))

@@ -380,8 +380,8 @@ def test_other_arms_have_their_page(browser: Browser, robot: str) -> None:
             assert found is not None
             assert int(found[1]) == count >= 1
         if robot == "panda":
-            assert page.get_attribute("button[aria-label^='hold J3']", "aria-pressed") == "true"
-            page.click("button[aria-label^='hold J3']")
+            assert page.get_attribute("button[aria-label^='hold J7']", "aria-pressed") == "true"
+            page.click("button[aria-label^='hold J7']")
             until(page, "!document.querySelector('#branches button')")
             page.click("button[aria-label^='hold J1']")
             page.wait_for_selector("#branches button")

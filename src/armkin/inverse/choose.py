@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,13 +24,14 @@ from armkin.inverse.branches.names import find
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.branches.turns import turns as copies_of
 from armkin.inverse.families import intervals_out
+from armkin.inverse.held import arm_without, others, redundant_alone
 from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
 from armkin.inverse.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
 from armkin.keep_out.clearance import said as hits_said
 from armkin.model import limits, units
-from armkin.model.lock import lock, unlock
+from armkin.model.lock import unlock
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -116,8 +117,8 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     found = [_Found() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for held in _holds(request):
-        one = _locked(arm, tuple(held.items()))
-        s = request.ik(one, targets, request.task, near=near[_kept(arm, held)], **more)
+        one, goals = others(arm, request.task, held, targets)
+        s = request.ik(one, goals, request.task, near=near[_kept(arm, held)], **more)
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
@@ -141,13 +142,13 @@ def most_targets(request: Request) -> int:
 def locked(request: Request) -> Arm:
     """The arm that is solved: the joints that are neither held nor swept."""
     held = {**request.held, **{name: values[0] for name, values in request.swept.items()}}
-    return _locked(request.arm, tuple(_in(request.arm, held).items()))
+    return arm_without(request.arm, tuple(_in(request.arm, held).items()))
 
 
-@lru_cache(maxsize=128)
-def _locked(arm: Arm, held: tuple[tuple[str, float], ...]) -> Arm:
-    """The same arm object for the same values held: what is prepared for it is used again."""
-    return lock(arm, dict(held)) if held else arm
+def prepared(request: Request) -> Arm:
+    """As `locked`, or one arm for all values that a redundant joint is held at: its targets are others."""
+    free = redundant_alone(request.arm, request.task, request.held)
+    return locked(request) if free is None else free.rest
 
 
 def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
@@ -187,7 +188,7 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     held = _in(arm, request.held)
-    one = _locked(arm, tuple(held.items()))
+    one = arm_without(arm, tuple(held.items()))
     if request.position_first:
         found = nearest_positions(one, targets, near[_kept(arm, held)])
     else:

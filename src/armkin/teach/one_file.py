@@ -81,8 +81,9 @@ def _hash(text: str) -> str:
 
 def _data(arm: Arm, task_name: str | None, plan: PathPlan | None) -> str:
     """What the page must know besides the solver: the scene, words, and a plan."""
-    drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": None, "locks": False}
-    values = {"arm": drawn, "solver": about(arm, task_name), "plan": None if plan is None else played(arm, plan)}
+    solver = about(arm, task_name)
+    drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": solver["held"] or None}
+    values = {"arm": drawn | {"locks": False}, "solver": solver, "plan": None if plan is None else played(arm, plan)}
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.model import units
 from armkin.model.arm import actual
 from armkin.motors import pulse_range
@@ -17,24 +18,23 @@ if TYPE_CHECKING:
 
 def about(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
     """What a page must know of the module: the task, its numbers' names and units, how far the motors go."""
-    task, _ = solver(actual(arm), task_name)
+    spare = redundancy(actual(arm), task_name)
+    task = spare.task if spare else solver(actual(arm), task_name)[0]
     return {
         "robot": Path(arm.path).stem if arm.path else arm.name,
         "task": task.name,
         "labels": list(task.labels),
         "units": units.label_units(task.labels),
+        "held": arm.joint_names[spare.joint] if spare else "",
         "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
     }
 
 
 def own_solver(arm: Arm) -> dict[str, Any]:
-    """The module's text and `about`; none where the arm is no closed form: the server is as quick then."""
+    """The module's text and `about`; none where the arm has no module."""
     from armkin.export.js.program import module  # only pages that are open need it
 
     try:
-        _, geometry = solver(actual(arm), None)
-        if geometry.pairs is not None:
-            return {"module": module(arm), "about": about(arm)}
+        return {"module": module(arm), "about": about(arm)}
     except UsageError:
-        pass
-    return {"module": None, "about": None}
+        return {"module": None, "about": None}

@@ -93,7 +93,7 @@ def _solved(arm: Arm, question: Question) -> dict[str, Any]:
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
     request = choose.Request(arm=arm, near=shown, held=held)
-    task, why = _task(choose.locked(request))
+    task, why = _task(choose.prepared(request))
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}
     kept = [i for i, name in enumerate(arm.joint_names) if name not in held]

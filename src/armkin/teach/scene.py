@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.errors import UsageError
+from armkin.inverse.solvers.redundant import redundant_joint
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
+from armkin.model.arm import actual
 from armkin.motors import joints_per_pulse, motor_names, pulse_units
 from armkin.view.skeleton import shape
 
@@ -62,12 +64,12 @@ def scene(arm: Arm) -> dict[str, Any]:
 
 
 def first_lock(arm: Arm) -> str | None:
-    """The joint that is held when the page opens: one of seven, the third, or none."""
+    """The joint that is held when the page opens: the redundant one; where several must be, one in the middle."""
     try:
         task_for(arm)
     except UsageError:
         return arm.joint_names[(arm.n - 1) // 2 - 1] if arm.n > 6 else None
-    return arm.joint_names[2] if arm.n == 7 else None
+    return redundant_joint(actual(arm), None) or None
 
 
 def _steps(arm: Arm) -> list[float]:

@@ -2,9 +2,11 @@
 
 /** One request under way; the newest one waits, older ones are dropped. */
 export class Latest {
-  /** @param {(fields: any) => Promise<void>} send */
-  constructor(send) {
+  /** @param {(fields: any) => Promise<void>} send @param {() => number} [pace] [ms] from one request to the next */
+  constructor(send, pace = () => 0) {
     this.send = send;
+    this.pace = pace;
+    this.sent = -Infinity; // [ms] when the last one was
     this.busy = false;
     /** @type {any} */
     this.next = null;
@@ -26,6 +28,9 @@ export class Latest {
   async run() {
     this.busy = true;
     while (this.next !== null) {
+      const early = this.sent + this.pace() - performance.now();
+      if (early > 0) await new Promise((resolve) => setTimeout(resolve, early));
+      this.sent = performance.now();
       const fields = this.next;
       this.next = null;
       await this.send(fields);

@@ -3,6 +3,7 @@
 import { Board } from "./board.js";
 import { isFlat } from "./chain.js";
 import { get } from "./dom.js";
+import { Held } from "./held.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
 import { Latest } from "./latest.js";
@@ -16,7 +17,7 @@ import { begun, trouble } from "./trouble.js";
 
 /** @typedef {import("./types.js").Look} Look */
 
-const NUDGE = 5; // [mm] of an arrow key
+const CONFIRMED = 100; // [ms] between two questions to the server while this page answers itself
 
 const drawing = import("./view.js"); // while the server is asked for the arm
 
@@ -28,15 +29,16 @@ class Page {
     this.q = look.q;
     this.branch = "";
     this.joints = new Joints(arm, (q, byHand, held) => (held && this.tip.target.length ? this.swing(q) : this.turn(q, byHand)), () => this.refresh());
-    this.tip = new Tip((target) => this.aim(target, { goal: true }), (branch) => this.choose(branch), (q) => this.turn(q), () => {
+    this.tip = new Tip((target, goal) => this.aim(target, { goal }), (branch) => this.choose(branch), (q) => this.turn(q), () => {
       if (!this.moving) this.showGhosts();
     });
+    this.held = new Held(arm, (q) => this.swing(q));
     this.motors = new Motors(arm, () => this.refresh());
     /** @type {import("./view.js").View | null} */
     this.view = null;
     this.moving = false; // the board moves: the page shows where its pins are
     this.jobs = 0; // that the board has ended
-    /** @type {((fields: any) => Look) | null} the arm's own module */
+    /** @type {{look: (fields: any) => Look, held: string} | null} the arm's own module */
     this.own = null;
     this.mine = false; // whether this page holds control; one that watches asks for nothing
     const pose = async () => {
@@ -51,7 +53,7 @@ class Page {
       trail: (tips, hit) => this.view?.trail(tips, hit),
       trouble: (text) => trouble(text, "program"), begun, mine: () => this.mine,
     });
-    this.asking = new Latest((fields) => this.answer(fields));
+    this.asking = new Latest((fields) => this.answer(fields), () => (this.answersItself() && !this.board.state?.follows ? CONFIRMED : 0));
     get("robot").textContent = arm.robot;
     document.title = `${arm.robot} - armkin teach`;
   }
@@ -105,11 +107,16 @@ class Page {
     this.first(asked);
   }
 
+  /** Whether this page has a solver of the joints that are not held. */
+  answersItself() {
+    return this.own !== null && [...this.joints.held].join() === this.own.held && !this.motors.best.checked;
+  }
+
   /** The first numbers, from this page itself; the server's answer confirms or corrects them. @param {any} fields */
   first(fields) {
-    if (!this.own || this.joints.held.size || this.motors.best.checked) return;
+    if (!this.answersItself() || !this.own) return;
     const stands = this.board.state?.pulses ?? null;
-    this.show(this.own({ ...fields, stands }), fields.target !== undefined);
+    this.show(this.own.look({ ...fields, stands }), fields.target !== undefined);
   }
 
   /** Ask for the same pose again; what waits to be asked is newer than that. */
@@ -123,7 +130,7 @@ class Page {
       const look = /** @type {Look} */ (await act("look", {
         q: this.q, held: [...this.joints.held], best: this.motors.best.checked, ...fields,
       }));
-      const older = (this.own || !fields.target) && this.asking.next !== null; // what is shown is newer
+      const older = (this.answersItself() || !fields.target) && this.asking.next !== null; // what is shown is newer
       if (!older) this.show(look, fields.target !== undefined, this.asking.next !== null);
       trouble("");
     } catch (error) {
@@ -180,6 +187,7 @@ class Page {
     this.joints.say(look.outside);
     this.tip.show(look, stale);
     this.motors.show(look);
+    this.held.show(look, this.joints.held);
     if (!this.view || this.moving) return;
     this.view.pose(look.q, look.red);
     this.showGhosts();
@@ -189,15 +197,6 @@ class Page {
     this.view.gizmo.show(look.task !== null, flat);
     get("turn").hidden = look.task !== "pose";
     this.view.gizmo.put(flat ? [target[0], target[1], tip[2]] : target, look.task === "pose" ? target.slice(3) : rpy_deg);
-  }
-
-  /** Move the target from where it is. @param {number[]} way [steps] */
-  nudge(way) {
-    if (!this.tip.target.length || !this.look.task) return;
-    const flat = isFlat(this.look.task);
-    const target = this.tip.target.map((value, i) => (i < (flat ? 2 : 3) ? value + NUDGE * way[i] : value));
-    this.tip.target = target;
-    this.aim(target);
   }
 
   /** Draw in 3-D, where the browser can. */
@@ -282,7 +281,7 @@ async function start() {
     g: () => one.board.grip(one.board.open ? "closed" : "open"),
   };
   for (let k = 1; k <= 8; k++) actions[String(k)] = () => one.tip.choose(k - 1);
-  keys(actions, (way) => one.nudge(way), stop);
+  keys(actions, (way) => one.tip.nudge(way), stop);
   one.show(opened.look);
   one.program.show(opened.program);
   if (opened.board) one.board.show(opened.board);

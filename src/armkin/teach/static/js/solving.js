@@ -136,7 +136,7 @@ export async function ownSolver(scene, act) {
     if (!module) return null;
     const { look } = solving(await import(`data:text/javascript;charset=utf-8,${encodeURIComponent(module)}`), about, scene);
     document.documentElement.dataset.own = "yes"; // for tests
-    return look;
+    return { look, held: about.held ?? "" };
   } catch {
     return null; // the server answers alone
   }

@@ -1,6 +1,9 @@
 // @ts-check
 /** The tip's target as the arm's task asks for it, what was found, and the branches to choose from. */
+import { isFlat } from "./chain.js";
 import { fixed, get, make, show, typed } from "./dom.js";
+
+const NUDGE = 5; // [mm] of an arrow key
 
 /** Okabe and Ito's colours, as in the pictures of `armkin plot`; told apart also by the colour-blind. */
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
@@ -21,7 +24,7 @@ const colour = (k) => COLOURS[k] ?? `hsl(${(k * 137) % 360} 60% 50%)`;
 
 export class Tip {
   /**
-   * @param {(target: number[]) => void} aimed
+   * @param {(target: number[], goal: boolean) => void} aimed goal: typed, an arm that follows goes there
    * @param {(branch: import("./types.js").Branch) => void} chose
    * @param {(joints: number[]) => void} went
    * @param {() => void} pointed another branch's button is pointed at, or none
@@ -35,6 +38,8 @@ export class Tip {
     /** @type {HTMLInputElement[]} */
     this.boxes = [];
     this.labels = "";
+    /** @type {string | null} */
+    this.task = null;
     /** @type {number[]} */
     this.target = [];
     /** @type {{branch: import("./types.js").Branch, colour: string, chosen: boolean}[]} */
@@ -47,6 +52,7 @@ export class Tip {
 
   /** @param {import("./types.js").Look} look @param {boolean} stale whether the target has changed since */
   show(look, stale) {
+    this.task = look.task;
     get("target").hidden = look.task === null;
     if (look.task === null) {
       get("answer").textContent = look.why ?? "";
@@ -93,7 +99,15 @@ export class Tip {
     const target = [...this.target];
     target[i] = value;
     this.target = target;
-    this.aimed(target);
+    this.aimed(target, true);
+  }
+
+  /** Move the target from where it is. @param {number[]} way [steps] */
+  nudge(way) {
+    if (!this.target.length || !this.task) return;
+    const flat = isFlat(this.task);
+    this.target = this.target.map((value, i) => (i < (flat ? 2 : 3) ? value + NUDGE * way[i] : value));
+    this.aimed(this.target, false);
   }
 
   /** @param {import("./types.js").Look} look */
