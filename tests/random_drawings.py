@@ -4,6 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
+# Lines that spoil a drawing, and what their refusal says behind the element's name.
+BROKEN_ELEMENTS = (
+    ('<path d="M0 0L1"/>', "L needs 2 numbers"), ('<path d="M0 0B1 1"/>', "'B' is not known"),
+    ('<path d="L1 1"/>', "it begins with M"), ('<path d="M1..2 3L2 2"/>', "L needs 2 numbers"),
+    ('<path d="M,,1 1L2 2"/>', "M needs 2 numbers"), ('<path d="M nan 0L1 1"/>', "M needs 2 numbers"),
+    ('<path d="M1e999 0L1 1"/>', "larger than 1e+09"), ('<path d="M0 0A1 1 0 2 0 3 3"/>', "flag is 0 or 1"),
+    ('<path d="M0 0A1e300 1e300 0 0 0 1 1"/>', "larger than 1e+09"), ('<path d="M1e7 0L1 1"/>', "farther away"),
+    ('<path d="M0 0C1e8 0 0 1e8 1 1"/>', "more than 20000 chords"), ('<circle r="-5"/>', "r -5 is below 0"),
+    ('<circle r="10%"/>', "'10%' is no length"), ('<circle r="1e200"/>', "larger than 1e+09"),
+    ('<rect width="-1" height="1"/>', "width -1 is below 0"),
+    ('<rect width="4" height="4" rx="-1"/>', "rx -1 is below 0"),
+    ('<polyline points="1 2 3"/>', "odd count"), ('<polyline points="1 2 a b"/>', "has what is no number"),
+    ('<line x2="3em"/>', "'3em' is no length"), ('<line x2="1furlong"/>', "is no length"),
+    ('<g transform="matrix(1 2 3 4 5)"><line x2="1"/></g>', "matrix has 5 numbers"),
+    ('<g transform="rotate(1) foo(2)"><line x2="1"/></g>', "is not known"),
+    ('<g transform="scale(1e8) scale(1e8)"><line x2="1"/></g>', "farther away"),
+    ('<use href="http://example.org/x.svg#a"/>', "which is not in this file"),
+    ('<use href="file:///etc/hostname"/>', "which is not in this file"), ("<use/>", "which is not in this file"),
+    ('<use id="self" href="#self"/>', "uses itself"), ("<text>a</text>", "is not drawn"),
+    ('<image href="a.png"/>', "is not drawn"),
+    ("<foreignObject/>", "is not drawn"), ("<switch/>", "is not drawn"), ("<svg/>", "inside of another"),
+    ('<line x2="1" clip-path="url(#x)"/>', "has clip-path"), ('<g style="mask:url(#m)"><line x2="1"/></g>', "has mask"),
+    ('<path d="M0 0" d="M1 1"/>', "is not XML: duplicate attribute"), ("<g>&nbsp;</g>", "is not XML: undefined entity"),
+    ("<g =>", "is not XML: "), ("</g>", "is not XML: mismatched tag"), ("<path d=M0/>", "is not XML: "),
+)  # fmt: skip
+
 
 def program(seed: int) -> str:
     """A G-code program."""

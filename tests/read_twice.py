@@ -6,6 +6,7 @@ import numpy as np
 
 import other_readers
 import random_drawings
+from armkin.errors import PathFileError
 from armkin.path_file import gcode, svg
 from armkin.path_file.drawing import Placing, Wishes
 
@@ -84,3 +85,21 @@ def drawing_off(seed: int) -> float:
         strokes[-1] += [list(p) for p in move.polyline or []]
     mine = np.concatenate([np.array(s)[:, :2] for s in strokes])
     return apart(mine, np.concatenate(other_readers.svg(text)))
+
+
+def spoilt(seed: int, which: int) -> tuple[str, str, str]:
+    """A drawing with a broken element, or a broken line: its text, the place that is named, what is said."""
+    lines, rng = random_drawings.drawing(seed).splitlines(), np.random.default_rng(seed)
+    line, words = random_drawings.BROKEN_ELEMENTS[which % len(random_drawings.BROKEN_ELEMENTS)]
+    k = int(rng.integers(3, len(lines)))  # behind the head, before the end
+    lines.insert(k, line)
+    return "\n".join(lines), f"t.svg:{k + 1}: ", words
+
+
+def refusal(text: str) -> str:
+    """Why a drawing is refused; empty: it is drawn."""
+    try:
+        svg.parse(text.encode(), "t.svg", AS_IT_IS, Wishes())
+    except PathFileError as error:
+        return str(error)
+    return ""

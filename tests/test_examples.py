@@ -20,6 +20,8 @@ PROMISED = {
     8: ["308.1 mm in", "left, elbow up"],
     9: ["right, elbow down", "<- chosen"],
     10: ["cells are reached", "places reach all 6 targets"],
+    11: ["1198 points, 3.91 m", "0.05 allowed", "14 words are of the printer"],
+    12: ["23 strokes, 1046 mm", "0.05 allowed"],
 }
 
 
@@ -29,6 +31,7 @@ def test_an_example_runs_from_any_folder(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     [path] = FOLDER.glob(f"{number:02}_*.py")
+    monkeypatch.setattr("sys.argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
     shown = capsys.readouterr().out
     assert not [words for words in PROMISED[number] if words not in shown], shown
@@ -40,3 +43,8 @@ def test_every_example_is_numbered_short_and_listed() -> None:
     assert max(len(path.read_text().splitlines()) for path in files) <= 25
     page = (FOLDER / "README.md").read_text()
     assert not [path.name for path in files if path.name not in page]
+
+
+def test_the_layer_is_what_its_script_writes() -> None:
+    script = runpy.run_path(str(FOLDER.parent / "scripts" / "first_layer.py"))
+    assert (FOLDER / "first_layer.gcode").read_text() == "".join(line + "\n" for line in script["program"](1))

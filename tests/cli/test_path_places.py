@@ -155,7 +155,7 @@ def test_an_arm_on_a_board_of_others_is_planned_without_a_port(tmp_path: Path) -
     assert "has no gripper that a board of kind grbl moves" in done.err
 
 
-def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved() -> None:
+def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved(tmp_path: Path) -> None:
     corners = ("--via", "300,0,400", "--via", "300,50,400")
     done = run("path", "ur5e", *corners, "--json")
     assert done.code == 0, done.err
@@ -166,3 +166,10 @@ def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved() ->
     refused = run("path", "ur5e", *corners, "--port", "none")
     assert (refused.code, refused.out) == (2, "")
     assert "have no max_accel, it has no board" in refused.err
+    file = tmp_path / "f.csv"
+    file.write_text("x,y,z\n300,0,400\n300,50,400\n")
+    sent = run("send", "ur5e", "--path", file, "--dry-run", "--json")
+    assert sent.code == 0, sent.err
+    assert "assumed for this plan alone, as ur5e does not say: max_accel of J1" in sent.err
+    assert sent.json["duration_s"] == done.json["duration_s"]
+    assert run("send", "ur5e", "--path", file, "--port", "none").code == 2

@@ -208,6 +208,27 @@ def test_a_banded_system_is_solved() -> None:
         np.testing.assert_allclose(banded(bands, b), np.linalg.solve(A, b), atol=1e-12)
 
 
+def ragged(seed: int) -> np.ndarray:
+    """Chords of 0.1 to 30 mm one after another, as slicers mix them, with small turns and corners."""
+    rng = np.random.default_rng(seed)
+    length = np.exp(rng.uniform(np.log(0.1), np.log(30), 40))
+    small = rng.normal(0, 0.08, 40)
+    turned = np.cumsum((small, np.where(rng.random(40) < 0.3, rng.uniform(-2.5, 2.5, 40), small))[seed % 2])
+    step = length[:, None] * np.stack([np.cos(turned), np.sin(turned), 0 * turned], axis=1)
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
+    """A spline with a knot at each place that it is held to swung 9 mm out between them."""
+    points = ragged(seed)
+    curve = fitting.fitted(points, 0.05)
+    u = np.unique(np.concatenate([curve.at, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
+    far, excess = worst_miss(points, curve.values(u)[0], 0.05)
+    assert far <= 0.051
+    assert excess <= 0.051
+
+
 def test_noise_is_no_corner_and_a_small_square_is() -> None:
     rng = np.random.default_rng(5)
     x = np.linspace(0, 10, 200)

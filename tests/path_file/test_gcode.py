@@ -110,6 +110,14 @@ def test_what_is_ignored_is_noted_once_a_word() -> None:
     assert notes[0] == "M104 is ignored (line 1, and 1 more)"
 
 
+def test_home_takes_the_flags_that_slicers_give_it() -> None:
+    for line in ("G28 W ; home all without mesh bed level", "G28 X Y", "G28 X0 Y0", "N1 G28 O"):
+        file = gcode.parse(f"{line}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, Wishes())
+        assert [move.kind for move in file.moves] == ["joint", "point", "polyline"]
+    with pytest.raises(PathFileError, match="t:1: 'X' is no word"):
+        gcode.parse(b"G1 X", "t", AS_IT_IS, Wishes())
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -7,7 +7,7 @@ import pytest
 
 import random_drawings
 from armkin.errors import PathFileError
-from read_twice import drawing_off, program_off, program_read
+from read_twice import drawing_off, program_off, program_read, refusal, spoilt
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -28,3 +28,11 @@ def test_a_broken_line_is_refused_with_its_number(seed: int) -> None:
     lines.insert(k, broken)
     with pytest.raises(PathFileError, match=f"t.gcode:{k + 1}: "):
         program_read("\n".join(lines))
+
+
+@pytest.mark.parametrize("which", range(len(random_drawings.BROKEN_ELEMENTS)))
+def test_a_broken_element_is_refused_with_its_line(which: int) -> None:
+    text, place, words = spoilt(which, which)
+    said = refusal(text)
+    assert said.startswith(place)
+    assert words in said

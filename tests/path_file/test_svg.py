@@ -114,6 +114,37 @@ def test_what_is_refused_names_line_and_element(body: str, words: str) -> None:
         drawn(body)
 
 
+@pytest.mark.parametrize(
+    ("raw", "words"),
+    [
+        (b"", "t.svg:1: is not XML: no element found"),
+        (b"hello", "t.svg:1: is not XML: syntax error"),
+        (b"\x1f\x8b\x08\0\0", "t.svg:1: is not XML"),
+        (b'\n\n<svg>\n<path d="M0 0L1 1 \xff"/></svg>', "t.svg:4: is not XML"),
+        (b'<?xml version="1.0" encoding="klingon"?><svg/>', "t.svg:1: is not XML"),
+        (b"<html/>", "is <html>, and no <svg>"),
+        (b'<svg viewBox="0 0 nan 1"><line x2="1"/></svg>', "t.svg:1: <svg>: '0 0 nan 1' has what is no number"),
+        (b'<svg viewBox="0 0 0 0"><line x2="1"/></svg>', "the last two above 0"),
+        (b'<svg viewBox="0 0 1 1" width="-5mm"><line x2="1"/></svg>', "width -5mm is below 0"),
+        (b'<svg viewBox="0 0 1 1" height="0"><line x2="1"/></svg>', "above 0, or left out"),
+        (b"<svg>" + b"<g>" * 100_000, "elements in each other deeper"),
+        (b'<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/hostname">]>\n<svg><path d="&x;"/></svg>', "t.svg:1: has ent"),
+        (b'<!DOCTYPE svg [<!ENTITY % p SYSTEM "http://127.0.0.1:9/x">%p;]>\n<svg/>', "t.svg:1: has entities"),
+        (b'<svg><path d="M0 0' + b"L1 1" * 130_000 + b'"/></svg>', "beyond 120000 points"),
+    ],
+)
+def test_files_that_are_no_drawing_are_refused_with_their_line(raw: bytes, words: str) -> None:
+    with pytest.raises(PathFileError) as refused:
+        svg.parse(raw, "t.svg", AS_IT_IS, Wishes())
+    assert words in str(refused.value)
+
+
+def test_a_document_type_elsewhere_is_not_fetched() -> None:
+    head = b'<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://127.0.0.1:9/svg11.dtd">'
+    drawn_ = svg.parse(head + b'<svg viewBox="0 0 1 1"><line x2="1"/></svg>', "t.svg", AS_IT_IS, Wishes())
+    assert len(drawn_.moves) > 0
+
+
 def test_entities_and_bombs_of_uses_are_refused() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg><path d="&a;"/></svg>'
     with pytest.raises(PathFileError, match="entities"):

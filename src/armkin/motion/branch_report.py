@@ -93,6 +93,16 @@ def words(arm: Arm, where: Reconfiguration) -> str:
     return f"{where.joint} meets its limit {where.value / size:.6g} {unit}"
 
 
+def closeness(plan: PathPlan) -> str:
+    """How far the motion leaves the path, or the points that it was fitted to."""
+    if plan.rounded_most is None:
+        return f"at most {plan.deviation:.4f} mm from the path; {plan.tolerance:g} allowed"
+    return (
+        f"points within {plan.deviation:.4f} mm of the motion, the farthest at {plan.rounded_most:.3f} mm; "
+        f"{plan.tolerance:g} allowed"
+    )
+
+
 def answer(plan: PathPlan) -> dict[str, Any]:
     """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
     arm = plan.arm

@@ -22,10 +22,12 @@ _SAME = 1e-6  # [mm] nearer points are one
 _SCALE = 16.0  # tolerances: from so far off a corner is still one
 _SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
 _CHORD = 0.85  # share of the tolerance, beside chords
+_BETWEEN = 6  # places of each cubic that are held to its chords in the end
 _EVEN = 8  # parts of a chord that is long beside a neighbour
 _SPARE = 0.98  # of what is allowed
 _POINTS, _LONGEST = 32, 20.0  # of a first interval: points, or [mm]
 _ROUNDS = 80
+_TRIES = 5  # after which a curve that leaves its chords is given up
 _TELLING, _CLOSE = 5, 0.05  # points that tell misfit from noise; of what is allowed: such a misfit is none
 _PATIENCE = 4  # rounds of weighing before an interval is divided
 _HEAVIEST = 1e6  # a point's weight
@@ -128,12 +130,21 @@ def corners(y: Array, tolerance: float) -> Bool:
 def fitted(y: Array, tolerance: float) -> Fitted:
     """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order."""
     chords = Chords(y, corners(y, tolerance))
-    for _ in range(4):
+    for round_ in range(_TRIES + 1):
         begin, end, powers, curve, missed = _curves(chords, tolerance)
         if not missed.any():
             break
-        chords = Chords(y, chords.corner | missed)  # cubics that waver: the chords themselves, rounded
+        # cubics that waver: the chords themselves, rounded; in the end all of such a curve's
+        chords = Chords(y, chords.corner | (missed if round_ + 1 < _TRIES else _of_curves(chords, missed)))
     return _rounded(chords, begin, end, powers, curve, tolerance)
+
+
+def _of_curves(chords: Chords, some: Bool) -> Bool:
+    """All points inside of the curves that have some of the points (N,)."""
+    curve = chords.curve
+    found = np.zeros(int(curve[-1]) + 1, bool)
+    found[curve[some[:-1]]] = found[curve[some[1:]]] = True
+    return np.concatenate([[False], found[curve[1:]] & (curve[1:] == curve[:-1]), [False]])
 
 
 def _curves(chords: Chords, tolerance: float) -> tuple[Array, Array, Array, Int, Bool]:
@@ -148,17 +159,47 @@ def _curves(chords: Chords, tolerance: float) -> tuple[Array, Array, Array, Int,
     if not alone.all():
         rows = _Rows.of(chords, ~alone, tolerance)
         layout, control, off = _least_knots(rows)
-        missed[rows.point[(off > 1.0) & (rows.point >= 0)]] = True
-        if (off > 1.0).any() and not missed.any():
-            missed[1:-1] = True
-        missed[[0, -1]] = False
-        missed &= ~chords.corner
+        bad = off > 1.0
+        missed[rows.point[bad & (rows.point >= 0)]] = True
+        beside = rows.chord[bad & (rows.point < 0)]
+        missed[beside] = missed[beside + 1] = True
         numbers = rows.curves[layout.curve]
+        cubics = layout.powers(control)
+        beside = _astray_chords(chords, layout, cubics, tolerance)
+        missed[beside] = missed[beside + 1] = True
         begin, end = np.append(begin, layout.begin), np.append(end, layout.end)
-        powers, which = np.concatenate([powers, layout.powers(control)]), np.append(which, numbers)
+        powers, which = np.concatenate([powers, cubics]), np.append(which, numbers)
         order = np.argsort(begin, kind="stable")
         begin, end, powers, which = begin[order], end[order], powers[order], which[order]
+        missed |= _astray_points(Fitted(np.append(begin, end[-1]), powers, u, np.zeros(0)), y, tolerance)
+    missed[[0, -1]] = False
+    missed &= ~chords.corner
     return begin, end, powers, which, missed
+
+
+def _astray_points(curve: Fitted, y: Array, tolerance: float) -> Bool:
+    """Which of the given points (N, d) lie farther from a curve than allowed."""
+    at, least = curve.at, np.full(len(y), np.inf)
+    for _ in range(3):  # the nearest place is a little before or behind
+        p, slope = curve.values(at)
+        off = y - p
+        least = np.minimum(least, (off**2).sum(axis=1))
+        way = (off * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
+        at = np.clip(at + np.clip(way, -1.0, 1.0), curve.begin[0], curve.begin[-1])
+    return np.asarray(least > tolerance**2)
+
+
+def _astray_chords(chords: Chords, layout: Layout, cubics: Array, tolerance: float) -> Int:
+    """Chords that a cubic leaves between the places that it was fitted to: their numbers."""
+    f = (np.arange(_BETWEEN) + 0.5)[:, None, None] / _BETWEEN
+    p = cubics[:, 0] + f * (cubics[:, 1] + f * (cubics[:, 2] + f * cubics[:, 3]))
+    at = layout.begin + f[..., 0] * (layout.end - layout.begin)
+    k = np.clip(np.searchsorted(chords.u, at, side="right") - 1, 0, len(chords.length) - 1)
+    unit = chords.step[k] / chords.length[k][..., None]
+    off = p - chords.y[k]
+    along = np.clip((off * unit).sum(axis=2), 0.0, chords.length[k])
+    away = np.linalg.norm(off - along[..., None] * unit, axis=2)
+    return np.unique(k[away > tolerance + chords.sagitta[k]])
 
 
 @dataclass(frozen=True)
@@ -173,6 +214,9 @@ class _Rows:
     weight: Array  # (R,)
     along: Array  # (R, d) direction of the chord of a place on one; 0 for a given point
     point: Int  # (R,) number of the given point, -1: a place on a chord
+    chord: Int  # (R,)
+    before: Array  # (R,) [mm] of its chord, from its begin to a place on it
+    beyond: Array  # (R,) from there to its end
     ends: Bool  # (R,) ends of curves
 
     @staticmethod
@@ -206,11 +250,14 @@ class _Rows:
             heavy,
             np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None]),
             np.where(given, numbers + (share == 1), -1),
+            numbers,
+            share * chords.length[numbers],
+            (1 - share) * chords.length[numbers],
             edge | np.append(edge[1:], True),
         )
 
     def miss(self, values: Array) -> Array:
-        """How curves that pass `values` (R, d) leave the rows, across their own direction: (R, d)."""
+        """How curves that pass `values` (R, d) leave the rows: points across their own direction, chords: (R, d)."""
         miss = values - self.y
         along = np.empty_like(values)
         along[1:-1] = values[2:] - values[:-2]
@@ -218,7 +265,10 @@ class _Rows:
         along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
         along = np.where(self.point[:, None] >= 0, along, self.along)
         along[self.ends] = 0.0
-        return np.asarray(miss - (miss * along).sum(axis=1, keepdims=True) * along)
+        far = (miss * along).sum(axis=1)
+        past = np.maximum(far - self.beyond, 0.0) + np.minimum(far + self.before, 0.0)  # a chord's end, or its begin
+        far -= np.where(self.point >= 0, 0.0, past)
+        return np.asarray(miss - far[:, None] * along)
 
 
 def _graded(chords: Chords, used: Bool) -> tuple[Int, Array]:

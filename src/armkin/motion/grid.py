@@ -176,15 +176,14 @@ def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:
     worst: tuple[float, float] | None = None
     for i in range(0, len(s), _BLOCK):
         at, given = s[i : i + _BLOCK], points[i : i + _BLOCK]
-        for _ in range(2):  # the nearest place is a little before or behind
+        distance = np.full(len(at), np.inf)  # the least of what is met: in a tight corner the search may leave it
+        for _ in range(3):  # the nearest place is a little before or behind
             q, slope = path.at(np.clip(at, path.s[0], path.s[-1]))
             off = given - position(arm, q)[:, : given.shape[1]]
+            distance = np.minimum(distance, np.linalg.norm(off, axis=1))
             tangent = (np.asarray(jacobian(arm, q)[:, : given.shape[1]]) @ slope[:, :, None])[..., 0]
             size = np.maximum((tangent**2).sum(axis=1), 1e-300)
             at = at + np.clip((off * tangent).sum(axis=1) / size, -1.0, 1.0)
-        distance = np.linalg.norm(
-            given - position(arm, path.at(np.clip(at, path.s[0], path.s[-1]))[0])[:, : given.shape[1]], axis=1
-        )
         k = int(distance.argmax())
         if worst is None or distance[k] > worst[0]:
             worst = float(distance[k]), float(s[i + k])

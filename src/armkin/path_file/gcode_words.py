@@ -13,6 +13,8 @@ _WORD = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _CHECKSUM = re.compile(r"\*\s*([0-9]{1,3})\s*$")
 _OWN_WORDS = re.compile(r"\s*(?:N\s*[0-9]+\s*)?(?:M\s*0*([0-9]+)|T\s*([0-9]+))")
 _MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # of RS-274: the other words of the line stay words
+_HOME = re.compile(r"\s*(?:N\s*[0-9]+\s*)?G\s*0*28(?![0-9.])")
+_FLAG = re.compile(r"[A-Z](?!\s*[-+.0-9])")  # of G28: slicers name axes, and what is left out, without a number
 _LONGEST = 1000  # characters of a line that is not a comment alone
 
 
@@ -73,6 +75,8 @@ def _words(line: str, name: str, number: int) -> tuple[tuple[str, float, str], .
         return (word, ("S", _number(speed[1]), "S")) if speed else (word,)
     if len(line) > _LONGEST:
         raise wrong(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
+    if _HOME.match(line) is not None:
+        line = _FLAG.sub(" ", line)
     packed = "".join(line.split())
     if packed.startswith("/"):
         raise wrong(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")

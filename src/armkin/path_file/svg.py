@@ -9,7 +9,17 @@ from xml.parsers import expat
 from armkin.errors import PathFileError
 from armkin.path_file.drawing import LARGEST, Pen, Placing, Wishes
 from armkin.path_file.model import MOST_POINTS, PathFile
-from armkin.path_file.svg_shapes import Matrix, Point, ShapeError, length, numbers, outlines, times, transform
+from armkin.path_file.svg_shapes import (
+    Matrix,
+    Point,
+    ShapeError,
+    above_zero,
+    length,
+    numbers,
+    outlines,
+    times,
+    transform,
+)
 
 _MM = 25.4 / 96  # of a px
 _SHAPES = {"path", "line", "polyline", "polygon", "rect", "circle", "ellipse"}
@@ -60,9 +70,11 @@ def _tree(raw: bytes, name: str) -> _Element:
     parser = expat.ParserCreate()
     top = _Element("", {}, 0)
     stack = [top]
+    text = raw.lstrip()
+    skipped = raw[: len(raw) - len(text)].count(b"\n")
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
-        made = _Element(tag.rpartition(":")[2], attributes, parser.CurrentLineNumber)
+        made = _Element(tag.rpartition(":")[2], attributes, skipped + parser.CurrentLineNumber)
         if tag.partition(":")[0] in ("sodipodi", "inkscape"):
             made.tag = "metadata"
         stack[-1].children.append(made)
@@ -74,13 +86,20 @@ def _tree(raw: bytes, name: str) -> _Element:
         stack.pop()
 
     def entity(*_: object) -> None:
-        raise PathFileError(f"{name}:{parser.CurrentLineNumber}: has entities, which are not read", file=name)
+        line = skipped + parser.CurrentLineNumber
+        raise PathFileError(f"{name}:{line}: has entities, which are not read", file=name, line=line)
 
     parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
     try:
-        parser.Parse(raw.lstrip(), True)
-    except (expat.ExpatError, LookupError, ValueError) as error:
-        raise PathFileError(f"{name}: is not XML: {error}", file=name) from None
+        parser.Parse(text, True)
+    except PathFileError:
+        raise
+    except expat.ExpatError as error:
+        line = skipped + error.lineno
+        why = expat.ErrorString(error.code)
+        raise PathFileError(f"{name}:{line}: is not XML: {why}", file=name, line=line) from None
+    except (LookupError, ValueError) as error:
+        raise PathFileError(f"{name}:1: is not XML: {error}", file=name, line=1) from None
     return top.children[0]
 
 
@@ -92,8 +111,10 @@ def _all(element: _Element) -> Iterator[_Element]:
 
 def _frame(root: _Element) -> Matrix:
     """From the drawing's coordinates to millimetres, x right and y up from the viewBox's lower left corner."""
-    sizes = [root.attributes.get(key) for key in ("width", "height")]
-    size = [None if text is None or text.strip().endswith("%") else length(text) for text in sizes]
+    said = {key: text for key, text in root.attributes.items() if not text.strip().endswith("%")}
+    size = above_zero(said, "width", "height")
+    if 0.0 in size:
+        raise ShapeError("width and height are above 0, or left out")
     box = numbers(root.attributes.get("viewBox", ""))
     if box and (len(box) != 4 or box[2] <= 0 or box[3] <= 0):
         raise ShapeError("viewBox needs x y width height, the last two above 0")

@@ -12,6 +12,9 @@ CLOSE = 0.002  # [mm] of a chord to its curve
 _TURN = math.radians(8.0)  # of a curve from chord to chord, at most
 _MOST = 20_000  # chords of one curve
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GAP = re.compile(r"[ \t\r\n]*,?[ \t\r\n]*")
+_LARGEST = 1e9  # of a number
+_NO_RADIUS = 1e-9  # an arc with less is a line
 _COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "pt": 4 / 3, "pc": 16.0, "q": 96 / 101.6}
 _TRANSFORM = re.compile(r"\s*,?\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
@@ -29,7 +32,24 @@ def length(text: str | None, default: float = 0.0) -> float:
     unit = text.strip()[found.end() :].strip().lower() if found else ""
     if found is None or unit not in _UNITS:
         raise ShapeError(f"'{text[:20]}' is no length: a number, or one with {', '.join(u for u in _UNITS if u)}")
-    return float(found[0]) * _UNITS[unit]
+    return _bounded(float(found[0])) * _UNITS[unit]
+
+
+def above_zero(attributes: Mapping[str, str], *keys: str) -> list[float | None]:
+    """Sizes of an element [px], which are not below 0; None where one is not there."""
+    out: list[float | None] = []
+    for key in keys:
+        text = attributes.get(key)
+        out.append(None if text is None else length(text))
+        if (out[-1] or 0.0) < 0:
+            raise ShapeError(f"{key} {text} is below 0")
+    return out
+
+
+def _bounded(value: float) -> float:
+    if not abs(value) <= _LARGEST:
+        raise ShapeError(f"the number {value:g} is larger than {_LARGEST:g}")
+    return value
 
 
 def numbers(text: str) -> list[float]:
@@ -37,7 +57,7 @@ def numbers(text: str) -> list[float]:
     found = _NUMBER.findall(text)
     if _NUMBER.sub("", text).strip(" ,\t\r\n"):
         raise ShapeError(f"'{text.strip()[:20]}' has what is no number")
-    return [float(x) for x in found]
+    return [_bounded(float(x)) for x in found]
 
 
 def times(m: Matrix, n: Matrix) -> Matrix:
@@ -98,23 +118,25 @@ def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Po
         if tag == "polygon" and values:
             pen.close()
     elif tag in ("circle", "ellipse"):
-        rx = size("r") if tag == "circle" else length(attributes.get("rx", attributes.get("ry")))
-        ry = size("r") if tag == "circle" else length(attributes.get("ry", attributes.get("rx")))
+        one, other = above_zero(attributes, *(("r", "r") if tag == "circle" else ("rx", "ry")))
+        rx, ry = (other if one is None else one) or 0.0, (one if other is None else other) or 0.0
         if rx > 0 and ry > 0:
             x, y = size("cx"), size("cy")
             pen.move((x + rx, y))
             pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
             pen.close()
     elif tag == "rect":
-        _rectangle(pen, size("x"), size("y"), size("width"), size("height"), attributes)
+        _rectangle(pen, size("x"), size("y"), attributes)
     return [stroke for stroke in pen.strokes if len(stroke) > 1]
 
 
-def _rectangle(pen: _Outline, x: float, y: float, w: float, h: float, attributes: Mapping[str, str]) -> None:
-    if w <= 0 or h <= 0:
+def _rectangle(pen: _Outline, x: float, y: float, attributes: Mapping[str, str]) -> None:
+    wide, high, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
+    w, h = wide or 0.0, high or 0.0
+    if w == 0 or h == 0:
         return
-    rx = min(length(attributes.get("rx", attributes.get("ry"))), w / 2)
-    ry = min(length(attributes.get("ry", attributes.get("rx"))), h / 2)
+    rx = min((round_y if round_x is None else round_x) or 0.0, w / 2)
+    ry = min((round_x if round_y is None else round_y) or 0.0, h / 2)
     pen.move((x + rx, y))
     corners = ((x + w - rx, y + ry, -90), (x + w - rx, y + h - ry, 0), (x + rx, y + h - ry, 90), (x + rx, y + ry, 180))
     for cx, cy, begin in corners:
@@ -196,8 +218,7 @@ def _path(pen: _Outline, d: str) -> None:
     command, at, size = "", 0, len(d)
     bent: tuple[str, Point] | None = None  # the curve before, and its last control point
     while True:
-        while at < size and d[at] in " ,\t\r\n":
-            at += 1
+        at = _gap(d, at)
         if at >= size:
             return
         if d[at].isalpha():
@@ -217,11 +238,16 @@ def _path(pen: _Outline, d: str) -> None:
             command = "L" if command == "M" else "l"
 
 
+def _gap(d: str, at: int) -> int:
+    """Behind the space, and one comma, that may stand between numbers."""
+    found = _GAP.match(d, at)
+    return at if found is None else found.end()
+
+
 def _values(d: str, at: int, command: str) -> tuple[list[float], int]:
     out: list[float] = []
     for k in range(_COMMANDS[command.upper()]):
-        while at < len(d) and d[at] in " ,\t\r\n":
-            at += 1
+        at = _gap(d, at)
         if command in "Aa" and k in (3, 4):  # flags need no space between them
             if d[at : at + 1] not in ("0", "1"):
                 raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[at : at + 6]}'")
@@ -233,7 +259,7 @@ def _values(d: str, at: int, command: str) -> tuple[list[float], int]:
             raise ShapeError(
                 f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[at : at + 12]}'"
             )
-        out.append(float(found[0]))
+        out.append(_bounded(float(found[0])))
         at = found.end()
     return out, at
 
@@ -275,7 +301,7 @@ def _arc(pen: _Outline, v: list[float]) -> None:
     rx, ry, turned, large, sweep = abs(v[0]), abs(v[1]), math.radians(v[2]), v[3] == 1, v[4] == 1
     if (x1, y1) == (x2, y2):
         return
-    if rx == 0 or ry == 0:
+    if min(rx, ry) < _NO_RADIUS:
         pen.line((x2, y2))
         return
     cos, sin = math.cos(turned), math.sin(turned)

@@ -8,32 +8,40 @@ import numpy as np
 
 from armkin.forward import position
 from armkin.model import units
-from armkin.plot.canvas import picture, space, true_proportions
+from armkin.motion.branch_report import closeness
+from armkin.motion.shown import times
+from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.motion.path_plan import PathPlan
 
-_SAMPLES = 600
+_SAMPLES = 600  # of what is drawn over time
+_MOST = 20_000  # points of the tool's way
+_FINE = 1 / 3000  # of what is seen: nearer the tool's way is drawn
+_SMALL = 1 / 3  # of what is seen: a smaller way is drawn once more, large
 _WIDE = 84  # characters of a line above the arm
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
 _SINGULAR = "#c0392b"
+_INK = "#333333"
 
 
 def plot_path(plan: PathPlan, out: str) -> None:
-    """Draw a plan into a .png or .svg file: in space, and over time."""
+    """Draw a plan into a .png or .svg file: in space, and over time; of any number of points bounded many."""
     t = np.linspace(0.0, plan.duration, _SAMPLES)
     q = plan.q(t)
     with picture(out, 11.5, 7.2) as figure:
         figure.text(0.03, 0.975, _title(plan), fontsize=11, va="top")
         figure.text(0.03, 0.94, _names(plan), fontsize=9, va="top")
+        figure.text(0.03, 0.915, closeness(plan), fontsize=9, va="top")
         _in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
         _joints(plan, rows[0], t, q)
-        _shares(plan, rows[1], t, np.abs(plan.qd(t)) / plan.arm.max_speed, "speed / max")
-        _shares(plan, rows[2], t, np.abs(plan.qdd(t)) / plan.arm.max_accel, "accel. / max")
-        _tool(rows[3], t, position(plan.arm, q))
+        fine = _fine(plan, t)
+        _shares(plan, rows[1], t, _most(t, fine, np.abs(plan.qd(fine)) / plan.arm.max_speed), "speed / max")
+        _shares(plan, rows[2], t, _most(t, fine, np.abs(plan.qdd(fine)) / plan.arm.max_accel), "accel. / max")
+        _tool(rows[3], t, fine, position(plan.arm, plan.q(fine)))
         for axes in rows[:-1]:
             axes.set_xticklabels([])
         rows[-1].set_xlabel("time / s", labelpad=2, fontsize=8)
@@ -45,8 +53,22 @@ def plot_path(plan: PathPlan, out: str) -> None:
                 axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
 
 
+def _fine(plan: PathPlan, t: Array) -> Array:
+    """Times, more of them where the picture's are far apart beside the motion's own changes."""
+    parts = int(np.clip(plan.duration / 0.02 / len(t), 1, _MOST // len(t)))
+    return np.linspace(0.0, plan.duration, (len(t) - 1) * parts + 1)
+
+
+def _most(t: Array, fine: Array, values: Array) -> Array:
+    """The greatest of what falls about each of the times t (T,): (F, n) -> (T, n)."""
+    out = np.zeros((len(t), values.shape[1]))
+    np.maximum.at(out, np.rint(fine / max(t[-1], 1e-300) * (len(t) - 1)).astype(int), values)
+    return out
+
+
 def _title(plan: PathPlan) -> str:
-    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s"
+    before = "" if plan.approach is None else f", {plan.approach.duration:.2f} s to its start before"
+    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s{before}"
 
 
 def _names(plan: PathPlan) -> str:
@@ -82,21 +104,64 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     label = f"{len(others)} other branch{'es' * many} that {'carry' if many else 'carries'} all, at the path's start"
     poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(others)), *poses]
     bones = [(name, skeleton(arm, pose), *look) for name, pose, *look in poses]
-    tips = position(arm, q)
-    points = np.concatenate([tips, arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
+    points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
-    axes = space(figure, (0.0, 0.03, 0.53, 0.78), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
+    size = float((points.max(axis=0) - points.min(axis=0)).max())
+    way, when = _way(plan, _FINE * size)
+    small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(when) else size
+    large = small >= _SMALL * size
+    low, high = (0.03, 0.76) if large else (0.37, 0.44)
+    axes = space(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for name, bone, colour, width, dashes in bones:
         axes.plot(*bone.path.T, color=colour, linewidth=width, linestyle=dashes, label=name, solid_capstyle="round")
         axes.plot(*bone.joints.T, color=colour, marker="o", markersize=4, linestyle="none")
-    axes.plot(*tips.T, color="#333333", linewidth=1.2, label="tool")
+    if not large:
+        way, when = _way(plan, _FINE * small)
+        _from_near(plan, figure, way, when)
+    axes.plot(*(way if len(when) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
     for one in plan.reconfigurations:
-        near = int(np.argmin(np.abs(plan.s(np.linspace(0.0, plan.duration, len(q))) - one.s)))
-        axes.plot(*tips[near : near + 1].T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
+        at = position(arm, plan.q(_time_of(plan, one.s))[None])
+        axes.plot(*at.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
     axes.legend(
-        loc="upper left", bbox_to_anchor=(0.03, 0.92), bbox_transform=figure.transFigure, fontsize=8, frameon=False
+        loc="upper left", bbox_to_anchor=(0.03, 0.90), bbox_transform=figure.transFigure, fontsize=8, frameon=False
     )
     true_proportions(axes, points, float(arm.base[2, 3]))
+
+
+def _way(plan: PathPlan, close: float) -> tuple[Array, Array]:
+    """The tool's way, its parts behind each other with a gap (nan) between: (N, 3) [mm]; and when: (N,) [s]."""
+    begins = plan.motion.begins
+    t, _ = times(plan.arm, plan, begins.tolist(), close, _MOST)
+    which = np.clip(np.searchsorted(begins, t, side="right") - 1, 0, len(begins) - 2)
+    ends = np.isin(t, begins) & np.isin(which - 1, list(plan.on_path))  # a part's last time is the next one's first
+    on = np.isin(which, list(plan.on_path))
+    p = position(plan.arm, plan.q(t))
+    p[~(on | ends)] = np.nan
+    keep = ~np.isnan(p[:, 0]) | np.append(False, ~np.isnan(p[:-1, 0]))
+    return p[keep], t[keep]
+
+
+def _time_of(plan: PathPlan, s: float) -> float:
+    """When the tool is at a length of its way [s]."""
+    low, high = 0.0, plan.duration
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (middle, high) if float(plan.s(np.array([middle]))[0]) < s else (low, middle)
+    return high
+
+
+def _from_near(plan: PathPlan, figure: Any, way: Array, when: Array) -> None:
+    """A way that is small beside the arm, seen along the axis in which it is thinnest."""
+    size = np.nanmax(way, axis=0) - np.nanmin(way, axis=0)
+    i, j = sorted(np.argsort(size)[1:].tolist())
+    axes = flat(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
+    axes.plot(way[:, i], way[:, j], color=_INK, linewidth=0.6, label="the tool's way")
+    if plan.rounded_most is not None:
+        worst = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
+        axes.plot(worst[i], worst[j], color=_SINGULAR, marker="+", markersize=9, linestyle="none",
+                  label="farthest from its point")  # fmt: skip
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=2, fontsize=8, borderpad=0.1)
+    axes.tick_params(labelsize=7.5)
 
 
 def _others(plan: PathPlan) -> list[Array]:
@@ -131,8 +196,8 @@ def _shares(plan: PathPlan, axes: Any, t: Array, share: Array, label: str) -> No
     axes.set_ylabel(label, fontsize=8)
 
 
-def _tool(axes: Any, t: Array, tips: Array) -> None:
-    speed = np.linalg.norm(np.gradient(tips, t, axis=0), axis=1)
-    axes.plot(t, speed, color="#333333", linewidth=1.0)
+def _tool(axes: Any, t: Array, fine: Array, tips: Array) -> None:
+    speed = np.linalg.norm(np.gradient(tips, fine, axis=0), axis=1)
+    axes.plot(t, _most(t, fine, speed[:, None])[:, 0], color=_INK, linewidth=1.0)
     axes.set_ylim(0.0, 1.1 * float(speed.max()) or 1.0)
     axes.set_ylabel("tool / mm/s", fontsize=8)

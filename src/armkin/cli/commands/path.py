@@ -164,6 +164,7 @@ def sent(
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
+    arm = board_link.planned(arm)
     if start is not None:
         options["start"] = board_link.standing(arm, start, "--from")
     plan = _planned(arm, moves, {}, options, json=json)
@@ -337,6 +338,8 @@ def _print(plan: PathPlan, found: dict[str, Any], *, json: bool, out: str | None
 
 def _text(plan: PathPlan, found: dict[str, Any]) -> str:
     """The plan for people."""
+    from armkin.motion.branch_report import closeness, words
+
     arm = plan.arm
     lines = [f"{arm.name}: {found['length_mm']:.3f} mm of path"]
     if found["duration_s"] is not None:
@@ -352,8 +355,6 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         )
         lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
     for one in plan.reconfigurations:
-        from armkin.motion.branch_report import words
-
         line = f"  at {one.s:.3f} mm: {words(arm, one)}"
         if line not in lines:  # several branches end there for one reason
             lines.append(line)
@@ -375,7 +376,7 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
         if worst is not None:
             size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
             lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
-        lines.append(_deviation_text(plan))
+        lines.append(closeness(plan))
         if plan.turned is not None:
             lines.append(f"the tool is turned by at most {found['turned_deg']:.2g} deg past a wrist singularity")
         if plan.reduced.count:
@@ -385,13 +386,3 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
                 f"the smallest from {wished:g} to {became:.4g} mm"
             )
     return "\n".join(lines) + "\n"
-
-
-def _deviation_text(plan: PathPlan) -> str:
-    """How far the motion leaves the path, or the points that it was fitted to."""
-    if plan.rounded_most is None:
-        return f"at most {plan.deviation:.4f} mm from the path; {plan.tolerance:g} allowed"
-    return (
-        f"points within {plan.deviation:.4f} mm of the motion, the farthest at {plan.rounded_most:.3f} mm; "
-        f"{plan.tolerance:g} allowed"
-    )

@@ -1,0 +1,59 @@
+"""Where a plan is looked at so that what is drawn between these times lies near the motion, however many there are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.forward import position
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
+    from armkin.model.arm import Arm
+    from armkin.motion.path_plan import PathPlan
+
+_FIRST = 0.5  # [s] between two of the first samples, at most
+_INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
+
+
+def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
+    """Times [s] between which the tip drawn is off by `close` [mm] at most, or by what `most` of them leave; how much.
+
+    Drawn: joints that go evenly between two times, and the tip's way as its chord. begins: times that are among them.
+    """
+    count = int(min(most / 4, plan.duration / _FIRST)) + 2
+    t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
+    a, b = t[:-1], t[1:]  # intervals that are still to be looked at
+    done = [t]
+    worst = 0.0
+    total = len(t)
+    while len(a):
+        off = _off(arm, plan, a, b)
+        bad = (off > close) & (b - a > 1e-3)
+        worst = max(worst, float(off[~bad].max(initial=0.0)))
+        if total + bad.sum() > most:
+            worst = max(worst, float(off.max()))
+            break
+        middle = (a[bad] + b[bad]) / 2
+        done.append(middle)
+        total += len(middle)
+        a, b = np.concatenate([a[bad], middle]), np.concatenate([middle, b[bad]])
+    return np.unique(np.concatenate(done)), worst
+
+
+def _off(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
+    """How far the tip drawn is from the tip [mm], the most seen between the times a and b: (k,)."""
+    first, last = plan.q(a), plan.q(b)
+    tips = [position(arm, first), position(arm, last)]
+    off = np.zeros(len(a))
+    for share in _INSIDE:
+        there = position(arm, plan.q(a + share * (b - a)))
+        arms = position(arm, first + share * (last - first))
+        off = np.maximum(off, np.linalg.norm(arms - there, axis=1))
+        # The way that is drawn: the distance to the chord.
+        way = tips[1] - tips[0]
+        long = np.maximum((way * way).sum(axis=1, keepdims=True), 1e-12)
+        along = np.clip(((there - tips[0]) * way).sum(axis=1, keepdims=True) / long, 0.0, 1.0)
+        off = np.maximum(off, np.linalg.norm(there - tips[0] - along * way, axis=1))
+    return np.asarray(off)
