@@ -15,7 +15,7 @@ branch_path.py      the branch that is taken: joint values along the route
 grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
 scan.py             passes along it; hold_cap.py: how fast it may be for a hold on it
-path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: with joints held
+path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: joints held; shown.py: as drawn
 jog_line.py         the line of one axis that a held button moves the tip along
 
 The way of waypoints:
