@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -28,6 +28,7 @@ SMALL = 1e-9  # [mm] shorter pieces are no pieces
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
 _TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
 _TABLES = 20_000  # of all spans
+_EVEN = 1e-9  # of a slope: less change is none
 
 
 def turn(w: Array) -> Array:
@@ -302,7 +303,7 @@ def unit_speed(
     Returns also the function from parameters to lengths.
     """
     scale = weights(task)
-    grid = np.append(_places(u, _intervals(len(u) - 1)), u[-1])
+    grid = np.append(_places(u, np.where(_even(at, u, scale), 1, _intervals(len(u) - 1))), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
@@ -321,14 +322,25 @@ def unit_speed(
     return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 
 
+def _even(at: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.bool_]:
+    """Which spans between the values u are straight, and passed evenly: their table of lengths is one interval."""
+    f = np.arange(5) / 4
+    v = u[:-1, None] + np.diff(u)[:, None] * f
+    slopes = (at(v.ravel())[1] * scale).reshape(*v.shape, -1)
+    apart = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2))
+    return np.asarray(apart <= _EVEN * np.abs(slopes).max(axis=(1, 2)))
+
+
 def _intervals(spans: int) -> int:
     """Of the table of lengths, for each of so many spans."""
     return int(np.clip(_TABLES // max(spans, 1), _LEAST_TABLE, _TABLE))
 
 
-def _places(u: Array, parts: int) -> Array:
-    """Every span between the values u in equal parts, without the last value."""
-    return np.asarray((u[:-1, None] + np.diff(u)[:, None] * (np.arange(parts) / parts)).ravel())
+def _places(u: Array, parts: NDArray[np.intp] | int) -> Array:
+    """Every span between the values u in so many equal parts, without the last value."""
+    count = np.broadcast_to(parts, len(u) - 1)
+    inside = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
+    return np.asarray(np.repeat(u[:-1], count) + np.repeat(np.diff(u), count) * (inside / np.repeat(count, count)))
 
 
 def relative(task: Task, a: Spot, b: Spot) -> Array:

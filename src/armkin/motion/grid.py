@@ -24,6 +24,7 @@ _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
 _DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
@@ -147,7 +148,7 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
         step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
         size = np.abs(step).max(axis=1, keepdims=True)
         q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * radian_or_reach(arm)
-        if size.max() < 1e-12:
+        if size.max(initial=0.0) < _SETTLED:
             break
     return np.asarray(q)
 
