@@ -138,7 +138,7 @@ class _Answers:
         reached, single, legal, there = (self._summed(values, orientations, M) for values in each)
         total = orientations * self.count
         with np.errstate(divide="ignore", invalid="ignore"):
-            mean = np.where(reached > 0, legal / reached, 0.0)
+            mean = legal / reached  # nan where none is reached: a mean of nothing
         columns = {"share": reached / total, "share_any": there / total, "branches": mean, "single": single / total}
         if self.question.measures:
             columns |= self._measures(orientations, M)

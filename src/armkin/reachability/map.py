@@ -46,7 +46,8 @@ class Reach:
 
     x_mm, y_mm, z_mm: the cell's centre in the frame of targets. share, share_any: of its orientations, reached within
     limits, and limits and keep-outs apart. branches: legal ones, mean over reached orientations. single: share that
-    exactly one legal branch reaches. manipulability, limit_margin: best, step_error_mm: least over all legal answers.
+    exactly one legal branch reaches. manipulability (of the tip, as `workspace` measures it), limit_margin: best,
+    step_error_mm: least over all legal answers. nan where no orientation is reached, or nothing is to be measured.
     """
 
     grid: Grid
