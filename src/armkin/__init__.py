@@ -12,7 +12,7 @@ numpy and the rest are imported with the first name that needs them.
 from importlib import import_module as _import_module
 
 TYPE_CHECKING = False  # type checkers know better; importing typing would double the time of this import
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 if TYPE_CHECKING:
     from armkin.calibration.procedure import calibrate as calibrate

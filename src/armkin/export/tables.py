@@ -1,7 +1,7 @@
 """An arm in another convention: screws, or a Denavit-Hartenberg table, standard or modified.
 
 All are robot files again: limits, drives, tool and the meaning of targets stay. Screws exist for every arm; a DH
-table exists unless two axes are a hair from parallel, where their common normal runs away.
+table exists unless two axes are parallel but for rounding, where the foot of their common normal is undetermined.
 """
 
 from __future__ import annotations

@@ -275,7 +275,7 @@ class _Linking:
         q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
         singular = np.flatnonzero(found.status == Status.SINGULAR)
         if len(singular):
-            # Exactly on a singularity some joints are free: a hair beside it they are not.
+            # Exactly on a singularity some joints are free: 1e-7 of the path's length beside it they are determined.
             aside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
             aside = np.where(aside == s[singular], s[singular] - 1e-7 * self.length, aside)
             beside = ik(self.arm, self.targets(aside), self.task, near=self.near)

@@ -50,7 +50,7 @@ ROBOT_FILE = Kind("robot file", "name, convention and joints", "name, convention
 
 _LOADER: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
-# YAML 1.1's own patterns, from PyYAML's resolver.py, and what people write that misses them by a hair.
+# YAML 1.1's own patterns, from PyYAML's resolver.py, and what people write that all but matches them.
 # Plain text, compiled by `re` when first needed: most files need the first two only.
 _INT = r"[-+]?(?:0|[1-9][0-9]*)"
 _FLOAT = r"[-+]?(?:0|[1-9][0-9]*)\.[0-9]*(?:[eE][-+][0-9]+)?|\.[0-9]+(?:[eE][-+][0-9]+)?"

@@ -1,4 +1,4 @@
-"""A motion that was held on its way, gone on with: what is noted of it, where it stands on its plan, what is left.
+"""Resuming a motion after a feed hold: its note, where it stands on its plan, what is left of it.
 
 The plan is made anew from the same start. The note, a small file beside the port's lock, says which plan that was:
 the robot file's digest, the counts where it began, a digest of the plan; and where the arm came to rest.

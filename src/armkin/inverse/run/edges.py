@@ -1,4 +1,4 @@
-"""Targets that a solver doubts: decided all at once where that will do, else posture by posture."""
+"""Targets with a nearly singular candidate: regular ones are accepted in bulk, the others analysed one by one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Circuits: the connected pieces of a self-motion of three joints or more.
+"""Circuits: connected components of a one-dimensional self-motion manifold of three joints or more.
 
 Two postures with the same values of the joints that a self-motion holds need not lie on one curve: a linkage of four
 bars has two circuits, the elbow up and down, where its shortest bar can go all the way round (Grashof's condition).

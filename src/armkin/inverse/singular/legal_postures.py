@@ -1,4 +1,4 @@
-"""Edges within limits: a self-motion, or a root known to rounding, that has legal postures is listed by one of these.
+"""For a self-motion manifold that leaves the joint limits: a configuration on it that is within them.
 
 A self-motion is listed by its posture closest to `near`, which may be outside limits where others of it are not; a
 double root at a limit is off it by as much as arithmetic can tell its halves apart.

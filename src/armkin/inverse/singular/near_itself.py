@@ -1,4 +1,4 @@
-"""`near` itself: where it is within limits and solves its target, it is a branch, and the best one.
+"""If `near` already solves the target within limits, it is returned unchanged, as the best branch.
 
 The exact answer to a rounded target may be 1e-9 over the smallest singular value away from the posture that the target
 was made from. Both solve it: the arm that stands there stays.

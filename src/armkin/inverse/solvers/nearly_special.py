@@ -188,7 +188,7 @@ def _solve(
 ) -> tuple[Array, Bool]:
     """Branches (N, B, n) and doubts (N,) of some targets; the similar arm's branches keep their places."""
     source = recorded(arm, task, alike)
-    off_here = off * np.maximum(1.0, distance(arm, task, target))  # far out on a slide it tells more
+    off_here = off * np.maximum(1.0, distance(arm, task, target))  # the error grows with the slide's extension
     found = _correct(arm, task, source, off, off_here, target)
     q = np.where(found.good[:, :, None], found.q, np.nan)
     few = np.flatnonzero(found.doubt)
