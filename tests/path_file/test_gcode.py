@@ -106,8 +106,27 @@ def test_what_is_ignored_is_noted_once_a_word() -> None:
     text = "M104 S200\nM104 S210\nT0\nG0 X1 E2\nG1 X2\nG10\nG11\nG40 G49 G61 G80 G94\nG64 P0.1\nG91.1\nG29 P1 X2"
     notes = gcode.parse(text.encode(), "t", AS_IT_IS, Wishes()).notes
     words = [note.split()[0] for note in notes]
-    assert words == ["M104", "T", "E", "G10", "G11", "G40", "G49", "G61", "G80", "G94", "G64", "G91.1", "G29"]
+    assert words == ["M104", "S", "T", "E", "G10", "G11", "G40", "G49", "G61", "G80", "G94", "G64", "G91.1", "G29"]
     assert notes[0] == "M104 is ignored (line 1, and 1 more)"
+
+
+def test_s_is_noted_where_nothing_takes_it() -> None:
+    def words(text: str, grip_by: str | None = None) -> list[str]:
+        notes = gcode.parse(f"{text}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, Wishes(grip_by=grip_by)).notes
+        return [note.split()[0] for note in notes]
+
+    assert words("S100") == ["S"]
+    assert words("M3 S100", "M3") == ["S"]
+    assert words("M106 S100", "M106") == words("G4 S1") == []
+    assert words("M106 S100") == ["M106", "S"]
+
+
+def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
+    one, other = (
+        gcode.parse(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, Wishes()) for word in ("\nG80", "")
+    )
+    assert one.moves == other.moves
+    assert gcode.parse(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, Wishes()).notes == ("G80 is ignored (line 1)",)
 
 
 def test_home_takes_the_flags_that_slicers_give_it() -> None:

@@ -22,7 +22,7 @@ _SYSTEMS = {54.0: 1, 55.0: 2, 56.0: 3, 57.0: 4, 58.0: 5, 59.0: 6}
 _IGNORED_G = {11.0: "G11", 29.0: "G29", 40.0: "G40", 49.0: "G49", 61.0: "G61", 64.0: "G64", 80.0: "G80",
               91.1: "G91.1", 94.0: "G94"}  # fmt: skip
 _GROUPS: dict[str, tuple[float, ...]] = {
-    "motion": (0.0, 1.0, 2.0, 3.0, 80.0),
+    "motion": (0.0, 1.0, 2.0, 3.0),
     "plane": (17.0, 18.0, 19.0),
     "units": (20.0, 21.0),
     "distance": (90.0, 91.0),
@@ -89,6 +89,9 @@ class _Program:
             if code not in (0.0, 1.0, 2.0, 30.0):
                 self._switch(code, gripped)
         values.pop("S", None)
+        waits = 4.0 in codes and "P" not in values
+        if gripped is not None and not waits and not (self.wishes.grip_by == "M106" and 106.0 in m_codes):
+            self._ignore("S")
         if 4.0 in codes:
             self._dwell(values, gripped)
         self._modes(codes)
@@ -171,8 +174,6 @@ class _Program:
                 self.absolute = code == 90.0
             elif code in _SYSTEMS:
                 self.system = _SYSTEMS[code]
-            elif code == 80.0:
-                self.motion = None
             elif code in _MOTION:
                 self.motion = code
 
