@@ -2,7 +2,7 @@ import js from "@eslint/js";
 
 const browser = [
   "Blob", "CustomEvent", "Event", "EventSource", "HTMLElement", "HTMLInputElement", "HTMLSelectElement", "ResizeObserver",
-  "URL", "URLSearchParams", "addEventListener", "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "history", "location", "matchMedia", "navigator", "performance",
+  "URL", "URLSearchParams", "atob", "addEventListener", "clearInterval", "clearTimeout", "console", "devicePixelRatio", "document", "fetch", "history", "location", "matchMedia", "navigator", "performance",
   "requestAnimationFrame", "setInterval", "setTimeout", "window",
 ];
 

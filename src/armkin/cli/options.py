@@ -35,6 +35,10 @@ Scene = Annotated[
     str | None,
     typer.Option("--scene", metavar="FILE", help="Keep-outs in a file of their own, added to the robot's."),
 ]
+Meshes = Annotated[
+    str | None,
+    typer.Option("--meshes", metavar="URDF", help="Draw the meshes (STL, DAE) of this URDF's visual elements."),
+]
 Tool = Annotated[
     str | None,
     typer.Option("--tool", metavar="X,Y,Z[,R,P,Y]", help="After the last joint, in place of the robot file's tool."),

@@ -14,6 +14,7 @@ import math
 import os
 import re
 import sys
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,7 +119,7 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
     names = _names([joint.name for joint in chain if joint.kind != "fixed"], notes)
     for joint in chain:
         where = f"{path}: joint {joint.name}"
-        T = T @ _origin(joint, where, snap)
+        T = T @ origin(joint, where, snap)
         if joint.kind == "fixed":
             continue
         if joint.kind not in _MOVING:
@@ -130,7 +131,7 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
                 f"{where}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
                 "choose another tip"
             )
-        direction = T[:3, :3] @ _axis(joint, where, snap)
+        direction = T[:3, :3] @ axis(joint, where, snap)
         joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
         if np.abs(T[:3, 3]).max() > FARTHEST:
             raise RobotFileError(f"{where}: stands more than 10 km from {base}; a URDF is in metres")
@@ -208,10 +209,15 @@ def _names(joints: list[str], notes: list[str]) -> dict[str, str]:
     return taken
 
 
-def _origin(joint: Joint, where: str, snap: bool) -> Matrix:
+def origin(joint: Joint, where: str, snap: bool = False) -> Matrix:
     """Where the joint stands in its parent link [m]."""
-    xyz = _triple(joint.text("origin", "xyz"), (0.0, 0.0, 0.0), f"{where}: origin xyz")
-    rpy = _triple(joint.text("origin", "rpy"), (0.0, 0.0, 0.0), f"{where}: origin rpy")
+    return placed(joint.parts.get("origin", {}), where, snap)
+
+
+def placed(attributes: Mapping[str, str], where: str, snap: bool = False) -> Matrix:
+    """The pose that an <origin> says [m]."""
+    xyz = triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{where}: origin xyz")
+    rpy = triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{where}: origin rpy")
     if max(map(abs, xyz)) > FARTHEST:
         raise RobotFileError(f"{where}: origin xyz is more than 10 km; a URDF is in metres")
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
@@ -232,17 +238,17 @@ def _cos_sin(angle: float, snap: bool) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def _axis(joint: Joint, where: str, snap: bool) -> Matrix:
+def axis(joint: Joint, where: str, snap: bool = False) -> Matrix:
     """The joint's direction in its own frame, of length 1; by default x, as the format says."""
-    axis = np.array(_triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{where}: axis xyz"))
-    length = float(np.linalg.norm(axis))
+    way = np.array(triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{where}: axis xyz"))
+    length = float(np.linalg.norm(way))
     if not 1e-12 < length < 1e12:
-        raise RobotFileError(f"{where}: axis {' '.join(f'{x:g}' for x in axis)} has no direction")
-    axis = axis / length
-    largest = int(np.argmax(np.abs(axis)))
-    if snap and np.abs(np.delete(axis, largest)).max() <= SNAP:
-        axis = np.eye(3)[largest] * np.sign(axis[largest])
-    return np.asarray(axis)
+        raise RobotFileError(f"{where}: axis {' '.join(f'{x:g}' for x in way)} has no direction")
+    way = way / length
+    largest = int(np.argmax(np.abs(way)))
+    if snap and np.abs(np.delete(way, largest)).max() <= SNAP:
+        way = np.eye(3)[largest] * np.sign(way[largest])
+    return np.asarray(way)
 
 
 def _value(joint: Joint, key: str, where: str) -> float | None:
@@ -250,7 +256,8 @@ def _value(joint: Joint, key: str, where: str) -> float | None:
     return None if text is None else _floats(text, 1, f"{where}: limit {key}")[0]
 
 
-def _triple(text: str | None, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+def triple(text: str | None, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+    """Three numbers of an attribute."""
     return default if text is None else _floats(text, 3, where)
 
 

@@ -11,7 +11,9 @@ MAX_DEPTH = 50
 MAX_LINKS = 2_000
 
 Solids = dict[str, list[tuple[str, dict[str, str]]]]  # link -> what its <collision> elements hold: tag, attributes
+Visuals = dict[str, list[dict[str, dict[str, str]]]]  # link -> of each <visual>: origin and mesh, their attributes
 
+_SEEN = (["link", "visual"], "origin"), (["link", "visual", "geometry"], "mesh")
 _FORMATS = {"sdf": "an SDF file", "mujoco": "a MuJoCo file", "COLLADA": "a mesh", "gazebo": "a Gazebo file"}
 
 
@@ -37,6 +39,7 @@ class _Reader:
         self.joints: dict[str, Joint] = {}
         self.joint: Joint | None = None
         self.solids: Solids = {}
+        self.visuals: Visuals = {}
         self.within: list[str] = []
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
@@ -56,6 +59,10 @@ class _Reader:
             self.joint.parts.setdefault(tag, dict(attributes))
         elif self.within[1:] == ["link", "collision", "geometry"]:
             self.solids[next(reversed(self.links))].append((tag, dict(attributes)))
+        elif self.within[1:] == ["link"] and tag == "visual":
+            self.visuals[next(reversed(self.links))].append({})
+        elif (self.within[1:], tag) in _SEEN:
+            self.visuals[next(reversed(self.links))][-1][tag] = dict(attributes)
         self.within.append(tag)
 
     def _named(self, tag: str, attributes: Mapping[str, str]) -> None:
@@ -69,7 +76,7 @@ class _Reader:
             raise RobotFileError(f"{self.name}: more than {MAX_LINKS} {tag}s")
         if tag == "link":
             self.links[name] = None
-            self.solids[name] = []
+            self.solids[name], self.visuals[name] = [], []
         else:
             self.joint = self.joints[name] = Joint(name, attributes.get("type", ""))
 
@@ -108,7 +115,7 @@ def document(raw: bytes, name: str) -> tuple[str, Tree]:
         if b"xmlns:xacro" in raw[:10_000] or name.endswith(".xacro"):
             raise is_xacro(name) from None
         raise RobotFileError(f"{name}: is not XML: {error}") from None
-    return reader.robot, Tree(name, list(reader.links), list(reader.joints.values()), reader.solids)
+    return reader.robot, Tree(name, list(reader.links), list(reader.joints.values()), reader.solids, reader.visuals)
 
 
 def is_xacro(name: str) -> RobotFileError:
@@ -121,8 +128,8 @@ def is_xacro(name: str) -> RobotFileError:
 class Tree:
     """Which link hangs on which, checked: every link has one parent at most, and there is no circle."""
 
-    def __init__(self, name: str, links: list[str], joints: list[Joint], solids: Solids) -> None:
-        self.name, self.links, self.solids = name, links, solids
+    def __init__(self, name: str, links: list[str], joints: list[Joint], solids: Solids, visuals: Visuals) -> None:
+        self.name, self.links, self.solids, self.visuals = name, links, solids, visuals
         self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
         self.children: dict[str, list[Joint]] = {link: [] for link in links}
         for joint in joints:

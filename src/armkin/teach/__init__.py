@@ -7,6 +7,7 @@ actions.py          every action by its name; program_actions.py: those on the p
 playing.py          a plan as the page plays it, by error
 program.py          moves recorded one after another, in the words of a path file
 scene.py            what the page draws: links, bodies, limits
+meshes.py           what the bodies look like, from a URDF; mesh_files.py: triangles of STL and Collada files
 pose_answers.py     one pose or one target: branches, limits, pulses
 board.py            the actions on the board; board_thread.py: the thread that owns the port
 one_file.py         the page without a server, in one HTML file; local/: what answers in the server's place

@@ -21,9 +21,14 @@ if TYPE_CHECKING:
 class Actions:
     """The actions of one run of `armkin teach`, and what its pages share: the arm, its pose, who holds control."""
 
-    def __init__(self, arm: Arm, port: str | None = None, baud: int | None = None) -> None:
-        """port: of a board, as `armkin send` takes it. Raises UsageError if the robot file says too little for it."""
-        self.arm = arm
+    def __init__(
+        self, arm: Arm, port: str | None = None, baud: int | None = None, meshes: dict[str, Any] | None = None
+    ) -> None:
+        """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.meshes.meshes`.
+
+        Raises UsageError if the robot file says too little for the board.
+        """
+        self.arm, self.meshes = arm, meshes
         self.board: BoardActions | None = None
         self.tabs = Tabs(self._abandoned)
         self._solving = threading.Lock()  # one question at a time: two cores are not many
@@ -85,7 +90,7 @@ class Actions:
         board = None if self.board is None else self.board.thread.state()
         return {
             "tab": tab.id,
-            "scene": scene(self.arm),
+            "scene": scene(self.arm) | {"meshes": self.meshes},
             "look": self._shown,
             "program": self.program_actions.program.state(),
             "board": board,

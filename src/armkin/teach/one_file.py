@@ -23,8 +23,12 @@ _LOCAL = Path(__file__).parent / "local" / "local.js"
 _IMPORT = re.compile(r'((?:from|import)\s*\(?\s*)"([./][^"]+)"')
 
 
-def html(arm: Arm, task_name: str | None = None, plan: PathPlan | None = None) -> str:
+def html(
+    arm: Arm, task_name: str | None = None, plan: PathPlan | None = None, meshes: dict[str, Any] | None = None
+) -> str:
     """The arm in one HTML file: every branch as the pose is dragged; plan: of a path, which the page plays.
+
+    meshes: what the bodies look like, see `armkin.teach.meshes.meshes`.
 
     Raises UsageError if the task does not fit the arm, or if its class has no form in JavaScript.
     """
@@ -32,7 +36,7 @@ def html(arm: Arm, task_name: str | None = None, plan: PathPlan | None = None) -
     modules["js/server.js"] = _LOCAL.read_text(encoding="utf-8").replace('"../static/js/', '"./')
     for path in sorted((_STATIC / "vendor" / "three").glob("*.js")):
         modules[f"vendor/three/{path.name}"] = path.read_text(encoding="utf-8")
-    modules |= {"arm.js": module(arm, task_name), "data.js": _data(arm, task_name, plan)}
+    modules |= {"arm.js": module(arm, task_name), "data.js": _data(arm, task_name, plan, meshes)}
     imports = {f"armkin/{name}": _url(_by_name(_stripped(text), name)) for name, text in modules.items()}
     imports["three"] = imports.pop("armkin/vendor/three/three.module.min.js")
     import_map = re.sub("<(?=[/!]|script)", r"\\u003c", json.dumps({"imports": imports}), flags=re.IGNORECASE)
@@ -79,11 +83,15 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _data(arm: Arm, task_name: str | None, plan: PathPlan | None) -> str:
+def _data(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[str, Any] | None) -> str:
     """What the page must know besides the solver: the scene, words, and a plan."""
     solver = about(arm, task_name)
     drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": solver["held"] or None}
-    values = {"arm": drawn | {"locks": False}, "solver": solver, "plan": None if plan is None else played(arm, plan)}
+    values = {
+        "arm": drawn | {"locks": False, "meshes": meshes},
+        "solver": solver,
+        "plan": None if plan is None else played(arm, plan),
+    }
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Out, Robot, Scene, TaskName
+from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName
 from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def export(
     single: Annotated[bool, typer.Option("--float", help="With --c: 32-bit numbers, for microcontrollers.")] = False,
     task: TaskName = None,
     scene: Scene = None,
+    meshes: Meshes = None,
     out: Out = None,
 ) -> None:
     """The arm in other words: URDF, JSON, C, JavaScript, HTML.
@@ -59,7 +60,7 @@ def export(
         "--json": (json, lambda arm: _json(arm, out)),
         "--c": (c, lambda arm: _c(arm, task, single, out)),
         "--js": (js, lambda arm: _js(arm, task, out)),
-        "--html": (html, lambda arm: _html(arm, task, path, out)),
+        "--html": (html, lambda arm: _html(arm, task, path, meshes, out)),
     }
     asked = [name for name, (wanted, _) in kinds.items() if wanted]
     if len(asked) != 1:
@@ -69,6 +70,8 @@ def export(
         raise UsageError("--float goes with --c alone")
     if path is not None and not html:
         raise UsageError("--path goes with --html alone")
+    if meshes is not None and not html:
+        raise UsageError("--meshes goes with --html alone")
     kinds[asked[0]][1](inputs.load(robot, scene))
 
 
@@ -111,7 +114,8 @@ def _js(arm: Arm, task: str | None, out: str | None) -> None:
         write(text)
 
 
-def _html(arm: Arm, task: str | None, path: str | None, out: str | None) -> None:
+def _html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
+    from armkin.teach.meshes import meshes as read_meshes
     from armkin.teach.one_file import html
 
     plan = None
@@ -123,7 +127,7 @@ def _html(arm: Arm, task: str | None, path: str | None, out: str | None) -> None
         path_file.check_robot(file, arm.name, arm.path)
         plan = planned(arm, file)
     with _without_lock("JavaScript"):
-        text = html(arm, task, plan)
+        text = html(arm, task, plan, None if meshes is None else read_meshes(arm, meshes))
     with output.destination(out) as write:
         write(text)
 

@@ -11,7 +11,7 @@ import typer
 from armkin.cli import keep_outs, output
 from armkin.cli.board_link import SIM, Baud
 from armkin.cli.keep_outs import NoScene
-from armkin.cli.options import Robot, Scene
+from armkin.cli.options import Meshes, Robot, Scene
 
 
 def teach(
@@ -23,6 +23,7 @@ def teach(
     scene: Scene = None,
     no_scene: NoScene = False,
     baud: Baud = None,
+    meshes: Meshes = None,
     open: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
     """A page in the browser: see the arm, choose a branch, send it.
@@ -34,6 +35,7 @@ def teach(
     import threading
 
     from armkin.teach.actions import Actions
+    from armkin.teach.meshes import meshes as read_meshes
     from armkin.teach.server import Server
 
     arm = keep_outs.moving(robot, scene)
@@ -42,7 +44,7 @@ def teach(
 
         check(port)
         keep_outs.check_port(port, arm, no_scene)
-    actions = Actions(arm, port, baud)
+    actions = Actions(arm, port, baud, None if meshes is None else read_meshes(arm, meshes))
     try:
         with Server(actions) as server, ExitStack() as stack:
             with output.destination(None) as write:

@@ -29,6 +29,11 @@ export class Shapes {
     arm.joints.forEach((joint, i) => this.joint(joint, i));
     const tool = this.gripper();
     this.bodies[n].push(...tool);
+    arm.meshes?.bodies.forEach((text, i) => {
+      if (!text) return;
+      this.bodies[i] = [{ geometry: mesh(text, /** @type {any} */ (arm.meshes).unit), drum: false }];
+      if (i) this.rails[i - 1] = null; // a slide's own mesh shows it
+    });
   }
 
   /**
@@ -129,6 +134,15 @@ function along(/** @type {any} */ geometry, /** @type {Vector3} */ middle, /** @
   geometry.applyQuaternion(turn);
   geometry.translate(middle.x, middle.y, middle.z);
   return geometry;
+}
+
+/** A body's triangles: nine whole numbers each, in base64. @param {string} text @param {number} unit [mm] */
+function mesh(text, unit) {
+  const counts = new Int16Array(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(Float32Array.from(counts, (x) => x * unit), 3));
+  geometry.computeVertexNormals(); // no corner is shared: those of the triangles
+  return geometry.setIndex([...new Array(counts.length / 3).keys()]);
 }
 
 /**

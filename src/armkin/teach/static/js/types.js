@@ -8,7 +8,8 @@
  * @typedef {{robot: string, robot_file: string, reach: number, base: number[][],
  *   links: number[][][], bodies: number[][][], joints: Joint[], poses: Object<string, number[]>,
  *   motors: {name: string, unit: string}[]|null, no_motors: string, gripper: Gripper|null,
- *   lock: string|null, locks: boolean, obstacles?: number[], jogs?: string[]}} Arm
+ *   lock: string|null, locks: boolean, obstacles?: number[], jogs?: string[],
+ *   meshes?: {unit: number, bodies: string[]}|null}} Arm
  * @typedef {{name: string, joints: number[], within_limits: boolean, outside: string[], hits?: string, motion: number}} Branch
  * @typedef {{pulses: number[], moves: number[], from: string, error_mm: number, best: boolean,
  *   outside_travel: string[]}} Motors

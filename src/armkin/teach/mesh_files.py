@@ -1,0 +1,143 @@
+"""Files of triangles: STL in both its forms, and the triangles and polygons of a Collada file (.dae).
+
+Collada: https://www.khronos.org/files/collada_spec_1_4.pdf; `up_axis` is left out of account, as RViz does.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.errors import MissingExtraError, UsageError
+from armkin.formula.arrays import Array
+
+MAX_BYTES = 64 * 2**20  # of one file
+_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_DEEPEST = 40  # nodes within nodes
+
+
+def triangles(path: Path) -> Array:
+    """The triangles (N, 3, 3) of a file, in its own units; a Collada file's in metres. Raises UsageError."""
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise UsageError(f"{path}: {size / 2**20:.0f} MB; a mesh may have {MAX_BYTES // 2**20}")
+        raw = path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path}: cannot read the mesh: {error.strerror}") from None
+    try:
+        found = _collada(raw) if path.suffix.lower() == ".dae" else _stl(raw)
+    except (ValueError, LookupError, TypeError, OverflowError) as error:
+        raise UsageError(f"{path}: is no mesh that can be read: {error}") from None
+    if not np.isfinite(found).all():
+        raise UsageError(f"{path}: holds a number that is not finite")
+    return found
+
+
+def _stl(raw: bytes) -> Array:
+    if len(raw) >= 84 and len(raw) == 84 + 50 * int.from_bytes(raw[80:84], "little"):
+        rows = np.frombuffer(raw, np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]), offset=84)
+        return rows["v"].astype(float)
+    if not raw.lstrip().startswith(b"solid"):
+        raise ValueError("neither binary STL of the length that it states, nor text that begins with solid")
+    vertices = np.array([[float(x) for x in row] for row in _VERTEX.findall(raw)])
+    return vertices.reshape(-1, 3, 3)
+
+
+def _collada(raw: bytes) -> Array:
+    try:
+        from defusedxml.ElementTree import fromstring
+    except ImportError:
+        raise MissingExtraError(
+            "reading a Collada file needs defusedxml: pip install defusedxml (armkin's extra: urdf)"
+        ) from None
+    try:
+        root = fromstring(raw, forbid_dtd=True)
+    except SyntaxError as error:  # what ElementTree's ParseError is
+        raise ValueError(f"no XML: {error}") from None
+    for element in root.iter():
+        element.tag = str(element.tag).rpartition("}")[2]
+    unit = root.find("asset/unit")
+    metre = 1.0 if unit is None else float(unit.get("meter", 1.0))
+    shapes = {one.get("id"): list(_polygons(one.find("mesh"))) for one in root.iter("geometry") if one.find("mesh")}
+    nodes = {node.get("id"): node for node in root.iter("node")}
+    parts = [np.zeros((0, 3, 3))]
+    for scene in root.iter("visual_scene"):
+        for node in scene.findall("node"):
+            parts += _placed(node, np.eye(4), shapes, nodes, 0)
+    return np.concatenate(parts) * metre
+
+
+def _placed(node: Any, T: Array, shapes: dict[Any, list[Array]], nodes: dict[Any, Any], depth: int) -> Iterator[Array]:
+    """The triangles of a node and of those within it."""
+    if depth > _DEEPEST:
+        raise ValueError(f"nodes nested deeper than {_DEEPEST}")
+    for element in node:
+        T = T @ _motion(element.tag, [float(x) for x in (element.text or "").split()]) if element.text else T
+    for used in node.findall("instance_geometry"):
+        for corners in shapes.get(used.get("url", "").removeprefix("#"), []):
+            yield corners @ T[:3, :3].T + T[:3, 3]
+    used = [nodes[one.get("url", "").removeprefix("#")] for one in node.findall("instance_node")]
+    for child in [*node.findall("node"), *used]:
+        yield from _placed(child, T, shapes, nodes, depth + 1)
+
+
+def _motion(tag: str, values: list[float]) -> Array:
+    T = np.eye(4)
+    if tag == "matrix":
+        T[:] = np.reshape(values, (4, 4))
+    elif tag == "translate":
+        T[:3, 3] = values
+    elif tag == "scale":
+        T[:3, :3] = np.diag(values)
+    elif tag == "rotate":
+        x, y, z = np.array(values[:3]) / np.linalg.norm(values[:3])
+        across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        turn = math.radians(values[3])
+        T[:3, :3] += math.sin(turn) * across + (1 - math.cos(turn)) * across @ across
+    return T
+
+
+def _polygons(mesh: Any) -> Iterator[Array]:
+    """The triangles of a geometry's triangles, polylists and polygons: polygons are taken to be convex."""
+    sources = {}
+    for source in mesh.findall("source"):
+        numbers, accessor = source.find("float_array"), source.find("technique_common/accessor")
+        if numbers is not None and accessor is not None:
+            values = np.array((numbers.text or "").split(), dtype=float)
+            stride = int(accessor.get("stride", 1))
+            sources[source.get("id")] = values[: len(values) // stride * stride].reshape(-1, stride)
+    vertices = {one.get("id"): one for one in mesh.findall("vertices")}
+    for kind in ("triangles", "polylist", "polygons"):
+        for group in mesh.findall(kind):
+            inputs = group.findall("input")
+            width = 1 + max(int(one.get("offset", 0)) for one in inputs)
+            [vertex] = [one for one in inputs if one.get("semantic") == "VERTEX"]
+            owner = vertices[vertex.get("source", "").removeprefix("#")]
+            [place] = [one for one in owner.findall("input") if one.get("semantic") == "POSITION"]
+            points = sources[place.get("source", "").removeprefix("#")][:, :3]
+            lists = [np.array((one.text or "").split(), dtype=np.int64) for one in group.findall("p")]
+            corners = [one.reshape(-1, width)[:, int(vertex.get("offset", 0))] for one in lists]
+            if kind == "triangles":
+                index = [one[: len(one) // 3 * 3].reshape(-1, 3) for one in corners]
+            elif kind == "polygons":
+                index = [_fan(one) for one in corners]
+            else:
+                counts = np.array(group.findtext("vcount", "").split(), dtype=np.int64)
+                index = [_fan(one) for one in np.split(np.concatenate(corners), np.cumsum(counts)[:-1])]
+            for one in index:
+                if len(one) and (one.min() < 0 or one.max() >= len(points)):
+                    raise ValueError("a triangle names a vertex that is not there")
+                yield points[one]
+
+
+def _fan(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A polygon's triangles."""
+    fan = [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
+    return np.array(fan, dtype=np.int64).reshape(-1, 3)

@@ -1,0 +1,143 @@
+"""The meshes of a URDF's <visual> elements, on the bodies of an arm: local files alone, coarse enough for a page."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armkin.errors import UsageError
+from armkin.formula.arrays import Array
+from armkin.model.rotation import inverse
+from armkin.robot_file import urdf
+from armkin.robot_file.urdf_document import Joint, Tree, document
+from armkin.teach.mesh_files import triangles
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+MOST = 30_000  # triangles of an arm: 0.7 MB of a page
+_FILES = 200
+_GRID = 1000  # the finest grid on which corners stand is the reach by so many
+_COARSER = 1.25  # each next grid by so much, until no more triangles are left
+_APART = 0.1, 1e-3  # [mm], [rad] by which axes of the URDF and of the arm may differ
+
+
+def meshes(arm: Arm, path: str) -> dict[str, Any]:
+    """What a page draws: `unit` [mm], and of each body (0 the base) its triangles' corners as whole units.
+
+    They are nine little-endian 16-bit numbers a triangle, in base64, in the frame after the body's joint (the base's:
+    of targets); "" where a body has no mesh. Raises UsageError for the URDF of another arm, or a file that is no mesh.
+    """
+    bodies = _bodies(arm, path)
+    unit = arm.reach / _GRID
+    while True:
+        coarse = [_on_grid(body, unit) for body in bodies]
+        if sum(map(len, coarse)) <= MOST:
+            break
+        unit *= _COARSER
+    if not any(map(len, coarse)):
+        raise UsageError(f"{path}: has no meshes of this arm in its <visual> elements")
+    if max(int(np.abs(body).max(initial=0)) for body in coarse) > 32_767:
+        raise UsageError(f"{path}: a mesh is more than 30 times as large as the arm: are its units metres?")
+    return {"unit": unit, "bodies": [base64.b64encode(body.astype("<i2").tobytes()).decode() for body in coarse]}
+
+
+def _on_grid(body: Array, unit: float) -> Array:
+    """Corners (N, 3, 3) in whole units, without triangles that have become lines, and each one once."""
+    corners = np.rint(body / unit).astype(np.int64)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    corners = corners[np.cross(b - a, c - a).any(axis=1)]
+    return np.unique(corners.reshape(-1, 9), axis=0)
+
+
+def _bodies(arm: Arm, path: str) -> list[Array]:
+    """The triangles (N, 3, 3) of each body, in its frame [mm]."""
+    raw = urdf.load(path)
+    if len(raw) > urdf.MAX_BYTES:
+        raise UsageError(f"{path}: larger than {urdf.MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
+    _, tree = document(raw, path)
+    first = tree.base(None)
+    after = _frames(arm)
+    chain = _chain(arm, tree, first, after)
+    found: list[list[Array]] = [[np.zeros((0, 3, 3))] for _ in range(arm.n + 1)]
+    stack = [(first, np.eye(4), 0)]
+    files = 0
+    while stack:
+        link, T, body = stack.pop()
+        for visual in tree.visuals[link]:
+            files += "mesh" in visual
+            if files > _FILES:
+                raise UsageError(f"{path}: more than {_FILES} meshes")
+            if "mesh" in visual:
+                corners = _corners(path, link, visual) @ T[:3, :3].T + T[:3, 3]
+                way = arm.base if body == 0 else inverse(after[body - 1]) @ arm.base
+                found[body].append(corners * urdf.METRE @ way[:3, :3].T + way[:3, 3])
+        for joint in tree.children[link]:
+            child = str(joint.text("child", "link"))
+            stack.append((child, T @ urdf.origin(joint, path), chain.index(joint) + 1 if joint in chain else body))
+    return [np.concatenate(parts) for parts in found]
+
+
+def _frames(arm: Arm) -> list[Array]:
+    """The frame after each joint at joint values 0."""
+    out, T = [], np.eye(4)
+    for link in arm.link[:-1]:
+        T = T @ link
+        out.append(T)
+    return out
+
+
+def _chain(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
+    """The moving joints of the URDF that are the arm's: those with its axes at joint values 0."""
+    worst = ""
+    for leaf in tree.leaves(first):
+        T, axes = np.eye(4), []
+        for joint in tree.chain(first, leaf):
+            T = T @ urdf.origin(joint, tree.name)
+            if joint.kind != "fixed":
+                axes.append((joint, T[:3, :3] @ urdf.axis(joint, tree.name), T[:3, 3] * urdf.METRE))
+        if len(axes) < arm.n:
+            worst = worst or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
+            continue
+        for k, (joint, z, p) in enumerate(axes[: arm.n]):
+            own = inverse(arm.base) @ after[k]
+            off = p - own[:3, 3]
+            away = 0.0 if arm.prismatic[k] else float(np.linalg.norm(off - (off @ own[:3, 2]) * own[:3, 2]))
+            if away > _APART[0] or np.linalg.norm(z - own[:3, 2]) > _APART[1]:
+                worst = f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[k]}"
+                break
+        else:
+            return [joint for joint, _, _ in axes[: arm.n]]
+    raise UsageError(f"{tree.name}: is not the URDF of {arm.name}: {worst}")
+
+
+def _corners(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
+    """A mesh's triangles in its link's frame [m]."""
+    where = f"{path}: visual of {link}"
+    name = visual["mesh"].get("filename", "")
+    scale = urdf.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{where}: mesh scale")
+    T = urdf.placed(visual.get("origin", {}), where)
+    return np.asarray(triangles(_file(path, name, where)) * scale @ T[:3, :3].T + T[:3, 3])
+
+
+def _file(path: str, name: str, where: str) -> Path:
+    """The local file that a URDF names: beside it, or package://NAME/..., in a folder NAME above it."""
+    scheme, colon, rest = name.partition("://")
+    if Path(name).suffix.lower() not in (".stl", ".dae"):
+        raise UsageError(f"{where}: mesh {name[:80] or 'without a filename'} is neither .stl nor .dae")
+    folder = Path(path).resolve().parent
+    if not colon:
+        return folder / name
+    if scheme == "file":
+        return Path(rest)
+    if scheme != "package":
+        raise UsageError(f"{where}: mesh {name[:80]} is no local file: package://, file:// or a path beside the URDF")
+    package, _, inside = rest.partition("/")
+    for above in [folder, *folder.parents]:
+        for place in (above / package / inside, above / inside):
+            if place.is_file():
+                return place
+    raise UsageError(f"{where}: mesh {name[:80]} is not found in the URDF's folder or above it")
