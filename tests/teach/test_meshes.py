@@ -126,7 +126,7 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
     arm = loaded(file)
     drawn = meshes(arm, str(file))
     assert 0.2 * MOST < sum(len(corners(drawn, k)) for k in range(4)) <= MOST
-    assert len(html(arm, meshes=drawn)) < 2.2e6
+    assert len(html(arm, meshes=drawn)) < 1.5e6
 
 
 @pytest.mark.parametrize(

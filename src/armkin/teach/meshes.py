@@ -18,7 +18,7 @@ from armkin.teach.mesh_files import triangles
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MOST = 30_000  # triangles of an arm: 0.7 MB of a page
+MOST = 18_000  # triangles of an arm: 0.43 MB of a page
 _FILES = 200
 _GRID = 1000  # the finest grid on which corners stand is the reach by so many
 _COARSER = 1.25  # each next grid by so much, until no more triangles are left
