@@ -4,8 +4,8 @@
 // To take up a segment takes two ticks, as one would be late at the highest rates: the last tick of the segment before, when its steps are
 // computed, takes the next one's rates and turns phases (dda.prepared); the first takes all else.
 //
-// r22 low byte of the timer when STEP rose, r23 step bits, r24 and r25 whatever is at hand. No other register is touched,
-// but where a segment is taken up, a bend counts, and in a hold.
+// r22 low byte of the timer when STEP rose, r23 step bits, r24 and r25 whatever is at hand, T: the segment's last tick. No other register is
+// touched, but where a segment is taken up, a bend counts, and in a hold. What few segments need stands behind the end.
 #pragma once
 
 #include "tick_parts.h"
@@ -88,6 +88,13 @@
       "1:",                                                                                      \
       [interval] "i"(&dda.interval), [stretch] "i"(&dda.stretch), [ocr] MEM(OCR1AL), [now] MEM(TCNT1L), [late] "i"(&dda.overruns))
 
+// T, of the ticks that are left now.
+#define LAST_TICK   \
+    "clt\n\t"       \
+    "brne 1f\n\t"   \
+    "set\n"         \
+    "1:\n\t"
+
 ISR(TIMER1_COMPA_vect, ISR_NAKED) {
     A("push r24\n\t"
       "in r24, __SREG__\n\t"
@@ -105,7 +112,7 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "lds r24, %[left]\n\t"
       "lds r25, %[left]+1\n\t"
       "sbiw r24, 1\n\t"
-      "brcs short_next\n\t"
+      "brcs short_next\n\t" LAST_TICK
       "sts %[left]+1, r25\n\t"
       "sts %[left], r24\n\t"
       "rjmp short_timer\n"
@@ -145,15 +152,18 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "lds r24, %[tail]\n\t"
       "inc r24\n\t"
       "sts %[tail], r24\n\t"
-      "ldd r24, Z+%[add]\n\t"
-      "sts %[sum]+1, r24\n\t"
+      "ldd r25, Z+%[add]\n\t"
+      "sts %[sum]+1, r25\n\t"
       "ldd r24, Z+%[add]+1\n\t"
       "sts %[sum]+2, r24\n\t"
+      "or r25, r24\n\t"
       "ldd r24, Z+%[add]+2\n\t"
       "sts %[sum]+3, r24\n\t"
+      "or r25, r24\n\t"
+      "sts %[changing], r25\n\t"
       "ldd r24, Z+%[ticks]\n\t"
       "ldd r25, Z+%[ticks]+1\n\t"
-      "sbiw r24, 1\n\t"
+      "sbiw r24, 1\n\t" LAST_TICK
       "sts %[left]+1, r25\n\t"
       "sts %[left], r24\n\t"
       ".if %[top]\n\t"
@@ -166,7 +176,7 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "eor r24, r25",
       [first] FIELD(interval), [ocr] MEM(OCR1AL), [interval] "i"(&dda.interval), [add] FIELD(add), [sum] "i"(&dda.add), [tail] "i"(&queue_tail),
       [prepared] "i"(&dda.prepared), [now] "i"(&dda.now), [ticks] FIELD(ticks), [left] "i"(&dda.left), [from] FIELD(back),
-      [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1), [invert] "i"(&direction_invert));
+      [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1), [invert] "i"(&direction_invert), [changing] "i"(&dda.changing));
     STEPPER_PINS(DIRECT)
     A("pop r21\n\t"
       "pop r30\n\t"
@@ -174,43 +184,112 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "short_timer:");
     SET_TIMER();
 
-    // interval += add >> 8
-    A(SUM("add", "%[i]", "%[a]+1") SUM("adc", "%[i]+1", "%[a]+2") SUM("adc", "%[i]+2", "%[a]+3") "lds r24, %[i]+3\n\t"
+    A("lds r24, %[changing]\n\t"
+      "tst r24\n\t"
+      "breq short_high\n\t"
+      "rjmp short_changing\n"
+      "short_high:\n\t"  // STEP is high long enough
+      "lds r24, %[now]\n\t"
+      "sub r24, r22\n\t"
+      "lds r25, %[high]\n\t"
+      "cp r24, r25\n\t"
+      "brcs short_high",
+      [changing] "i"(&dda.changing), [now] MEM(TCNT1L), [high] "i"(&step_high));
+    STEPPER_PINS(LOWER)
+    A("ldi r23, 0\n\t"
+      "lds r24, %[fine]\n\t"
+      "tst r24\n\t"
+      "breq 1f\n\t"
+      "rjmp short_fine\n"
+      "1:",
+      [fine] "i"(&dda.fine));
+    STEPPER_PINS(PHASE_COARSE)
+    A("short_bits:\n\t"
+      "sts %[bits], r23\n\t"
+      "brts 1f\n\t"
+      "rjmp short_end\n"
+      "1:\n\t"
+      "lds r24, %[tail]\n\t"
+      "inc r24\n\t"
+      "lds r25, %[head]\n\t"
+      "cp r24, r25\n\t"
+      "brne 1f\n\t"
+      "rjmp short_end\n"
+      "1:",
+      [bits] "i"(&dda.bits), [tail] "i"(&queue_tail), [head] "i"(&queue_head));
+
+    // the next segment's rates
+    A("push r31\n\t"
+      "push r30\n\t"
+      "push r21\n\t"
+      "push r20");
+    NEXT_SLOT();
+    A("ldi r22, 0\n\t"
+      "ldd r20, Z+%[fine]\n\t"
+      "sts %[any], r20\n\t"
+      "ldd r21, Z+%[from]\n\t"
+      "lds r24, %[back]+%[top]\n\t"
+      "sbrc r24, 7\n\t"
+      "rjmp 1f\n\t"
+      "lds r24, %[back]\n\t"
+      "eor r21, r24\n\t"
+      "rjmp short_rates\n"
+      "1:\n\t"  // LAST: phases begin anew
+      "ldi r24, 0x80",
+      [fine] FIELD(fine), [from] FIELD(back), [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1), [any] "i"(&dda.fine));
+    STEPPER_PINS(REST)
+    A("short_rates:");
+    STEPPER_PINS(TAKE_RATE)
+    A("ldi r24, 1\n\t"
+      "sts %[prepared], r24\n\t"
+      "pop r20\n\t"
+      "pop r21\n\t"
+      "pop r30\n\t"
+      "pop r31\n"
+      "short_end:\n\t"
+      "sbis %[flags], %[due]\n\t"
+      "rjmp 1f\n\t"
+      "lds r24, %[now]\n\t"
+      "lds r25, %[now]+1\n\t"
+      "subi r24, %[allowed] + 1\n\t"
+      "sbci r25, 0\n\t"
+      "brcs 1f\n\t"
+      "lds r24, %[late]\n\t"
+      "subi r24, -1\n\t"
+      "breq 1f\n\t"
+      "sts %[late], r24\n"
+      "1:\n\t"
+      "pop r22\n\t"
+      "pop r23\n\t"
+      "pop r25\n\t"
+      "pop r24\n\t"
+      "out __SREG__, r24\n\t"
+      "pop r24\n\t"
+      "reti",
+      [prepared] "i"(&dda.prepared), [flags] "I"(_SFR_IO_ADDR(TIFR1)), [due] "n"(OCF1A), [now] MEM(TCNT1L), [allowed] "n"(LATE), [late] "i"(&dda.overruns));
+
+    // interval += add >> 8; add grows by the bend, with every block of ticks or, QUICK, with each; behind the last tick nobody looks
+    A("short_changing:\n\t" SUM("add", "%[i]", "%[a]+1") SUM("adc", "%[i]+1", "%[a]+2") SUM("adc", "%[i]+2", "%[a]+3") "lds r24, %[i]+3\n\t"
       "sbrc r25, 7\n\t"
       "rjmp 1f\n\t"
       "ldi r25, 0\n\t"
       "rjmp 2f\n"
       "1: ldi r25, 0xFF\n"
       "2: adc r24, r25\n\t"
-      "sts %[i]+3, r24\n"
-      "3:\n\t"  // STEP is high long enough
-      "lds r24, %[now]\n\t"
-      "sub r24, r22\n\t"
-      "lds r25, %[high]\n\t"
-      "cp r24, r25\n\t"
-      "brcs 3b",
-      [i] "i"(&dda.interval), [a] "i"(&dda.add), [now] MEM(TCNT1L), [high] "i"(&step_high));
-    STEPPER_PINS(LOWER)
-
-    // add grows by the bend, with every block of ticks or, QUICK, with each; behind the last tick nobody looks
-    A("clt\n\t"
+      "sts %[i]+3, r24\n\t"
+      "brts 1f\n\t"
       "lds r24, %[left]\n\t"
       "andi r24, %[block] - 1\n\t"
-      "breq 1f\n\t"
+      "breq 2f\n\t"
       "lds r24, %[back]\n\t"
       "sbrc r24, 6\n\t"
-      "rjmp short_bend\n\t"
-      "rjmp short_phases\n"
+      "rjmp 2f\n"
       "1:\n\t"
-      "lds r24, %[left]\n\t"
-      "lds r25, %[left]+1\n\t"
-      "or r24, r25\n\t"
-      "brne short_bend\n\t"
-      "set\n\t"  // the segment's last tick
-      "rjmp short_phases\n"
-      "short_bend:\n\t"
+      "rjmp short_high\n"
+      "2:\n\t"
       "push r31\n\t"
       "push r30\n\t"
+      "push r22\n\t"
       "lds r30, %[now]\n\t"
       "lds r31, %[now]+1\n\t"
       "ldd r24, Z+%[bend]\n\t"
@@ -254,75 +333,16 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "adc r30, r22\n\t"
       "sts %[a]+3, r30\n"
       "4:\n\t"
+      "pop r22\n\t"
       "pop r30\n\t"
-      "pop r31\n"
-      "short_phases:\n\t"
-      "ldi r23, 0",
-      [left] "i"(&dda.left), [block] "n"(BLOCK), [back] "i"((uint8_t *)&dda.back + sizeof dda.back - 1), [a] "i"(&dda.add),
+      "pop r31\n\t"
+      "rjmp short_high",
+      [i] "i"(&dda.interval), [left] "i"(&dda.left), [block] "n"(BLOCK), [back] "i"((uint8_t *)&dda.back + sizeof dda.back - 1), [a] "i"(&dda.add),
       [now] "i"(&dda.now), [bend] FIELD(bend));
 
+    A("short_fine:");
     STEPPER_PINS(PHASE)
-    A("sts %[bits], r23\n\t"
-      "brts 1f\n\t"
-      "rjmp short_end\n"
-      "1:\n\t"
-      "lds r24, %[tail]\n\t"
-      "inc r24\n\t"
-      "lds r25, %[head]\n\t"
-      "cp r24, r25\n\t"
-      "brne 1f\n\t"
-      "rjmp short_end\n"
-      "1:",
-      [bits] "i"(&dda.bits), [tail] "i"(&queue_tail), [head] "i"(&queue_head));
-
-    // the next segment's rates
-    A("push r31\n\t"
-      "push r30\n\t"
-      "push r21\n\t"
-      "push r20");
-    NEXT_SLOT();
-    A("ldi r22, 0\n\t"
-      "ldd r20, Z+%[fine]\n\t"
-      "ldd r21, Z+%[from]\n\t"
-      "lds r24, %[back]+%[top]\n\t"
-      "sbrc r24, 7\n\t"
-      "rjmp 1f\n\t"
-      "lds r24, %[back]\n\t"
-      "eor r21, r24\n\t"
-      "rjmp short_rates\n"
-      "1:\n\t"  // LAST: phases begin anew
-      "ldi r24, 0x80",
-      [fine] FIELD(fine), [from] FIELD(back), [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1));
-    STEPPER_PINS(REST)
-    A("short_rates:");
-    STEPPER_PINS(TAKE_RATE)
-    A("ldi r24, 1\n\t"
-      "sts %[prepared], r24\n\t"
-      "pop r20\n\t"
-      "pop r21\n\t"
-      "pop r30\n\t"
-      "pop r31\n"
-      "short_end:\n\t"
-      "sbis %[flags], %[due]\n\t"
-      "rjmp 1f\n\t"
-      "lds r24, %[now]\n\t"
-      "lds r25, %[now]+1\n\t"
-      "subi r24, %[allowed] + 1\n\t"
-      "sbci r25, 0\n\t"
-      "brcs 1f\n\t"
-      "lds r24, %[late]\n\t"
-      "subi r24, -1\n\t"
-      "breq 1f\n\t"
-      "sts %[late], r24\n"
-      "1:\n\t"
-      "pop r22\n\t"
-      "pop r23\n\t"
-      "pop r25\n\t"
-      "pop r24\n\t"
-      "out __SREG__, r24\n\t"
-      "pop r24\n\t"
-      "reti",
-      [prepared] "i"(&dda.prepared), [flags] "I"(_SFR_IO_ADDR(TIFR1)), [due] "n"(OCF1A), [now] MEM(TCNT1L), [allowed] "n"(LATE), [late] "i"(&dda.overruns));
+    A("rjmp short_bits");
 }
 
 #undef A

@@ -37,6 +37,13 @@
       "1:",                                                                                                      \
       [p] "i"(&dda.phase[i]), [q] "i"(&dda.rate[i]), [n] "n"(i));
 
+// The same where no rate has a low byte.
+#define PHASE_COARSE(i, ...)                                                    \
+    A(SUM("add", "%[p]+1", "%[q]+1") SUM("adc", "%[p]+2", "%[q]+2") "brcc 1f\n\t" \
+      "ori r23, 1 << %[n]\n"                                                     \
+      "1:",                                                                      \
+      [p] "i"(&dda.phase[i]), [q] "i"(&dda.rate[i]), [n] "n"(i));
+
 // At rest: half a step. r22 is 0.
 #define REST(i, ...)          \
     A("sts %[p], r22\n\t"     \

@@ -20,6 +20,9 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.interval = (uint32_t)interval << 16;
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
     const axes_t back = s->back;
+    if (HAL_PREPARES) {
+        dda.changing = s->add != 0;
+    }
     if (HAL_PREPARES && dda.prepared) {
         dda.prepared = false;
         dda.back = back;
@@ -32,6 +35,9 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     const axes_t turned = dda.back ^ back, fine = s->fine;
     (void)turned;
     (void)fine;
+    if (HAL_PREPARES) {
+        dda.fine = fine;
+    }
 #define LOAD(i, ...)                          \
     if (fine & 1 << (i)) {                    \
         dda.rate[i] = s->rate[i];             \

@@ -57,6 +57,7 @@ struct dda {
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
     bool prepared;              // the next segment's rates are taken, and phases turned, by a chip's own tick
+    uint8_t changing, fine;     // not 0: there is an `add`; a rate has a low byte. For a chip's own tick
     uint8_t overruns;
 
     uint16_t stretch;      // hold: intervals become `stretch`/256 times as long; 256: as planned
