@@ -13,6 +13,8 @@
 //   DDA_AXIS(i, …)             one axis of the tick, see core/dda.h
 //   HAL_PREPARES               whether its tick takes the next segment's rates ahead of time (dda.prepared)
 //   dda_direction(back)        sets the DIR pins, inline where a call would cost too much
+//   HAL_MULTIPLY(a, b)         16 by 16 bits
+// and, where it has a quicker way than C's: HAL_RECIPROCAL(interval), 2^23 / interval; HAL_STEPS(phase, rate, fine, ticks), see core/motion.h
 #pragma once
 
 // Not inlined: its variables take up stack only while it runs.

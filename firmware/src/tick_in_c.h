@@ -19,5 +19,6 @@ void dda_direction(uint16_t back);
     dda.interval += dda.add >> 8;
 
 #define HAL_PREPARES 0
+#define HAL_MULTIPLY(a, b) ((uint32_t)(uint16_t)(a) * (uint16_t)(b))
 #define HAL_NEAR(pointer)
 #define HAL_COMING(cycles)

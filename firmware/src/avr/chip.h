@@ -2,6 +2,7 @@
 #pragma once
 #include <avr/interrupt.h>
 #include <avr/pgmspace.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "direction.h"
@@ -86,3 +87,87 @@ typedef __int24 sfine_t;
 
 // By the interval before, the timer would fire too early behind a load that takes longer.
 #define HAL_COMING(cycles) (OCR1A = (cycles))
+
+// 2^23 / interval, of intervals above 256: the first nine bits of the quotient are 0.
+static inline uint16_t hal_reciprocal(uint16_t interval) {
+    uint16_t rest = 256, quotient = 0;
+    uint8_t bits = 15;
+    __asm__("1:\n\t"
+            "lsl %A[q]\n\t"
+            "rol %B[q]\n\t"
+            "lsl %A[r]\n\t"
+            "rol %B[r]\n\t"
+            "brcs 2f\n\t"
+            "cp %A[r], %A[i]\n\t"
+            "cpc %B[r], %B[i]\n\t"
+            "brcs 3f\n"
+            "2:\n\t"
+            "sub %A[r], %A[i]\n\t"
+            "sbc %B[r], %B[i]\n\t"
+            "inc %A[q]\n"
+            "3:\n\t"
+            "dec %[n]\n\t"
+            "brne 1b"
+            : [q] "+r"(quotient), [r] "+r"(rest), [n] "+r"(bits)
+            : [i] "r"(interval));
+    return quotient;
+}
+#define HAL_RECIPROCAL(interval) hal_reciprocal(interval)
+
+// 16 by 16 bits; inline, as gcc would call its library for it.
+static inline uint32_t hal_multiply(uint16_t a, uint16_t b) {
+    uint32_t product;
+    __asm__("mul %A[a], %A[b]\n\t"
+            "movw %A[p], r0\n\t"
+            "mul %B[a], %B[b]\n\t"
+            "movw %C[p], r0\n\t"
+            "mul %A[a], %B[b]\n\t"
+            "add %B[p], r0\n\t"
+            "adc %C[p], r1\n\t"
+            "clr r1\n\t"
+            "adc %D[p], r1\n\t"
+            "mul %B[a], %A[b]\n\t"
+            "add %B[p], r0\n\t"
+            "adc %C[p], r1\n\t"
+            "clr r1\n\t"
+            "adc %D[p], r1"
+            : [p] "=&r"(product)
+            : [a] "r"(a), [b] "r"(b)
+            : "r0");
+    return product;
+}
+#define HAL_MULTIPLY(a, b) hal_multiply(a, b)
+
+// A phase goes on by rate * ticks, and what overflows are the steps: motion_steps() in 40 cycles for gcc's 75.
+static inline uint16_t hal_steps(fine_t *phase, uint16_t rate, bool fine, uint16_t ticks) {
+    uint32_t sum = hal_multiply(rate, ticks);
+    if (!fine) {
+        __asm__("ldd r0, %a[at]+1\n\t"
+                "add %A[s], r0\n\t"
+                "std %a[at]+1, %A[s]\n\t"
+                "ldd r0, %a[at]+2\n\t"
+                "adc %B[s], r0\n\t"
+                "std %a[at]+2, %B[s]\n\t"
+                "adc %C[s], r1\n\t"
+                "adc %D[s], r1"
+                : [s] "+r"(sum), "+m"(*phase)
+                : [at] "b"(phase)
+                : "r0");
+        return sum >> 16;
+    }
+    __asm__("ldd r0, %a[at]+0\n\t"
+            "add %A[s], r0\n\t"
+            "std %a[at]+0, %A[s]\n\t"
+            "ldd r0, %a[at]+1\n\t"
+            "adc %B[s], r0\n\t"
+            "std %a[at]+1, %B[s]\n\t"
+            "ldd r0, %a[at]+2\n\t"
+            "adc %C[s], r0\n\t"
+            "std %a[at]+2, %C[s]\n\t"
+            "adc %D[s], r1"
+            : [s] "+r"(sum), "+m"(*phase)
+            : [at] "b"(phase)
+            : "r0");
+    return sum >> 24;
+}
+#define HAL_STEPS(phase, rate, fine, ticks) hal_steps(phase, rate, fine, ticks)

@@ -8,7 +8,7 @@ _Static_assert(RECIPROCAL / MIN_INTERVAL < 1UL << 16, "the reciprocal of an inte
 // A segment's time: in 2^-16 of 50 ms from 16 cycles, and a longer one's in 2^-8 of 50 ms from 256 cycles.
 #define FRACTION ((uint32_t)((1ULL << 35) / (CLOCK / 20)))
 #define WINDOW ((uint32_t)(65536ULL * 256 * 256 / (CLOCK / 20)))
-_Static_assert((uint64_t)FRACTION * (CLOCK / 20 / 16) < 1ULL << 32 && FRACTION * (MIN_INTERVAL / 16) >> 15, "32 bits; no segment takes no time");
+_Static_assert((uint64_t)FRACTION * (CLOCK / 20 / 16) <= 1ULL << 31 && FRACTION * (MIN_INTERVAL / 16) >> 15, "32 bits; no segment takes no time");
 
 // Velocities are rounded down in two places.
 static const uint32_t ROUNDING = 4 * (RECIPROCAL / MIN_INTERVAL);
@@ -19,10 +19,14 @@ struct pace {
     uint16_t first, last;  // RECIPROCAL / interval; at rest 0
     uint16_t time;         // 2^-16 of 50 ms, at most 50 ms; 0: rest, which is as long as the segment beside it
     uint16_t windows;      // of a longer one: 2^-8 of 50 ms; else 0
+    uint16_t interval;     // the last; 0: none
 };
 
 // RECIPROCAL / interval: long division of a power of two, a third of what a small chip's library takes.
 static uint16_t reciprocal(uint16_t interval) {
+#ifdef HAL_RECIPROCAL
+    return HAL_RECIPROCAL(interval);
+#else
     uint16_t rest = RECIPROCAL >> 16, quotient = 0;
     for (uint8_t bit = 0; bit < 16; bit++) {
         const bool over = rest >> 15;
@@ -34,22 +38,27 @@ static uint16_t reciprocal(uint16_t interval) {
         }
     }
     return quotient;
+#endif
 }
 
-static void take_pace(const struct segment *s, uint16_t last, struct pace *pace) {
-    pace->first = pace->last = reciprocal(s->interval);
+// Returns how long the segment takes, in units of 256 cycles.
+static uint32_t take_pace(const struct segment *s, uint16_t last, const struct pace *before, struct pace *pace) {
+    pace->first = pace->last = s->interval == before->interval ? before->last : reciprocal(s->interval);
     if (s->add) {
         pace->last = reciprocal(last);
     }
-    const uint32_t cycles = (uint32_t)s->ticks * (((uint32_t)s->interval + last) >> 1);
+    pace->interval = last;
+    const uint32_t cycles = HAL_MULTIPLY(s->ticks, ((uint32_t)s->interval + last) >> 1);
     pace->windows = 0;
-    if (cycles < CLOCK / 20) {
-        pace->time = (cycles >> 4) * FRACTION >> 15;
+    if (cycles < CLOCK / 20) {  // shifts by whole bytes are what a small chip is quick with
+        const uint_fast16_t sixteenths = (uint_fast16_t)(cycles >> 8) << 4 | (uint8_t)cycles >> 4;
+        pace->time = sixteenths * FRACTION << 1 >> 16;
     } else {
         const uint32_t windows = ((cycles >> 16) * WINDOW >> 8) + ((cycles >> 8 & 0xFF) * WINDOW >> 16);
         pace->time = 0xFFFF;
         pace->windows = windows < 0xFFFF ? windows : 0xFFFF;
     }
+    return cycles >> 8;
 }
 
 static uint32_t distance(int32_t a, int32_t b) {
@@ -59,7 +68,7 @@ static uint32_t distance(int32_t a, int32_t b) {
 // What 5/4 of max_accel makes of an axis's velocity; in units 2^8 as great where `time` is. 24 by 16 bits, in parts that a small chip is quick with.
 static uint32_t budget(uint8_t axis, uint16_t time) {
     const uint16_t low = limits.jump[axis], high = limits.jump[axis] >> 16;
-    return ((uint32_t)low * time >> 8) + ((uint32_t)high * time << 8);
+    return (HAL_MULTIPLY(low, time) >> 8) + (HAL_MULTIPLY(high, time) << 8);
 }
 
 static uint16_t size(const struct segment *s, uint8_t axis, axes_t bit) {
@@ -67,7 +76,7 @@ static uint16_t size(const struct segment *s, uint8_t axis, axes_t bit) {
 }
 
 static int32_t velocity(uint16_t size, uint16_t reciprocal, bool back) {
-    const uint32_t v = (uint32_t)size * reciprocal;
+    const uint32_t v = HAL_MULTIPLY(size, reciprocal);
     return back ? -(int32_t)v : (int32_t)v;
 }
 
@@ -92,36 +101,58 @@ static bool beyond(fine_t *excess, int32_t change, uint32_t budget, uint32_t sla
     return (uint32_t)sum - budget > slack;
 }
 
-static inline bool unchecked(uint8_t axis, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
-    if (limits.jump[axis] < JUMP_MAX && ((before->first && a->rate[axis]) || (pace->first && b->rate[axis]))) {
+// One axis: true if its velocity jumps from `a` to `b`, or changes within `b`, by more than its budget. Between the middles of both, too,
+// the change is within that; what was beyond it is kept, each way, and at most rounding's: so the velocities in the middles of
+// any two segments differ by no more than the budget of the time between, and rounding once, however short they are.
+APART static bool accelerates(uint8_t axis, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
+    const axes_t bit = 1U << axis;
+    const int32_t left = motion.plan_speed[axis], first = velocity(size(b, axis, bit), pace->first, b->back & bit);
+    const int32_t last = pace->last == pace->first ? first : velocity(size(b, axis, bit), pace->last, b->back & bit);
+    motion.plan_speed[axis] = last;
+    fine_t *const excess = motion.plan_excess[axis];
+    const bool stands = !(before->first && a->rate[axis]) && !(pace->first && b->rate[axis]);
+    if (stands || limits.jump[axis] >= JUMP_MAX) {
+        motion.plan_exceeding &= ~bit;
         return false;
     }
-    motion.plan_excess[axis][0] = motion.plan_excess[axis][1] = 0;
-    return true;
-}
-
-// Does an axis's velocity jump from `a` to `b`, or change within `b`, by more than its budget? Between the middles of both, too, the change
-// is within that; what was beyond it is kept, each way, and at most rounding's: so the velocities in the middles of any two
-// segments differ by no more than the budget of the time between, and rounding once, however short the segments are.
-static bool accelerates(uint8_t axis, axes_t bit, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
-    fine_t *const excess = motion.plan_excess[axis];
-    if (before->windows) {
+    if (before->windows || !(motion.plan_exceeding & bit)) {
         excess[0] = excess[1] = 0;
     }
-    const uint16_t size_a = size(a, axis, bit), size_b = size(b, axis, bit);
-    const int32_t left = velocity(size_a, before->last, a->back & bit), first = velocity(size_b, pace->first, b->back & bit);
-    const bool even = before->first == before->last && pace->first == pace->last;
-    const uint32_t between = budget(axis, (before->time >> 1) + (pace->time >> 1)), jump = distance(left, first);
-    if (even && !excess[0] && !excess[1] && jump + 4 <= between) {  // as nearly always: nothing to add up
-        return false;
-    }
-    const int32_t last = even ? first : velocity(size_b, pace->last, b->back & bit);
-    const uint32_t slack = ROUNDING + ((distance(left, 0) + distance(last, 0)) >> CYCLES), change = distance(first, last);
-    if (jump > between + slack || (pace->windows && pace->windows < 0xFFFF && change >> 8 > budget(axis, pace->windows)) ||
+    const uint32_t between = budget(axis, (before->time >> 1) + (pace->time >> 1)), change = distance(first, last);
+    const uint32_t slack = ROUNDING + ((distance(left, 0) + distance(last, 0)) >> CYCLES);
+    if (distance(left, first) > between + slack ||
+        (pace->windows && pace->windows < 0xFFFF && change >> 8 > budget(axis, pace->windows)) ||
         (!pace->windows && change && change > budget(axis, pace->time) + slack)) {
         return true;
     }
-    const int32_t from = even ? left : velocity(size_a, before->first, a->back & bit);
+    const int32_t from = before->last == before->first ? left : velocity(size(a, axis, bit), before->first, a->back & bit);
     const int32_t more = quarter(first, last, pace->windows) - quarter(left, from, before->windows);
-    return beyond(&excess[0], more, between >> 2, slack >> 2) | beyond(&excess[1], -more, between >> 2, slack >> 2);
+    const bool over = beyond(&excess[0], more, between >> 2, slack >> 2) | beyond(&excess[1], -more, between >> 2, slack >> 2);
+    motion.plan_exceeding |= bit;
+    if (!excess[0] && !excess[1]) {
+        motion.plan_exceeding &= ~bit;
+    }
+    return over;
+}
+
+// The first axis from `axis` on that needs a look by accelerates(). As nearly always none does, where no interval changes and nothing is
+// beyond its budget: jumps are less than the budget's greater part, or the axis is not checked.
+APART static uint8_t next_unclear(uint8_t axis, uint8_t axes, const struct pace *before, const struct segment *b, const struct pace *pace) {
+    if (before->first != before->last || pace->first != pace->last) {
+        return axis;
+    }
+    const uint16_t time = (before->time >> 1) + (pace->time >> 1);
+    uint8_t back = b->back, fine = b->fine, exceeding = motion.plan_exceeding, bit = 1;
+    for (uint8_t i = 0; i < axes; i++) {
+        const uint16_t jump = limits.jump[i] >> 8;
+        if (i >= axis && jump < JUMP_MAX >> 8) {
+            const int32_t first = velocity(fine & bit ? b->rate[i] >> 9 : b->rate[i] >> 1, pace->first, back & bit);
+            if (exceeding & bit || distance(motion.plan_speed[i], first) + 4 > HAL_MULTIPLY(jump, time)) {
+                return i;
+            }
+            motion.plan_speed[i] = first;
+        }
+        NEXT_AXIS(bit, (back = b->back >> 8, fine = b->fine >> 8, exceeding = motion.plan_exceeding >> 8))
+    }
+    return axes;
 }

@@ -51,6 +51,8 @@ static void read_times(const uint8_t *p, bool wide, struct segment *s) {
     s->interval = get16(p);
     if (!wide) {
         s->add = (sfine_t)(int16_t)get16(p + 2) * 256;
+        s->bend = 0;
+        s->back = s->fine = 0;
         return;
     }
     s->add = (sfine_t)(int16_t)get16(p + 3) * 256 + p[2];
@@ -68,12 +70,16 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     if (s->ticks == 0 || s->interval < least) {
         return false;
     }
+    if (s->add == 0) {
+        *last = s->interval;
+        return s->bend == 0;
+    }
     if (s->bend && s->ticks > (quick ? LONGEST_QUICK : LONGEST_BEND)) {
         return false;
     }
-    const int32_t grown = quick ? s->bend * (int32_t)(s->ticks - 1) >> 1 : s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6;
+    const int32_t grown = s->bend == 0 ? 0 : quick ? s->bend * (int32_t)(s->ticks - 1) >> 1 : s->bend * (int32_t)((s->ticks - 1) / BLOCK) >> 6;
     const int32_t add = s->add + grown;
-    if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || (s->add == 0 && s->bend) || add < -ADD_MOST || add >= ADD_MOST) {
+    if ((s->add > 0 && add < 0) || (s->add < 0 && add > 0) || add < -ADD_MOST || add >= ADD_MOST) {
         return false;
     }
     *last = motion_interval(s, s->ticks - 1);
@@ -83,47 +89,84 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     return motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
-static enum error read_head(const uint8_t *p, bool wide, struct segment *s, struct pace *pace) {
+static enum error read_head(const uint8_t *p, bool wide, struct segment *s, const struct pace *before, struct pace *pace, uint32_t *units) {
     int32_t last;
     read_times(p, wide, s);
     if (!times_valid(s, &last)) {
         return E_INTERVAL;
     }
-    take_pace(s, last, pace);
+    *units += take_pace(s, last, before, pace);
     return OK;
 }
 
-// A rate of the frame; the direction where it has one, else the one that the axis had.
-static enum error read_rate(const uint8_t *p, uint8_t axis, axes_t bit, struct segment *s) {
-    const int16_t rate = (int16_t)get16(p);
-    if (rate == INT16_MIN) {
-        return E_STEPS;
+// What is wrong first, axis by axis: each look goes only as far as the one before found nothing (`past`).
+struct look {
+    uint8_t past;  // axes to look at
+    uint8_t error;
+};
+
+static void found(struct look *look, uint8_t axis, enum error error) {
+    look->past = axis;
+    look->error = error;
+}
+
+// Rates of the frame; the direction where one has one, else the one that the axis had.
+APART static void read_rates(const uint8_t *p, uint16_t mask, struct segment *s, const struct pace *pace, struct look *look) {
+    const uint16_t fastest = pace->first > pace->last ? pace->first : pace->last;
+    const axes_t was = motion.plan_fraction.back, fine = s->fine;
+    axes_t bit = 1, back = s->back | (was & ~(axes_t)mask);
+    memset(s->rate, 0, sizeof s->rate);
+    for (uint8_t i = 0; mask; i++, mask >>= 1, bit <<= 1) {
+        if (!(mask & 1)) {
+            continue;
+        }
+        const int16_t rate = (int16_t)get16(p);
+        p += 2;
+        if (rate == INT16_MIN) {
+            found(look, i, E_STEPS);
+            break;
+        }
+        back |= rate < 0 ? bit : rate ? 0 : was & bit;
+        const uint16_t size = rate < 0 ? -rate : rate;
+        const bool greatest = size == 0x7FFF && !(fine & bit);
+        s->rate[i] = size << 1 | greatest;
+        if (HAL_MULTIPLY(fine & bit ? size >> 8 : size, fastest) > limits.top[i]) {
+            found(look, i, E_RATE);
+            break;
+        }
     }
-    s->back |= rate < 0 ? bit : rate ? 0 : motion.plan_fraction.back & bit;
-    const uint16_t size = rate < 0 ? -rate : rate;
-    const bool greatest = size == 0x7FFF && !(s->fine & bit);
-    s->rate[axis] = size << 1 | greatest;
-    return OK;
+    s->back = back;
 }
 
-static bool too_fast(uint8_t axis, axes_t bit, const struct segment *s, const struct pace *pace) {
-    return (uint32_t)size(s, axis, bit) * (pace->first > pace->last ? pace->first : pace->last) > limits.top[axis];
-}
-
-// One axis of a segment from the frame into its slot; the plan goes on to its end.
-static enum error read_axis(const uint8_t *p, uint8_t axis, axes_t bit, struct segment *s, const struct pace *pace) {
-    const enum error error = read_rate(p, axis, bit, s);
-    if (error) {
-        return error;
+static inline __attribute__((always_inline)) void check_changes(const struct segment *a, const struct pace *before, const struct segment *s, const struct pace *pace, struct look *look) {
+    for (uint8_t i = 0; (i = next_unclear(i, look->past, before, s, pace)) < look->past; i++) {
+        if (accelerates(i, a, before, s, pace)) {
+            found(look, i, E_ACCEL);
+        }
     }
-    return too_fast(axis, bit, s, pace) ? E_RATE : OK;
 }
 
-static enum error plan_axis(uint8_t axis, axes_t bit, const struct segment *s) {
-    const int32_t before = motion.plan[axis];
-    motion_advance(axis, bit, s);
-    const struct axis_config *config = &memory.image.axis[axis];
-    return within(config->lower, config->upper, before, motion.plan[axis]) ? OK : E_LIMIT;
+// The plan goes on to the segment's end.
+APART static void plan_axes(uint16_t mask, const struct segment *s, struct look *look) {
+    const axes_t turning = motion.plan_fraction.back ^ s->back;
+    const uint16_t ticks = s->ticks;
+    uint8_t named = mask, turned = turning, back = s->back, fine = s->fine, bit = 1;
+    for (uint8_t i = 0; i < look->past; i++) {
+        fine_t *const phase = &motion.plan_fraction.phase[i];
+        if (turned & bit) {
+            *phase ^= PHASE_TURN;
+        }
+        if (named & bit && s->rate[i]) {
+            const int32_t before = motion.plan[i], steps = motion_steps(phase, s->rate[i], fine & bit, ticks);
+            const int32_t after = motion.plan[i] = back & bit ? before - steps : before + steps;
+            const struct axis_config *config = &memory.image.axis[i];
+            if (!within(config->lower, config->upper, before, after)) {
+                found(look, i, E_LIMIT);
+            }
+        }
+        NEXT_AXIS(bit, (named = mask >> 8, turned = turning >> 8, back = s->back >> 8, fine = s->fine >> 8))
+    }
+    motion.plan_fraction.back = s->back & ALL_AXES;
 }
 
 static int32_t nearest[ROWS];  // a row's value nearest to its limits since the motion began
@@ -151,74 +194,73 @@ static enum error check_rows(uint8_t *detail) {
     return OK;
 }
 
-static enum error read_axes(const uint8_t *p, uint16_t mask, const struct segment *a, const struct pace *before, struct segment *s,
+static enum error read_axes(const uint8_t *p, uint16_t mask, uint8_t axes, const struct segment *a, const struct pace *before, struct segment *s,
                             const struct pace *pace, uint8_t *detail) {
-    axes_t bit = 1;
-    for (uint8_t i = 0; i < AXES; i++, mask >>= 1, bit <<= 1) {
-        enum error error = OK;
-        if (mask & 1) {
-            error = read_axis(p, i, bit, s, pace);
-            p += 2;
-        } else {  // it stands, if it was moving from now on
-            s->back |= motion.plan_fraction.back & bit;
-        }
-        if (!error && !unchecked(i, a, before, s, pace) && accelerates(i, bit, a, before, s, pace)) {
-            error = E_ACCEL;
-        }
-        if (!error && mask & 1) {
-            error = plan_axis(i, bit, s);
-        }
-        if (error) {
-            *detail = i;
-            return error;
-        }
+    struct look look = {.past = axes};
+    read_rates(p, mask, s, pace, &look);
+    check_changes(a, before, s, pace, &look);
+    plan_axes(mask, s, &look);
+    if (look.error) {
+        *detail = look.past;
     }
-    return OK;
+    return look.error;
 }
 
-// Leaves the last segment's pace.
-static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, struct pace *before, uint8_t *detail) {
+// Leaves the last segment's pace in the first of two, and how long all are.
+static enum error read_segments(const uint8_t *p, uint8_t count, uint16_t mask, bool wide, uint8_t size, struct pace paces[2], uint32_t *units, uint8_t *detail) {
+    struct pace *before = &paces[count % 2], *pace = &paces[!(count % 2)];
     if (motion.state == IDLE) {
         begin_rows();
     }
+    const struct segment *a = motion_slot(-1);
     memset(before, 0, sizeof *before);
-    if (!motion.ended) {
-        const struct segment *a = motion_slot(-1);  // it may be done: nothing has been written over it yet
-        take_pace(a, motion_interval(a, a->ticks - 1), before);
+    if (!motion.ended) {  // it may be done: nothing has been written over it yet
+        take_pace(a, motion_interval(a, a->ticks - 1), before, before);
     }
+    uint8_t axes = AXES;
     for (uint8_t n = 0; n < count; n++, p += size) {
-        struct segment *s = motion_slot(n);
-        struct pace pace;
-        memset(s, 0, sizeof *s);
-        enum error error = read_head(p, wide, s, &pace);
+        if (n == 2) {  // from here on axes that the batch does not name stand, and have stood
+            axes = 0;
+            for (uint16_t m = mask; m; m >>= 1) {
+                axes++;
+            }
+        }
+        struct segment *const s = motion_slot(n);
+        enum error error = read_head(p, wide, s, before, pace, units);
         if (error) {
             *detail = n;
             return error;
         }
         if (!before->time) {
-            before->time = pace.time;
+            before->time = pace->time;
         }
-        error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, motion_slot(n - 1), before, s, &pace, detail);
+        error = read_axes(p + (wide ? WIDE_SIZE : NARROW_SIZE), mask, axes, a, before, s, pace, detail);
         if (!error) {
             error = check_rows(detail);
         }
         if (error) {
             return error;
         }
-        *before = pace;
+        struct pace *const done = before;
+        before = pace;
+        pace = done;
+        a = s;
     }
     return OK;
 }
 
 static enum error check_end(const uint8_t *ends, uint16_t mask, const struct segment *s, const struct pace *last, bool end, uint8_t *detail) {
-    const struct pace rest = {.time = last->time};
-    axes_t bit = 1;
-    for (uint8_t i = 0; i < AXES; i++, bit <<= 1) {
+    struct look look = {.past = AXES};
+    if (end) {
+        const struct pace rest = {.time = last->time};
+        check_changes(s, last, s, &rest, &look);
+    }
+    for (uint8_t i = 0; i < AXES; i++, mask >>= 1) {
         *detail = i;
-        if (end && !unchecked(i, s, last, s, &rest) && accelerates(i, bit, s, last, s, &rest)) {
+        if (i == look.past) {
             return E_ACCEL;
         }
-        if (mask >> i & 1) {
+        if (mask & 1) {
             if (motion.plan[i] != (int32_t)get32(ends)) {
                 return E_END;
             }
@@ -229,7 +271,7 @@ static enum error check_end(const uint8_t *ends, uint16_t mask, const struct seg
     return OK;
 }
 
-static enum error read_batch(const uint8_t *payload, uint8_t axes, uint8_t segment, uint8_t *detail) {
+static enum error read_batch(const uint8_t *payload, uint8_t axes, uint8_t segment, uint32_t *units, uint8_t *detail) {
     const uint16_t mask = get16(payload + 2);
     const uint8_t flags = payload[4], count = payload[5];
     const uint8_t *starts = payload + HEAD, *ends = starts + 4 * axes;
@@ -240,10 +282,10 @@ static enum error read_batch(const uint8_t *payload, uint8_t axes, uint8_t segme
     if (count > motion_free()) {
         return E_CREDIT;
     }
-    struct pace last;
-    error = read_segments(ends + 4 * axes, count, mask, flags & WIDE, segment, &last, detail);
+    struct pace paces[2];
+    error = read_segments(ends + 4 * axes, count, mask, flags & WIDE, segment, paces, units, detail);
     if (!error) {
-        error = check_end(ends, mask, motion_slot(count - 1), &last, flags & END, detail);
+        error = check_end(ends, mask, motion_slot(count - 1), paces, flags & END, detail);
     }
     if (!error && motion.state == IDLE) {
         error = inputs_blocking(motion_slot(0), detail);
@@ -258,16 +300,17 @@ APART enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t 
     const uint16_t mask = get16(payload + 2);
     const uint8_t flags = payload[4], count = payload[5];
     uint8_t axes = 0;
-    for (uint8_t i = 0; i < 16; i++) {
-        axes += mask >> i & 1;
+    for (uint16_t m = mask; m; m &= m - 1) {
+        axes++;
     }
     const uint8_t segment = (flags & WIDE ? WIDE_SIZE : NARROW_SIZE) + 2 * axes;
     if (count == 0 || flags & ~(END | WIDE | GENTLE) || length != HEAD + 8 * axes + count * segment) {
         return E_LENGTH;
     }
+    uint32_t units = 0;
     enum error error = inputs_ready(motion.state == MOVING);
     if (!error) {
-        error = read_batch(payload, axes, segment, detail);
+        error = read_batch(payload, axes, segment, &units, detail);
     }
     if (error) {
         if (motion.state == IDLE) {
@@ -282,6 +325,6 @@ APART enum error batch_received(const uint8_t *payload, uint8_t length, uint8_t 
     if (gentle > motion.gentle) {
         motion.gentle = gentle;
     }
-    motion_append(count, flags & END);
+    motion_append(count, units, flags & END);
     return OK;
 }

@@ -105,10 +105,10 @@ static void slice(void) {
         s->rate[i] = fine ? (uint16_t)(rate * 128) * 2 : rate < 0xFFFE ? (uint16_t)(rate / 2) * 2 : 0xFFFE;
         s->fine |= fine ? 1U << i : 0;
         s->back |= cruise.rate[i] < 0 ? 1U << i : 0;
-        motion_advance(i, 1U << i, s);
     }
+    motion_advance(s);
     cruise.share = next;
-    motion_append(1, false);
+    motion_append(1, motion_units(s), false);
 }
 
 void cruise_poll(void) {

@@ -26,6 +26,13 @@ enum { QUICK = 1 << (8 * sizeof(axes_t) - 2) };  // in `back`: `bend` counts wit
 _Static_assert(AXES < 8 * sizeof(axes_t) - 1, "two bits are LAST and QUICK");
 _Static_assert(((axes_t)LAST & (axes_t)QUICK) == 0, "one is not the other, where an int has 16 bits, too");
 
+// Masks of axes byte by byte, as a small chip is quick with: to the next axis's bit, in the byte that it stands in.
+#define NEXT_AXIS(bit, shift)  \
+    if (!(bit = bit << 1)) {    \
+        bit = 1;                \
+        shift;                  \
+    }
+
 enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
 
 // Phases and rates: 2^-24 step. At rest a phase is half a step. An axis that turns round goes on from the other side.

@@ -29,12 +29,12 @@ static bool turned(bool now, bool state, uint8_t *steady) {
 
 static uint8_t pressed_now(void) {
     const uint8_t levels = hal_switches();
-    uint8_t pressed = 0;
+    uint8_t pressed = 0, bit = 1;
     (void)levels;
-    for (uint8_t n = 0; n < SWITCHES; n++) {
+    for (uint8_t n = 0; n < SWITCHES; n++, bit <<= 1) {
         const uint8_t flags = memory.image.guard[n].flags;
-        if (flags & USED && (levels >> n & 1) == !!(flags & CLOSED)) {
-            pressed |= 1U << n;
+        if (flags & USED && !!(levels & bit) == !!(flags & CLOSED)) {
+            pressed |= bit;
         }
     }
     return pressed;
@@ -97,9 +97,12 @@ APART enum error inputs_millisecond(uint8_t *detail) {
     if (switch_steady >= STEADY_MS - 1) {
         inputs.pressed = now;
     }
-    const struct segment *s = motion.state == IDLE ? 0 : motion_running();
-    if (inputs.abort || inputs.power_cut) {
-        return motion.state == IDLE ? OK : inputs.abort ? E_ABORT : E_POWER;
+    if (motion.state == IDLE) {
+        return OK;
     }
-    return s && motion.state != HOMING ? inputs_blocking(s, detail) : OK;
+    if (inputs.abort || inputs.power_cut) {
+        return inputs.abort ? E_ABORT : E_POWER;
+    }
+    const struct segment *s = inputs.pressed && motion.state != HOMING ? motion_running() : 0;
+    return s ? inputs_blocking(s, detail) : OK;
 }

@@ -13,18 +13,17 @@ uint8_t link_bad, link_length;
 
 static uint8_t frame[FRAME_MAX];
 static uint8_t filled;
-static uint8_t block;  // bytes until the next COBS code
+static uint8_t block;  // bytes until the next COBS code, that one included; 0: between frames
 static uint32_t crc;   // of all bytes so far
-static bool started;
 
 static void end_of_frame(void) {
-    const bool whole = started && block == 0 && filled >= CRC_SIZE + 2 && crc == CRC_GOOD;
+    const bool whole = block == 1 && filled >= CRC_SIZE + 2 && crc == CRC_GOOD;
     if (whole) {
         link_length = filled - CRC_SIZE;
-    } else if (started && link_bad < 255) {
+    } else if (block && link_bad < 255) {
         link_bad++;
     }
-    started = false;
+    block = 0;
 }
 
 uint8_t *link_frame(void) {
@@ -33,40 +32,39 @@ uint8_t *link_frame(void) {
 
 // The loop's variables are its own: the line brings a byte every 640 cycles, and the board must take them faster, whatever else it does.
 APART uint8_t link_bytes(const uint8_t *bytes, uint8_t count) {
-    const uint8_t *p = bytes, *const past = bytes + count;
     uint8_t *at = frame + filled;
-    uint8_t left = block;
+    uint8_t room = FRAME_MAX - filled, left = block, taken = 0;
     uint32_t sum = crc;
-    while (p != past) {
-        uint8_t byte = *p++;
+    do {
+        uint8_t byte = *bytes++;
+        taken++;
         if (byte == 0) {
-            filled = at - frame;
+            filled = FRAME_MAX - room;
             block = left;
             crc = sum;
             end_of_frame();
-            return p - bytes;
+            return taken;
         }
-        if (!started) {
-            started = true;
+        if (left == 0) {
+            left = byte;
             at = frame;
+            room = FRAME_MAX;
             sum = CRC_START;
-            left = byte - 1;
             continue;
         }
-        if (left) {
-            left--;
-        } else {  // each code but the first stands for the zero that ended its block
-            left = byte - 1;
+        if (--left == 0) {  // each code but the first stands for the zero that ended its block
+            left = byte;
             byte = 0;
         }
-        if (at == frame + FRAME_MAX) {
-            sum = 0;  // it is too long: no CRC is right any more
-        } else {
+        if (room) {
+            room--;
             *at++ = byte;
             sum = crc_byte(sum, byte);
+        } else {
+            sum = 0;  // it is too long: no CRC is right any more
         }
-    }
-    filled = at - frame;
+    } while (taken != count);
+    filled = FRAME_MAX - room;
     block = left;
     crc = sum;
     return count;

@@ -22,10 +22,7 @@ static const float UNIT_MS = 256e3F / CLOCK;
 #define SHARED(x) (*(volatile __typeof__(x) *)&(x))  // the interrupt changes it
 
 // Cycles between ticks after `ticks` of them, not rounded from tick to tick.
-int32_t motion_interval(const struct segment *s, uint16_t ticks) {
-    if (!s->add) {
-        return s->interval;
-    }
+APART int32_t motion_bent_interval(const struct segment *s, uint16_t ticks) {
     const uint32_t coarse = (uint32_t)(int32_t)(s->add >> 8) * ticks, fine = (uint32_t)(uint8_t)s->add * ticks >> 8;
     int32_t change = (int32_t)(coarse + fine) >> 8;
     if (s->back & QUICK) {
@@ -46,36 +43,11 @@ static uint16_t last_interval(const struct segment *s) {
 }
 
 static uint32_t span(uint16_t ticks, uint16_t first, uint16_t last) {
-    return ticks * (((uint32_t)first + last) >> 1) >> 8;
+    return HAL_MULTIPLY(ticks, ((uint32_t)first + last) >> 1) >> 8;
 }
 
 uint32_t motion_units(const struct segment *s) {
     return span(s->ticks, s->interval, last_interval(s));
-}
-
-// Steps that an axis makes in so many ticks; moves its phase on. A product of 16 by 16 bits, as a small chip is quick with.
-static uint16_t steps_in(fine_t *phase, uint16_t rate, bool fine, uint16_t ticks) {
-    const uint32_t made = (uint32_t)rate * ticks;
-    if (fine) {
-        const uint32_t sum = (uint32_t)*phase + (made & PHASE_MASK);
-        *phase = sum & PHASE_MASK;
-        return (uint16_t)(made >> 24) + (uint16_t)(sum >> 24);
-    }
-    const uint32_t sum = made + (uint16_t)(*phase >> 8);
-    *phase = (fine_t)(uint16_t)sum << 8 | (uint8_t)*phase;
-    return sum >> 16;
-}
-
-static void advance(int32_t *count, struct fraction *f, uint8_t i, axes_t bit, const struct segment *s, uint16_t ticks) {
-    const axes_t back = s->back & bit;
-    if ((f->back ^ back) & bit) {
-        f->phase[i] ^= PHASE_TURN;
-        f->back ^= bit;
-    }
-    if (s->rate[i]) {
-        const uint16_t n = steps_in(&f->phase[i], s->rate[i], s->fine & bit, ticks);
-        *count += back ? -(int32_t)n : (int32_t)n;
-    }
 }
 
 static void at_rest(struct fraction *f) {
@@ -86,19 +58,26 @@ static void at_rest(struct fraction *f) {
 }
 
 static void advance_all(int32_t counts[AXES], struct fraction *f, const struct segment *s, uint16_t ticks) {
-    axes_t bit = 1;
-    for (uint8_t i = 0; i < AXES; i++, bit <<= 1) {
-        if (s->rate[i] || (f->back ^ s->back) & bit) {
-            advance(&counts[i], f, i, bit, s, ticks);
+    const axes_t turning = f->back ^ s->back;
+    uint8_t turned = turning, back = s->back, fine = s->fine, bit = 1;
+    for (uint8_t i = 0; i < AXES; i++) {
+        if (turned & bit) {
+            f->phase[i] ^= PHASE_TURN;
         }
+        if (s->rate[i]) {
+            const uint16_t steps = motion_steps(&f->phase[i], s->rate[i], fine & bit, ticks);
+            counts[i] += back & bit ? -(int32_t)steps : (int32_t)steps;
+        }
+        NEXT_AXIS(bit, (turned = turning >> 8, back = s->back >> 8, fine = s->fine >> 8))
     }
+    f->back = s->back & ALL_AXES;
     if (s->back & LAST && ticks == s->ticks) {
         at_rest(f);
     }
 }
 
-void motion_advance(uint8_t axis, axes_t bit, const struct segment *s) {
-    advance(&motion.plan[axis], &motion.plan_fraction, axis, bit, s, s->ticks);
+void motion_advance(const struct segment *s) {
+    advance_all(motion.plan, &motion.plan_fraction, s, s->ticks);
 }
 
 // The interrupt notes ticks, not counts: turn them into counts while their segment is still there.
@@ -194,15 +173,14 @@ struct segment *motion_slot(uint8_t ahead) {
 }
 
 static void plan_rest(void) {
-    memset(motion.plan_excess, 0, sizeof motion.plan_excess);
+    memset(motion.plan_speed, 0, sizeof motion.plan_speed);
+    motion.plan_exceeding = 0;
     motion.ended = true;
     at_rest(&motion.plan_fraction);
 }
 
-void motion_append(uint8_t segments, bool end) {
-    for (uint8_t n = 0; n < segments; n++) {
-        queued_units += motion_units(motion_slot(n));
-    }
+void motion_append(uint8_t segments, uint32_t units, bool end) {
+    queued_units += units;
     motion.ended = false;
     if (end) {
         motion_slot(segments - 1)->back |= LAST;
@@ -317,13 +295,13 @@ APART enum error motion_millisecond(void) {
     if (motion.cruising || (motion.state != MOVING && motion.state != HOLDING)) {
         return OK;
     }
-    const struct segment *s = running(&left, &interval);
+    const bool holding = motion.state == HOLDING, look = ++pace % 4 == 0;
+    const struct segment *s = holding || look ? running(&left, &interval) : 0;
     if (!s) {
         return OK;
     }
-    const bool holding = motion.state == HOLDING;
     bool dry = false;
-    if (++pace % 4 == 0) {
+    if (look) {
         speed = holding ? hold_speed : stop_time(s, interval);
         dry = running_dry(s, left, interval);
         motion.gentle = dry ? 0 : motion.gentle;  // no time for that

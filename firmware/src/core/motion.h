@@ -18,7 +18,9 @@ struct motion {
     // at the end of the queue:
     int32_t plan[AXES];
     struct fraction plan_fraction;
-    fine_t plan_excess[AXES][2];  // of changes of velocity over their budget, up and down: see batch.c
+    int32_t plan_speed[AXES];     // velocities, see acceleration.h
+    fine_t plan_excess[AXES][2];  // of changes of velocity over their budget, up and down, of axes in:
+    axes_t plan_exceeding;
     bool ended;                   // at rest
     uint8_t gentle;               // eighths of the accelerations that a hold leaves out
 
@@ -42,12 +44,34 @@ const struct segment *motion_running(void);  // null at rest
 uint8_t motion_free(void);
 uint16_t motion_queued(void);  // ms
 
-// Appending: write segments into motion_slot(0), (1), … up to motion_free(), each with motion_advance(); then publish them all at once.
+// Appending: write segments into motion_slot(0), (1), … up to motion_free(), move motion.plan on, then publish them all at once.
 struct segment *motion_slot(uint8_t ahead);
-void motion_advance(uint8_t axis, axes_t bit, const struct segment *s);  // motion.plan of an axis (bit: 1 << axis) to a segment's end
-void motion_append(uint8_t segments, bool end);
+void motion_advance(const struct segment *s);  // motion.plan to a segment's end
+void motion_append(uint8_t segments, uint32_t units, bool end);
 uint32_t motion_units(const struct segment *s);  // its time, 256 cycles
-int32_t motion_interval(const struct segment *s, uint16_t ticks);  // cycles to the tick after so many
+int32_t motion_bent_interval(const struct segment *s, uint16_t ticks);
+
+// Cycles to the tick after so many.
+static inline int32_t motion_interval(const struct segment *s, uint16_t ticks) {
+    return s->add ? motion_bent_interval(s, ticks) : s->interval;
+}
+
+// Steps that an axis makes in so many ticks; moves its phase on.
+static inline uint16_t motion_steps(fine_t *phase, uint16_t rate, bool fine, uint16_t ticks) {
+#ifdef HAL_STEPS
+    return HAL_STEPS(phase, rate, fine, ticks);
+#else
+    const uint32_t made = HAL_MULTIPLY(rate, ticks);
+    if (fine) {
+        const uint32_t sum = (uint32_t)*phase + (made & PHASE_MASK);
+        *phase = sum & PHASE_MASK;
+        return (uint16_t)(made >> 24) + (uint16_t)(sum >> 24);
+    }
+    const uint32_t sum = made + (uint16_t)(*phase >> 8);
+    *phase = (fine_t)(uint16_t)sum << 8 | (uint8_t)*phase;
+    return sum >> 16;
+#endif
+}
 
 void motion_begin(enum state state);  // leave IDLE: from here on a reset loses the position
 void motion_rest(void);               // back to IDLE: the counts are final

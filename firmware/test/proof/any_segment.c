@@ -19,6 +19,7 @@ enum error inputs_blocking(const struct segment *s, uint8_t *detail) { (void)s; 
 static void any_plan(void) {
     for (uint8_t i = 0; i < AXES; i++) {
         motion.plan[i] = Frama_C_interval(-(1 << 30), 1 << 30);
+        motion.plan_speed[i] = Frama_C_interval(-0x7FFFFFFF, 0x7FFFFFFF);
         motion.plan_excess[i][0] = Frama_C_interval(0, 1 << 23);
         motion.plan_excess[i][1] = Frama_C_interval(0, 1 << 23);
         motion.plan_fraction.phase[i] = Frama_C_interval(0, PHASE_MASK);
@@ -27,38 +28,44 @@ static void any_plan(void) {
         memory.image.axis[i].lower = Frama_C_interval(-(1 << 30), 1 << 30);
         memory.image.axis[i].upper = Frama_C_interval(-(1 << 30), 1 << 30);
     }
+    motion.plan_exceeding = Frama_C_interval(0, ALL_AXES);
     motion.plan_fraction.back = Frama_C_interval(0, ALL_AXES);
 }
 
-static bool any_head(struct segment *s, struct pace *pace) {
+static bool any_head(struct segment *s, const struct pace *before, struct pace *pace) {
     uint8_t p[WIDE_SIZE];
     Frama_C_make_unknown((char *)p, sizeof p);
-    return read_head(p, Frama_C_interval(0, 1), s, pace) == OK;
+    uint32_t units = 0;
+    return read_head(p, Frama_C_interval(0, 1), s, before, pace, &units) == OK;
 }
 
 // Behind another segment, or at rest, as at an END.
 static void one_segment(bool resting) {
-    uint8_t rate[2], other[2];
-    Frama_C_make_unknown((char *)rate, sizeof rate);
-    Frama_C_make_unknown((char *)other, sizeof other);
+    uint8_t rates[2 * AXES], others[2 * AXES], detail;
+    Frama_C_make_unknown((char *)rates, sizeof rates);
+    Frama_C_make_unknown((char *)others, sizeof others);
     any_plan();
     struct segment *a = &queue[1], *s = &queue[0];
-    struct pace before, pace;
-    const uint8_t i = Frama_C_interval(0, AXES - 1);
-    if (!any_head(a, &before) || read_rate(other, i, 1 << i, a) != OK || !any_head(s, &pace)) {
+    struct pace none = {0}, before, pace;
+    struct look look = {.past = AXES};
+    if (!any_head(a, &none, &before)) {
+        return;
+    }
+    read_rates(others, Frama_C_interval(0, ALL_AXES), a, &before, &look);
+    if (look.error || !any_head(s, &before, &pace)) {
         return;
     }
     if (resting) {
         before = (struct pace){.time = pace.time};
     }
-    if (read_axis(rate, i, 1 << i, s, &pace) != OK || (!unchecked(i, a, &before, s, &pace) && accelerates(i, 1 << i, a, &before, s, &pace)) || plan_axis(i, 1 << i, s) != OK) {
+    if (read_axes(rates, Frama_C_interval(0, ALL_AXES), Frama_C_interval(0, AXES), a, &before, s, &pace, &detail) != OK) {
         return;
     }
     motion_units(s);
     const uint16_t ticks = Frama_C_interval(0, 65535);
     if (ticks <= s->ticks) {
         motion_interval(s, ticks);
-        motion_advance(i, 1 << i, s);
+        motion_advance(s);
     }
 }
 
