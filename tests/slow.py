@@ -163,6 +163,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "firmware/test_latencies.py": (),
     "firmware/test_proved_core.py": (),
     "firmware/test_short_tick.py": (),
+    "firmware/test_stack_bound.py": (),
     "formula/test_recorder.py": (
         "test_exact_operations_are_numpys_to_the_last_bit",
         "test_other_operations_are_numpys_to_rounding",

@@ -122,17 +122,18 @@ def chip_rows() -> None:
     setup, high, low, _ = measure.reversing("uno_cnc_shield", 400)
     row("DIR set-up, STEP high, STEP low, shortest", f"{setup:.1f}, {high:.1f}, {low:.1f} us", "0.375 us set-up")
     row("first step after the first batch", f"{measure.first_step_ms():.2f} ms", "2.3 ... 3.6 ms")
-    for baud, rates, grbl in (
-        (115_200, (500, 550, 600, 650), "325 ... 372"),
-        (250_000, (1_000, 1_050, 1_100, 1_150, 1_200, 1_250), ""),
+    for baud, rates, board, grbl in (
+        (115_200, (500, 550, 600, 620), "uno_cnc_shield", "325 ... 372"),
+        (250_000, (1_000, 1_100, 1_150, 1_200, 1_250, 1_300), "uno_cnc_shield", ""),
+        (250_000, (1_000, 1_100, 1_150, 1_200, 1_250, 1_300), "mega_ramps14", ""),
     ):
         best = 0.0
         for rate in rates:
-            got_rate, exact = measure.segments_per_second(baud, rate, batch=8)
+            got_rate, exact = measure.segments_per_second(baud, rate, board=board)
             if not exact:
                 break
             best = got_rate
-        row(f"short segments a second at {baud}", f"{best:.0f}", grbl)
+        row(f"{board}: segments/s at {baud}, 25 kHz x 4", f"{best:.0f}", grbl)
     for cause in ("hold", "abort", "silence"):
         stop = measure.hold(cause=cause)
         figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"

@@ -55,9 +55,12 @@ def test_first_step_within_3_ms_of_the_first_batch() -> None:
     assert measure.first_step_ms(batch=2) < 2
 
 
-@pytest.mark.parametrize(("baud", "rate"), [(115_200, 600), (250_000, 800)])
-def test_short_segments_a_second(baud: int, rate: float) -> None:
-    got, exact = measure.segments_per_second(baud, rate, batch=8)
+@pytest.mark.parametrize(
+    ("baud", "rate", "board"),
+    [(115_200, 600, "uno_cnc_shield"), (250_000, 1200, "uno_cnc_shield"), (250_000, 1200, "mega_ramps14")],
+)
+def test_short_segments_a_second(baud: int, rate: float, board: str) -> None:
+    got, exact = measure.segments_per_second(baud, rate, board=board)
     assert exact
     assert got > 0.99 * rate
 

@@ -97,8 +97,11 @@ static bool beyond(fine_t *excess, int32_t change, uint32_t budget, uint32_t sla
         *excess = 0;
         return false;
     }
+    if ((uint32_t)sum - budget > slack) {
+        return true;
+    }
     *excess = (uint32_t)sum - budget;
-    return (uint32_t)sum - budget > slack;
+    return false;
 }
 
 // One axis: true if its velocity jumps from `a` to `b`, or changes within `b`, by more than its budget. Between the middles of both, too,

@@ -116,7 +116,7 @@ APART static void read_rates(const uint8_t *p, uint16_t mask, struct segment *s,
     const axes_t was = motion.plan_fraction.back, fine = s->fine;
     axes_t bit = 1, back = s->back | (was & ~(axes_t)mask);
     memset(s->rate, 0, sizeof s->rate);
-    for (uint8_t i = 0; mask; i++, mask >>= 1, bit <<= 1) {
+    for (uint8_t i = 0; i < AXES; i++, mask >>= 1, bit <<= 1) {
         if (!(mask & 1)) {
             continue;
         }
@@ -139,6 +139,7 @@ APART static void read_rates(const uint8_t *p, uint16_t mask, struct segment *s,
 }
 
 static inline __attribute__((always_inline)) void check_changes(const struct segment *a, const struct pace *before, const struct segment *s, const struct pace *pace, struct look *look) {
+    //@ loop unroll AXES;
     for (uint8_t i = 0; (i = next_unclear(i, look->past, before, s, pace)) < look->past; i++) {
         if (accelerates(i, a, before, s, pace)) {
             found(look, i, E_ACCEL);
@@ -151,6 +152,7 @@ APART static void plan_axes(uint16_t mask, const struct segment *s, struct look 
     const axes_t turning = motion.plan_fraction.back ^ s->back;
     const uint16_t ticks = s->ticks;
     uint8_t named = mask, turned = turning, back = s->back, fine = s->fine, bit = 1;
+    //@ loop unroll AXES;
     for (uint8_t i = 0; i < look->past; i++) {
         fine_t *const phase = &motion.plan_fraction.phase[i];
         if (turned & bit) {
