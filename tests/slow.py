@@ -161,6 +161,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "firmware/test_analyser.py": (),
     "firmware/test_handshake.py": (),
     "firmware/test_latencies.py": (),
+    "firmware/test_noise.py": (),
     "firmware/test_proved_core.py": (),
     "firmware/test_short_tick.py": (),
     "firmware/test_stack_bound.py": (),

@@ -51,7 +51,7 @@ class Program:
         self.elf = elf
         command = ["avr-objdump", "-d", "--no-show-raw-insn", str(elf)]
         text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        self.names = {int(address, 16): name for address, name in SYMBOL.findall(text)}
+        self.names: dict[int, str] = {int(address, 16): name for address, name in SYMBOL.findall(text)}
         found = [(int(a, 16), n, o, t) for a, n, o, t in LINE.findall(text)]
         self.code: dict[int, Instruction] = {}
         for (address, name, operands, target), (after, *_) in zip(found, [*found[1:], (-1,)], strict=True):

@@ -27,6 +27,6 @@ configuration.py          a robot file as its board must know it
 machine.py                the arm: configured, its position known or lost, moved by plans
 homing.py                 homing by limit switches
 jogging.py, gripping.py   one joint at a constant speed; the gripper, whose counts are in gripper_counts.py
-resuming.py               resuming a motion after a feed hold
+resuming.py               resuming a motion after a feed hold; onwards.py: what is left of a plan
 board_status.py           what `status` tells besides the position, and why a board refused, in words
 """

@@ -9,16 +9,19 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.firmware import protocol, streaming, trajectory_to_counts
 from armkin.board.firmware.board_status import WHY, as_json
+from armkin.board.firmware.onwards import onwards, places_on
 from armkin.board.firmware.protocol import Error, Flag, Status
 from armkin.board.firmware.session import DeviceError, Session
 from armkin.board_kinds import board_name
 from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
-from armkin.motors import pulses
+from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
@@ -189,7 +192,7 @@ class Machine(Backend):
         """
         try:
             self.status, end = streaming.carry_out(
-                self.session, from_counts(plans, self.counts), self.configuration.axes, progress
+                self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self._onwards
             )
         except StoppedError as stopped:
             self.status = stopped.status or self.status
@@ -205,6 +208,12 @@ class Machine(Backend):
                 "a bug in armkin or its firmware, please report it"
             )
         return self.status
+
+    def _onwards(self, plan: trajectory_to_counts.Cut, stands: list[int]) -> trajectory_to_counts.Cut | None:
+        """What is left of a plan for an arm that stands at these counts; None: not on it."""
+        counts = np.array(stands, dtype=np.int64)
+        place = next(places_on([plan], counts), None)
+        return None if place is None else self.lay(onwards(plan, place, joints(self.arm, counts)), counts)
 
     def in_time(self) -> None:
         """Raise LinkError if the board says that ticks came late."""

@@ -10,25 +10,20 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.protocol import STEP
+from armkin.board.firmware.onwards import Place, onwards, places_on
 from armkin.board.firmware.trajectory_to_counts import Cut
 from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
-from armkin.motion.remainder import remainder
-from armkin.motion.trajectory import Trajectory
-from armkin.motors import places
 
 if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine
 
-_NEAR = 1.5  # steps that every motor of an arm on its plan is within
 _SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
 _NOTED = 0.5  # [s] between two notes while the arm moves
 _MOST = 65_536  # [bytes] of a note
@@ -43,16 +38,6 @@ class Note:
     start: list[int]  # counts where it began
     seconds: float  # of the plan that were done, about
     stands: list[int] | None = None  # counts where it came to rest; None: the sender ended before it was told
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where an arm stands on its plan."""
-
-    part: int
-    stretch: int  # of the part
-    seconds: float  # since the stretch began
-    done: float  # seconds since the plan began
 
 
 def digest(parts: Sequence[Cut]) -> str:
@@ -147,7 +132,7 @@ def find(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
     """
     if digest(parts) != note.plan:
         raise NothingHeldError("this is another motion than the one that was held")
-    found = list(_places(parts, np.array(machine.counts())))
+    found = list(places_on(parts, np.array(machine.counts())))
     if not found:
         raise LinkError(
             f"the arm does not stand on the motion that was held: {machine.describe()}",
@@ -159,52 +144,9 @@ def find(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
 
 def rest(machine: Machine, parts: Sequence[Cut], place: Place) -> list[Cut]:
     """What is left of the parts from a place on: the first one from where the arm stands, the others as they are."""
-    part = parts[place.part]
-    here = machine.joints()
-    stretches = part.trajectory.stretches
-    first = remainder(machine.arm, stretches[place.stretch], place.seconds, here)
-    left = Trajectory(machine.arm, here, (first, *stretches[place.stretch + 1 :]))
+    left = onwards(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)
     return [machine.lay(left, counts), *parts[place.part + 1 :]]
-
-
-def _places(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
-    """All places on a plan where the counts lie, in order: one a segment that passes them."""
-    before = 0.0
-    for p, part in enumerate(parts):
-        for k, move in enumerate(part.moves()):
-            segments = list(move.segments)
-            stretch = part.trajectory.stretches[k]
-            begin = before + float(part.trajectory.begins[k])
-            if not segments:
-                if np.abs(move.start - counts).max(initial=0) <= _NEAR:
-                    yield Place(p, k, 0.0, begin)
-                continue
-            steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
-            ends = move.start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
-            ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
-            times = ticks / ticks[-1] * stretch.duration
-            for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
-                way = b - a
-                share = float(np.clip((counts - a) @ way / max(way @ way, 1e-12), 0.0, 1.0))
-                if np.abs(a + share * way - counts).max(initial=0) <= _NEAR:
-                    at = _refined(part, k, t0 + share * (t1 - t0), counts)
-                    yield Place(p, k, at, begin + at)
-        before += part.duration
-
-
-def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
-    """The time within a stretch when its motors are nearest to the counts (Gauss-Newton from a guess)."""
-    arm, stretch = part.trajectory.arm, part.trajectory.stretches[number]
-    t = guess
-    for _ in range(8):
-        when = np.array([t])
-        off = counts - places(arm, stretch.at(when))[0]
-        speed = stretch.at(when, 1)[0] @ arm.motor_gain.T
-        if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
-            break
-        t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
-    return t
 
 
 def _read(path: str) -> Note | None:

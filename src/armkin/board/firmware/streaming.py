@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.trajectory_to_counts import Cut
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
-_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.51
+_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.1
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
@@ -38,12 +38,17 @@ _BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made 
 
 
 def carry_out(
-    session: Session, plans: Iterable[Cut | None], axes: Sequence[int], progress: Progress
+    session: Session,
+    plans: Iterable[Cut | None],
+    axes: Sequence[int],
+    progress: Progress,
+    onwards: Callable[[Cut, list[int]], Cut | None],
 ) -> tuple[Status, Counts | None]:
     """Carry out plans, one after another; None in between: nothing to do yet. axes: the motors' on the board.
 
     Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session. If the
-    queue runs dry before the first step, it begins again, with more time to fill.
+    queue runs dry before the first step, it begins again, with more time to fill; behind it, too, where the line has
+    damaged what was to fill it: then with what is left of the plan, as `onwards` says.
     """
     end: Counts | None = None
     total = begun = done = 0.0
@@ -76,11 +81,16 @@ def carry_out(
         if error.error != Error.DRY or session.port.now() - since > _LEAD_MOST + _BEGUN or len(first) != 1:
             raise
         status = session.rest()
-        if any(status.counts[axis] != count for axis, count in zip(axes, first[0].start.tolist(), strict=True)):
+        counts = [status.counts[axis] for axis in axes]
+        left: Cut | None = first[0]
+        if counts != first[0].start.tolist():
+            known = all(status.known >> axis & 1 for axis in axes)
+            left = onwards(first[0], counts) if known and session.line.damaged else None
+        if left is None:
             raise
         session.reopen()
         total = begun = 0.0
-        return stream(session, frames(chain([first[0]], source), _LEAD_MOST), tell), end
+        return stream(session, frames(chain([left], source), _LEAD_MOST), tell), end
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
@@ -147,10 +157,9 @@ def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: floa
 
     frames: the first of the motion: seconds, segments and bytes on the line of each.
     """
-    if session.line.damaged:
-        return _LEAD_BAD
     busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
-    return max(least, busy, min(_LEAD + _behind(session, frames), _LEAD_MOST))
+    bad = _LEAD_BAD if session.line.damaged else 0.0
+    return max(least, busy, bad, min(_LEAD + _behind(session, frames), _LEAD_MOST))
 
 
 def _behind(session: Session, frames: Sequence[tuple[float, int, int]]) -> float:

@@ -1,0 +1,77 @@
+"""Where an arm stands on a plan, and what is left of the plan from there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.board.firmware.protocol import STEP
+from armkin.motion.remainder import remainder
+from armkin.motion.trajectory import Trajectory
+from armkin.motors import places
+
+if TYPE_CHECKING:
+    from armkin.board.firmware.trajectory_to_counts import Cut
+    from armkin.formula.arrays import Array
+
+_NEAR = 1.5  # steps that every motor of an arm on its plan is within
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an arm stands on its plan."""
+
+    part: int
+    stretch: int  # of the part
+    seconds: float  # since the stretch began
+    done: float  # seconds since the plan began
+
+
+def onwards(part: Cut, place: Place, here: Array) -> Trajectory:
+    """What is left of a part of a plan, from rest at joint values (n,) [rad | mm] that lie on it."""
+    stretches, arm = part.trajectory.stretches, part.trajectory.arm
+    first = remainder(arm, stretches[place.stretch], place.seconds, here)
+    return Trajectory(arm, here, (first, *stretches[place.stretch + 1 :]))
+
+
+def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
+    """All places on a plan where the counts lie, in order: one a segment that passes them."""
+    before = 0.0
+    for p, part in enumerate(parts):
+        for k, move in enumerate(part.moves()):
+            segments = list(move.segments)
+            stretch = part.trajectory.stretches[k]
+            begin = before + float(part.trajectory.begins[k])
+            if not segments:
+                if np.abs(move.start - counts).max(initial=0) <= _NEAR:
+                    yield Place(p, k, 0.0, begin)
+                continue
+            steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
+            ends = move.start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
+            ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
+            times = ticks / ticks[-1] * stretch.duration
+            for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
+                way = b - a
+                share = float(np.clip((counts - a) @ way / max(way @ way, 1e-12), 0.0, 1.0))
+                if np.abs(a + share * way - counts).max(initial=0) <= _NEAR:
+                    at = _refined(part, k, t0 + share * (t1 - t0), counts)
+                    yield Place(p, k, at, begin + at)
+        before += part.duration
+
+
+def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
+    """The time within a stretch when its motors are nearest to the counts (Gauss-Newton from a guess)."""
+    arm, stretch = part.trajectory.arm, part.trajectory.stretches[number]
+    t = guess
+    for _ in range(8):
+        when = np.array([t])
+        off = counts - places(arm, stretch.at(when))[0]
+        speed = stretch.at(when, 1)[0] @ arm.motor_gain.T
+        if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
+            break
+        t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
+    return t

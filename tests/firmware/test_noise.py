@@ -1,0 +1,68 @@
+"""armkin's sender before the compiled firmware over a line that damages bytes, or is dead now and then: simulated time.
+
+A computer that has nothing else to do begins a motion at once, and its queue is not full yet when a frame is lost.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from emulator import EmulatedBoard
+from stepped_port import SteppedPort
+
+import armkin
+from armkin.board.firmware import streaming
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+
+ARM = armkin.load("three_dof")
+LOADS = {"quiet": 0.0, "busy": 3.0}
+WAY = [[100, 60, -90], [-100, 10, -20]]  # deg; 5.7 s
+
+
+def seconds(who: str, *line: str) -> float:
+    """How long the way takes, what is done to the line included; the counts are checked, and the pins."""
+    with EmulatedBoard(speed="step", reset_on_open=False) as board, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(streaming, "_load", lambda session: LOADS[who])
+        port = SteppedPort(board, 0.0005)
+        port.wait(0.02)
+        machine = Machine(port, ARM, configure(ARM))
+        machine.prepare(assume=ARM.home)
+        for command in line:
+            board.control(command)
+        began = port.now()
+        for degrees in WAY:
+            plan = machine.plan(machine.counts(), np.deg2rad(degrees))
+            machine.run([plan])
+            assert machine.counts() == tuple(plan.end.tolist())
+        took = port.now() - began
+        net = board.stats()["axes"]
+        assert [net[axis]["net"] for axis in "XYZ"] == list(machine.counts())
+        return took
+
+
+@cache
+def clean(who: str) -> float:
+    """The same over a good line."""
+    return seconds(who)
+
+
+@pytest.mark.parametrize(
+    ("who", "rate", "seed"),
+    [("quiet", 0.001, 2), ("quiet", 0.001, 3), ("quiet", 0.01, 1), ("quiet", 0.0125, 1), ("busy", 0.01, 2)],
+)
+def test_noise_ends_at_exact_counts(who: str, rate: float, seed: int) -> None:
+    """Of these quiet ones three were held on their first degree."""
+    took = seconds(who, f"noise flip {rate} seed {seed}")
+    assert (
+        took < clean(who) * (1.05 if rate <= 0.001 or who == "busy" else 1.1) + 0.7
+    )  # a beginning that is gone on with
+
+
+@pytest.mark.parametrize("who", LOADS)
+def test_a_line_that_is_dead_now_and_then_is_bridged(who: str) -> None:
+    """0.2 s every 3 s."""
+    dead = [f"after {ms + more}ms {what}" for ms in (1700, 4700) for more, what in ((0, "cut both"), (200, "restore"))]
+    assert seconds(who, *dead) < 1.05 * clean(who)
