@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion import fitting
+from armkin.motion import branch_path, fitting
 from armkin.motion.b_spline import banded
 from armkin.motion.path_plan import PathPlan
 
@@ -206,6 +206,25 @@ def test_a_banded_system_is_solved() -> None:
         A = sum(np.diag(bands[k, : n - k], k) + (np.diag(bands[k, : n - k], -k) if k else 0) for k in range(min(4, n)))
         b = rng.normal(size=(n, 2))
         np.testing.assert_allclose(banded(bands, b), np.linalg.solve(A, b), atol=1e-12)
+
+
+@pytest.mark.parametrize("jerk", [None, 60.0])
+def test_many_rests_are_planned_at_once_as_each_alone(
+    three_dof: Arm, monkeypatch: pytest.MonkeyPatch, jerk: float | None
+) -> None:
+    saw = CENTRE + np.array([[25.0 * (-1) ** k, 0.5 * k, 0.1 * k] for k in range(14)])
+    plan = armkin.path(three_dof, saw, corners="tolerance", jerk=jerk)
+    monkeypatch.setattr(branch_path, "_MANY", 1000)
+    alone = armkin.path(three_dof, saw, corners="tolerance", jerk=jerk)
+    assert len(plan.motion.stretches) == len(alone.motion.stretches) == 14  # one leads to the start
+    assert plan.duration == pytest.approx(alone.duration, rel=4e-3)
+    for share in ("speed", "accel"):
+        assert plan.limits[share].max() <= 1.001
+    for one, other in zip(plan.motion.stretches, alone.motion.stretches, strict=True):
+        np.testing.assert_allclose(one.end, other.end, atol=1e-9)
+        assert np.abs(one.at(np.array([0.0, one.duration]), 1)).max() <= 1e-9
+    tip = armkin.fk(three_dof, plan.q(plan.motion.begins[1:]))[:, :3, 3]
+    np.testing.assert_allclose(tip, saw, atol=1e-6)
 
 
 def ragged(seed: int) -> np.ndarray:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _GRID = 1000  # points of a route's grid, at least
 _STEP = 1.0  # [mm] between the first samples, at most
 _SAMPLES = (200, 20_000)
+_MANY = 8  # rests: all that lies between them is planned at once
 _FARTHEST = 2.0  # [mm] between those of a path that has more
 
 
@@ -161,29 +162,38 @@ def stretches(
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
+    edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
+    kept = None if grid < _GRID else pace.tolerance
+    if len(edges) > _MANY:  # what lies between two rests is independent: one grid and one law for all
+        number, inner = max(grid, len(s) * grid // (2 * _GRID)), np.array(edges[1:-1])
+        path, _, off = fine_enough(arm, route, s, q, edges[0], edges[-1], number, kept, run.chain.windows, inner)
+        _check_kept(path, off, pace)
+        return _timed(arm, route, path, pace)
     made: list[Curve | Smoothed] = []
     for a, b in pairwise(edges):
-        if b - a <= 1e-9:
-            continue
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        tolerance = None if grid < _GRID else pace.tolerance
-        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, tolerance, run.chain.windows)
-        if off > pace.tolerance:
-            raise NoSolutionError(
-                f"between {a:.3f} and {b:.3f} mm the plan may leave the path by {off:.3g} mm; "
-                f"{pace.tolerance:g} are allowed: nothing was moved"
-            )
+        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows)
+        _check_kept(path, off, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
-        made.append(_timed(arm, route, knots(path.s, path.q, breaks), pace))
+        made += _timed(arm, route, finer(knots(path.s, path.q, breaks)), pace)
     return made
 
 
-def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
-    """The fastest law of time on a grid."""
-    path = finer(path)
+def _check_kept(path: Knots, off: Array, pace: Pace) -> None:
+    """Raise NoSolutionError where a grid's cubics may leave the path."""
+    k = int(off.argmax())
+    if off[k] > pace.tolerance:
+        raise NoSolutionError(
+            f"between {path.s[k]:.3f} and {path.s[k + 1]:.3f} mm the plan may leave the path by {off[k]:.3g} mm; "
+            f"{pace.tolerance:g} are allowed: nothing was moved"
+        )
+
+
+def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoothed]:
+    """The fastest law of time on a grid, from each rest to the next."""
     cap, fraction = _caps(arm, route, path, pace)
     accel = arm.max_accel * pace.accel
     window = 0.0
@@ -191,8 +201,12 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> Curve | Smoothed:
         window = float((2 * accel / pace.jerk).max())
         cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
-    curve = Curve(path, optimal(path, Bounds(speed, accel, cap), coupled(arm, pace.accel)))
-    return Smoothed(curve, window) if window else curve
+    x = optimal(path, Bounds(speed, accel, cap), coupled(arm, pace.accel))
+    made: list[Curve | Smoothed] = []
+    for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
+        curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
+        made.append(Smoothed(curve, window) if window else curve)
+    return made
 
 
 def _caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:

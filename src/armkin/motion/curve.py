@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -156,3 +157,11 @@ class Smoothed:
 def way_of(stretch: Curve | Smoothed) -> Knots:
     """The way through joint space of a curve, or of the one that was made smooth."""
     return stretch.path if isinstance(stretch, Curve) else stretch.curve.path
+
+
+def ways_of(stretches: Sequence[Curve | Smoothed]) -> Knots:
+    """The ways of stretches one after another as one, with a rest between each two."""
+    ways = [way_of(one) for one in stretches]
+    if len(ways) == 1:
+        return ways[0]
+    return Knots(*(np.concatenate([getattr(way, part) for way in ways]) for part in ("s", "q", "d")))

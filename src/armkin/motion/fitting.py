@@ -130,63 +130,72 @@ def corners(y: Array, tolerance: float) -> Bool:
 def fitted(y: Array, tolerance: float) -> Fitted:
     """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order."""
     chords = Chords(y, corners(y, tolerance))
+    used, parts = np.ones(len(y) - 1, bool), []
     for round_ in range(_TRIES + 1):
-        begin, end, powers, curve, missed = _curves(chords, tolerance)
-        if not missed.any():
-            break
+        begin, end, powers, missed = _curves(chords, used, tolerance)
         # cubics that waver: the chords themselves, rounded; in the end all of such a curve's
-        chords = Chords(y, chords.corner | (missed if round_ + 1 < _TRIES else _of_curves(chords, missed)))
+        again = _of_curves(chords, missed)
+        kept = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
+        parts.append((begin[kept], end[kept], powers[kept]))
+        if not again.any() or round_ == _TRIES:
+            break
+        inside = np.concatenate([[False], again[1:] & again[:-1] & ~chords.corner[1:-1], [False]])
+        used, chords = again, Chords(y, chords.corner | (missed if round_ + 1 < _TRIES else inside))
+    begin, end, powers = (np.concatenate(some) for some in zip(*parts, strict=True))
+    order = np.argsort(begin, kind="stable")
+    begin, end, powers = begin[order], end[order], powers[order]
+    curve = chords.curve[np.searchsorted(chords.u, (begin + end) / 2) - 1]
     return _rounded(chords, begin, end, powers, curve, tolerance)
 
 
 def _of_curves(chords: Chords, some: Bool) -> Bool:
-    """All points inside of the curves that have some of the points (N,)."""
-    curve = chords.curve
-    found = np.zeros(int(curve[-1]) + 1, bool)
-    found[curve[some[:-1]]] = found[curve[some[1:]]] = True
-    return np.concatenate([[False], found[curve[1:]] & (curve[1:] == curve[:-1]), [False]])
+    """All chords (N - 1,) of the curves that some points (N,), none of them a corner, lie inside of."""
+    found = np.zeros(int(chords.curve[-1]) + 1, bool)
+    found[chords.curve[np.flatnonzero(some)]] = True
+    return np.asarray(found[chords.curve])
 
 
-def _curves(chords: Chords, tolerance: float) -> tuple[Array, Array, Array, Int, Bool]:
-    """Cubics of all curves: begin, end (M,), powers (M, 4, d), curve (M,); and which points they miss (N,)."""
+def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array, Array, Bool]:
+    """Cubics of all curves whose chords are used: begin, end (M,), powers (M, 4, d); which points they miss (N,)."""
     curve, u, y = chords.curve, chords.u, chords.y
     missed = np.zeros(len(y), bool)
-    count = np.bincount(curve)
-    alone = count[curve] == 1  # a straight line
+    alone = (np.bincount(curve)[curve] == 1) & used  # a straight line
     flat = np.zeros((int(alone.sum()), 4, y.shape[1]))
     flat[:, 0], flat[:, 1] = y[:-1][alone], chords.step[alone]
-    begin, end, powers, which = u[:-1][alone], u[1:][alone], flat, curve[alone]
-    if not alone.all():
-        rows = _Rows.of(chords, ~alone, tolerance)
+    begin, end, powers = u[:-1][alone], u[1:][alone], flat
+    bent = used & ~alone
+    if bent.any():
+        rows = _Rows.of(chords, bent, tolerance)
         layout, control, off = _least_knots(rows)
         bad = off > 1.0
         missed[rows.point[bad & (rows.point >= 0)]] = True
-        beside = rows.chord[bad & (rows.point < 0)]
-        missed[beside] = missed[beside + 1] = True
-        numbers = rows.curves[layout.curve]
         cubics = layout.powers(control)
-        beside = _astray_chords(chords, layout, cubics, tolerance)
-        missed[beside] = missed[beside + 1] = True
+        for beside in (rows.chord[bad & (rows.point < 0)], _astray_chords(chords, layout, cubics, tolerance)):
+            missed[beside] = missed[beside + 1] = True
+        missed |= _astray_points(chords, bent, layout, cubics, tolerance)
         begin, end = np.append(begin, layout.begin), np.append(end, layout.end)
-        powers, which = np.concatenate([powers, cubics]), np.append(which, numbers)
-        order = np.argsort(begin, kind="stable")
-        begin, end, powers, which = begin[order], end[order], powers[order], which[order]
-        missed |= _astray_points(Fitted(np.append(begin, end[-1]), powers, u, np.zeros(0)), y, tolerance)
+        powers = np.concatenate([powers, cubics])
     missed[[0, -1]] = False
     missed &= ~chords.corner
-    return begin, end, powers, which, missed
+    return begin, end, powers, missed
 
 
-def _astray_points(curve: Fitted, y: Array, tolerance: float) -> Bool:
-    """Which of the given points (N, d) lie farther from a curve than allowed."""
-    at, least = curve.at, np.full(len(y), np.inf)
+def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
+    """Which of the given points inside of the used curves lie farther from the cubics than allowed: (N,)."""
+    inside = np.concatenate([[False], used[1:] & used[:-1] & ~chords.corner[1:-1], [False]])
+    number = np.flatnonzero(inside)
+    y, at, least = chords.y[number], chords.u[number], np.full(len(number), np.inf)
     for _ in range(3):  # the nearest place is a little before or behind
-        p, slope = curve.values(at)
-        off = y - p
+        i = np.clip(np.searchsorted(layout.begin, at, side="right") - 1, 0, len(cubics) - 1)
+        h = layout.end[i] - layout.begin[i]
+        f = np.clip((at - layout.begin[i]) / h, 0.0, 1.0)[:, None]
+        c0, c1, c2, c3 = (cubics[:, k][i] for k in range(4))
+        off, slope = y - (c0 + f * (c1 + f * (c2 + f * c3))), (c1 + f * (2 * c2 + 3 * f * c3)) / h[:, None]
         least = np.minimum(least, (off**2).sum(axis=1))
         way = (off * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
-        at = np.clip(at + np.clip(way, -1.0, 1.0), curve.begin[0], curve.begin[-1])
-    return np.asarray(least > tolerance**2)
+        at = at + np.clip(way, -1.0, 1.0)
+    inside[number[least <= tolerance**2]] = False
+    return inside
 
 
 def _astray_chords(chords: Chords, layout: Layout, cubics: Array, tolerance: float) -> Int:

@@ -28,7 +28,7 @@ SMALL = 1e-9  # [mm] shorter pieces are no pieces
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
 _TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
 _TABLES = 20_000  # of all spans
-_EVEN = 1e-9  # of a slope: less change is none
+_EVEN, _EXACT = 1e-9, 1e-6  # of a slope: less change is none; [mm] of a length
 
 
 def turn(w: Array) -> Array:
@@ -303,7 +303,7 @@ def unit_speed(
     Returns also the function from parameters to lengths.
     """
     scale = weights(task)
-    grid = np.append(_places(u, np.where(_even(at, u, scale), 1, _intervals(len(u) - 1))), u[-1])
+    grid = np.append(_places(u, _table(at, u, scale)), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
@@ -322,13 +322,16 @@ def unit_speed(
     return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 
 
-def _even(at: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.bool_]:
-    """Which spans between the values u are straight, and passed evenly: their table of lengths is one interval."""
-    f = np.arange(5) / 4
+def _table(at: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
+    """How many intervals of a table of lengths each span between the values u needs: one that is passed evenly, one."""
+    f = (np.arange(4) + 0.5) / 4
     v = u[:-1, None] + np.diff(u)[:, None] * f
     slopes = (at(v.ravel())[1] * scale).reshape(*v.shape, -1)
-    apart = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2))
-    return np.asarray(apart <= _EVEN * np.abs(slopes).max(axis=(1, 2)))
+    most = np.abs(slopes).max(axis=(1, 2))
+    length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
+    needed = np.ceil((length / _EXACT) ** 0.25)  # Hermite's error falls with the fourth power
+    even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN * most
+    return np.where(even, 1, np.clip(needed, _LEAST_TABLE, _intervals(len(u) - 1))).astype(np.intp)
 
 
 def _intervals(spans: int) -> int:

@@ -24,6 +24,7 @@ _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
 _DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_REST = 32  # intervals from rest to rest, at least, where there are many rests
 _SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
@@ -38,21 +39,27 @@ def fine_enough(
     number: int,
     tolerance: float | None,
     windows: tuple[Window, ...] = (),
-) -> tuple[Knots, list[int], float]:
+    stops: Array | None = None,
+) -> tuple[Knots, list[int], Array]:
     """A grid from length a to b: cubics, numbers of the points where q'' jumps, and how far they may leave the route.
 
     s, q: samples (N,), (N, n) of the branch. The grid has `number` points, and more in the intervals that may leave
-    the route by more than `tolerance` [mm]; None: whatever they do. windows: where the wrist passes a singularity.
+    the route by more than `tolerance` [mm]; None: whatever they do. windows: where the wrist passes a singularity;
+    stops: (k,) lengths at which it rests. The last: (M,) [mm] for each interval.
     """
-    where, breaks = _places(arm, route, s, q, a, b, number, windows)
+    stops = np.zeros(0) if stops is None else stops
+    where, breaks = _places(arm, route, s, q, a, b, number, windows, stops)
+    resting = _nearest(where[breaks], stops)
     most = _TIMES * len(where)
     for damping in _DAMPING:
         known = None
         for _ in range(_ROUNDS):
-            path = known = _solved(arm, route, s, q, where, breaks, damping, known, windows)
+            values = _solved(arm, route, s, q, where, damping, known, windows)
+            path = known = knots(where, values, breaks.tolist(), breaks[resting].tolist())
             if tolerance is None:
-                return path, breaks.tolist(), 0.0
-            off = interval_deviations(arm, route, path)
+                return path, breaks.tolist(), np.zeros(len(path.h))
+            every = interval_deviations(arm, route, path)
+            off = np.delete(every, path.rests)
             if off.max() <= tolerance or len(where) > most:
                 break
             parts = np.ceil(np.clip(1.1 * np.sqrt(off / tolerance), 1.0, 4.0)).astype(int)
@@ -60,12 +67,23 @@ def fine_enough(
             where, breaks = _divided(where, breaks, np.maximum(parts, 1 + beside))
         if off.max() <= tolerance:
             break
-    return path, breaks.tolist(), float(off.max())
+    return path, breaks.tolist(), every
+
+
+def _nearest(sorted_: Array, values: Array) -> Int:
+    """The nearest of sorted numbers (N,) for each of the values: (k,)."""
+    if not len(values):
+        return np.zeros(0, np.intp)
+    i = np.clip(np.searchsorted(sorted_, values), 1, max(len(sorted_) - 1, 1))
+    if len(sorted_) == 1:
+        return np.zeros(len(values), np.intp)
+    return np.asarray(np.where(values - sorted_[i - 1] < sorted_[i] - values, i - 1, i))
 
 
 def _places(
-    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, windows: tuple[Window, ...]
-) -> tuple[Array, Int]:
+    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, windows: tuple[Window, ...],
+    stops: Array,
+) -> tuple[Array, Int]:  # fmt: skip
     """Grid points that follow way and joints, and which of them are breaks."""
     bends = np.sort(np.concatenate([route.breaks, *([one.begin, one.end] for one in windows)]))
     first, last = np.searchsorted(bends, [a + 1e-9, b - 1e-9])
@@ -76,7 +94,11 @@ def _places(
     total = max(float(at[-1] - at[0]), 1e-12)
     each = int(np.clip(2 * number / (len(edges) - 1), *_EACH))
     share = _MOTION * np.diff(at) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
-    count = np.maximum((number * share).astype(int), each)
+    least = np.full(len(share), each)
+    if len(stops):
+        of = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # which part between two stops
+        least = np.maximum(least, -(-_REST // np.bincount(of)[of]))
+    count = np.maximum((number * share).astype(int), least)
     # places at equal steps of a level that rises with motion and way, in each section between two edges
     grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
     level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
@@ -105,11 +127,10 @@ def _solved(
     s: Array,
     q: Array,
     where: Array,
-    breaks: Int,
     damping: float,
     known: Knots | None,
     windows: tuple[Window, ...],
-) -> Knots:
+) -> Array:
     """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
     values, new = np.empty((len(where), arm.n)), np.ones(len(where), bool)
     if known is not None:
@@ -121,7 +142,7 @@ def _solved(
         inside = new & (where > one.begin) & (where < one.end)
         if inside.any():
             values[inside] = one.joints(arm, route, where[inside], one.copy_of(arm, guess[inside[new]][0]))
-    return knots(where, values, breaks.tolist())
+    return values
 
 
 def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:
@@ -166,7 +187,9 @@ def interval_deviations(arm: Arm, route: Route, path: Knots) -> Array:
     """
     lever = levers(arm)
     parts = [slice(i, i + _BLOCK + 1) for i in range(0, len(path.s) - 1, _BLOCK)]
-    return np.concatenate([_deviations(arm, route, Knots(path.s[p], path.q[p], path.d[p]), lever) for p in parts])
+    off = np.concatenate([_deviations(arm, route, Knots(path.s[p], path.q[p], path.d[p]), lever) for p in parts])
+    off[path.rests] = 0.0
+    return off
 
 
 def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Bool
 from armkin.motion.scan import ahead, back, least_of, scan
 
 Int = NDArray[np.intp]
@@ -52,7 +52,10 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Knots:
-    """A joint path as cubics between grid points: q, q' at the points, and q'' at both ends of every interval."""
+    """A joint path as cubics between grid points: q, q' at the points, and q'' at both ends of every interval.
+
+    Where a path rests in a corner the point stands twice, with the slopes before and behind it: an interval of no way.
+    """
 
     s: Array  # (N,)
     q: Array  # (N, n)
@@ -60,8 +63,14 @@ class Knots:
 
     @cached_property
     def h(self) -> Array:
-        """Lengths of the intervals: (N - 1,)."""
-        return np.asarray(self.s[1:] - self.s[:-1])
+        """Lengths of the intervals: (N - 1,); 1 where the path rests, whatever is divided by it."""
+        h = self.s[1:] - self.s[:-1]
+        return np.asarray(np.where(h == 0.0, 1.0, h))
+
+    @cached_property
+    def rests(self) -> Int:
+        """Intervals in which the path rests: (k,)."""
+        return np.flatnonzero(self.s[1:] == self.s[:-1])
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """q and q' at lengths s: (M,) -> (M, n) twice."""
@@ -81,25 +90,16 @@ class Knots:
         return left, right
 
 
-def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
+def knots(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] = ()) -> Knots:
     """Slopes of samples from five neighbours each, none of them beyond a break (indices where q'' jumps).
 
     s: (N,) increasing; q: (N, n). The slopes are exact to the fourth order of the spacing; at a break it is the
-    mean of both sides'.
+    mean of both sides', but for those of them where the path rests, which stand twice.
     """
     N = len(s)
     edges = np.unique([0, N - 1, *breaks])
-    if len(edges) > _SECTIONS and np.diff(edges).min() >= _NEIGHBOURS - 1:  # many short sections, all at once
-        size = np.diff(edges) + 1
-        first = np.repeat(edges[:-1], size)
-        i = np.arange(int(size.sum())) - np.repeat(np.cumsum(size) - size, size) + first
-        last = np.repeat(edges[1:], size)
-        parts = [slice(some.start, some.stop) for some in in_parts(len(i))]
-        slopes = np.concatenate([_slopes_at(s, q, i[some], first[some], last[some]) for some in parts])
-        begin = np.cumsum(size) - size
-        total = slopes[np.concatenate([[True], i[1:] != i[:-1]])]
-        total[edges[1:-1]] = (slopes[begin[1:] - 1] + slopes[begin[1:]]) / 2
-        return Knots(s, q, total)
+    if len(rests) or (len(edges) > _SECTIONS and np.diff(edges).min() >= _NEIGHBOURS - 1):
+        return _in_sections(s, q, edges, np.isin(edges[1:-1], rests))
     total, count = np.zeros_like(q), np.zeros(N)
     for lo, hi in pairwise(edges.tolist()):
         for some in in_parts(hi + 1 - lo):
@@ -108,6 +108,22 @@ def knots(s: Array, q: Array, breaks: Sequence[int] = ()) -> Knots:
         count[lo : hi + 1] += 1
     total /= count[:, None]
     return Knots(s, q, total)
+
+
+def _in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
+    """`knots` of many short sections, all at once; rests: (k,) at which of the edges between two of them it rests."""
+    size = np.diff(edges) + 1
+    first = np.repeat(edges[:-1], size)
+    begin = np.cumsum(size) - size
+    i = np.arange(int(size.sum())) - np.repeat(begin, size) + first
+    last = np.repeat(edges[1:], size)
+    parts = [slice(some.start, some.stop) for some in in_parts(len(i))]
+    slopes = np.concatenate([_slopes_at(s, q, i[some], first[some], last[some]) for some in parts])
+    smooth = begin[1:][~rests]
+    slopes[smooth - 1] = (slopes[smooth - 1] + slopes[smooth]) / 2
+    keep = np.ones(len(i), bool)
+    keep[smooth] = False
+    return Knots(s[i[keep]], q[i[keep]], slopes[keep])
 
 
 def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
@@ -135,7 +151,7 @@ def finer(path: Knots) -> Knots:
 
     With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
     """
-    if len(path.s) >= _FEW:
+    if len(path.s) >= _FEW or len(path.rests):
         return path
     parts = max(2, round(200 / len(path.s)))
     h, f = path.h[:, None], (np.arange(parts) / parts)[:, None, None]
@@ -241,13 +257,14 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
         for some in in_parts(len(cap)):
             rate = np.ascontiguousarray((speed[some] / np.maximum(np.abs(path.d[some]), TINY)).T).min(axis=0)
             cap[some] = np.minimum(cap[some], rate**2)
-        cap[0] = cap[-1] = 0.0
+        cap[0] = cap[-1] = cap[path.rests] = cap[path.rests + 1] = 0.0
         if len(cap) < 2:
             return np.asarray(cap)
         share = np.ones((path.q.shape[1] + (0 if rows is None else len(rows[0])), len(path.h)), np.float32)
         accel = np.broadcast_to(bounds.accel, path.q.shape)
         whole = np.broadcast_to(np.ones((), np.float32), share.shape)
         given, limits = (_motions(path, accel, rows, each) for each in (share, whole))
+        worst = np.ones(len(path.h))
         for round_ in range(_ROUNDS):
             x, most = _fastest(cap.copy(), path.h, given), 0.0
             for some in in_parts(len(path.h)):
@@ -255,7 +272,8 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
                 motion = limits(some)
                 over = motion.excess(x[ends])
                 rush = motion.rush(x[ends], np.minimum(speed[ends][:-1], speed[ends][1:]).T)
-                most = max(most, float(over.max()), float(rush.max()))
+                worst[some] = np.maximum(over.max(axis=0), rush)
+                most = max(most, float(worst[some].max()))
                 if round_ < _SHARED:
                     share[:, some] /= np.where(over > 1.0, over, 1.0)
                 else:
@@ -265,7 +283,9 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
                 cap[ends][1:] = np.fmin(cap[ends][1:], x[ends][1:] / less)
             if most <= _EXCESS:
                 return x
-        return np.asarray(x / most)
+        begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
+        slower = np.maximum(np.maximum.reduceat(worst, begins), 1.0)
+        return np.asarray(x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
 
 
 def in_parts(intervals: int) -> list[slice]:

@@ -21,7 +21,7 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, said
 from armkin.motion import branch_report, geometry, path_numbers
 from armkin.motion.branch_path import Pace, carry, stands, stretches
-from armkin.motion.curve import Curve, Smoothed, way_of
+from armkin.motion.curve import Curve, Smoothed, way_of, ways_of
 from armkin.motion.dense import FIT, PLAN, Polyline
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.grid import deviation, missed
@@ -269,7 +269,7 @@ class Walk:
         for share in PLAN:
             pace = replace(self.pace, tolerance=share * self.pace.tolerance)
             made = stretches(self.arm, route, s, run, near, pace, fixed=fixed)
-            off = max((missed(self.arm, route, way_of(one)) or (0.0,))[0] for one in made)
+            off = (missed(self.arm, route, ways_of(made)) or (0.0,))[0]
             if off <= self.pace.tolerance:
                 return made
         raise NoSolutionError(
@@ -289,7 +289,7 @@ class Walk:
             self.plan.along(len(self.made), curve, self.plan.length)
             self.made.append(curve)
             self.q = curve.end
-            _measure(self.plan, route, path_)
+        _measure(self.plan, route, ways_of(curves))
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
