@@ -91,7 +91,37 @@ def test_a_rounding_that_is_none_is_refused(wrong: float | list[float]) -> None:
 def test_printed_decimals_are_counted_from_the_third_on() -> None:
     rows = np.array([[390.0, 400.5, 12.25], [390.125, 0.0, 0.0], [0.123456, -2.5, 1.0 / 3.0]])
     off = printed(["mm", "mm", "deg"], rows, 1000.0)
-    np.testing.assert_allclose(off, [0.0, 0.5e-6, 0.5e-9], rtol=1e-9)
+    np.testing.assert_allclose(
+        off,
+        [
+            0.0,
+            np.hypot(np.hypot(0.5e-6, 0.5e-6), np.radians(0.5e-3)),
+            np.hypot(np.hypot(0.5e-9, 0.5e-9), np.radians(0.5e-6)),
+        ],
+        rtol=1e-9,
+    )
+
+
+def test_zeros_that_are_printed_count_and_the_halves_of_angles_add() -> None:
+    off = printed(["mm", "mm", "deg", "deg"], np.array([[345.04, 400.0, 28.675, 0.0]]), 1000.0, [[3, 1, 4, 4]])
+    np.testing.assert_allclose(off, np.hypot(0.5e-6, np.radians(1e-4)))
+
+
+@pytest.mark.parametrize(
+    ("name", "q", "digits"),
+    [("irb120", [0, 0, 45, 90, 0, -180], 3), ("puma560", [135, 90, 135, -45, -90, -45], 4),
+     ("thor", [0, -45, -90, -135, -90, -135], 4)],
+)  # fmt: skip
+def test_a_posture_on_its_limits_is_its_own_printed_pose(name: str, q: list[int], digits: int) -> None:
+    """A number ends in a zero; or roll and yaw are both off by half a decimal, about nearly one axis."""
+    T = armkin.fk(armkin.load(name), np.radians([q]))
+    words = [f"{value:.{digits}f}" for value in targets_out(LABELS["pose"], T)[0]]
+    done = run("ik", name, *words, "--near", ",".join(map(str, q)), "--json")
+    assert done.code == 0
+    assert done.json["branches"][done.json["best"]]["joints"] == pytest.approx(q, abs=1e-9)
+    rows = ",".join(LABELS["pose"]) + "\n" + ",".join(words)
+    batch = run("ik", name, "--batch", "-", "--near", ",".join(map(str, q)), "--json", stdin=rows.encode())
+    assert batch.json["branches"][batch.json["best"]]["joints"] == pytest.approx(q, abs=1e-9)
 
 
 def test_six_printed_decimals_on_the_command_line_move_no_joint() -> None:

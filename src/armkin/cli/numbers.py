@@ -33,6 +33,16 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     return value
 
 
+def decimals(text: str) -> int:
+    """How many decimals a number is printed with.
+
+    >>> decimals("345.040"), decimals("390"), decimals("3.45040e2")
+    (3, 0, 3)
+    """
+    mantissa, _, exponent = text.strip().lower().partition("e")
+    return max(len(mantissa.partition(".")[2]) - int(exponent or 0), 0)
+
+
 def is_number(text: str) -> bool:
     """Whether a word is a number."""
     return _NUMBER.fullmatch(text.strip()) is not None

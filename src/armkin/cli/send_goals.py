@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from armkin.cli import inputs, lock_and_sweep, piped_answers
 from armkin.cli.csv_rows import streamed_rows
+from armkin.cli.numbers import decimals
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 
@@ -45,13 +46,16 @@ def goals(
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
     arm = inputs.load(robot, scene, tool)
     if target is not None:
+        from armkin.inverse.answers.rounding import printed
         from armkin.inverse.tasks.fitting import task_for
 
         what = task_for(arm, task)
         values = inputs.target_list(arm, what, target)
         goal = units.targets_in(what.labels, np.array([values]))
         close = None if near is None else inputs.joint_list(arm, near, "--near")
-        return arm, Goals(None, [1], goal, what.name, branch, lock_and_sweep.locks(arm, lock), close)
+        shown = [[decimals(word) for word in target.split(",")]]
+        rounding = printed(units.label_units(what.labels), np.array([values]), arm.reach, shown)
+        return arm, Goals(None, [1], goal, what.name, branch, lock_and_sweep.locks(arm, lock), close, rounding)
     if batch == "-":
         from armkin.board.planner import Stream
 
@@ -79,6 +83,7 @@ class Goals:
     branch: str | None = None
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     near: Sequence[float] | None = None  # [deg | mm] what the branch is chosen by; None: where the arm stands
+    rounding: Array | None = None  # (1,) of the target
 
     def resolve(self, arm: Arm, near: Array) -> Array:
         """Joint values (w, n); near: where the arm stands [rad | mm]."""
@@ -90,7 +95,7 @@ class Goals:
         request = choose.Request(
             arm=arm, task=self.task, near=at, branch=self.branch, held=self.held, ignore=arm.ignores_keep_out
         )
-        [answer] = choose.solve(request, self.target)  # type: ignore[arg-type]
+        [answer] = choose.solve(request, self.target, self.rounding)  # type: ignore[arg-type]
         if answer.best is None and answer.within_limits and answer.refused is None:
             raise choose.blocked(request, answer)
         if answer.best is None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import ik_text, inputs, lock_and_sweep, output, piped_answers, render
+from armkin.cli.numbers import decimals
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -139,7 +140,8 @@ def ik(
     inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     goal = units.targets_in(what.labels, values)
-    [found] = choose.solve(request, goal, _rounding(arm, what, values))
+    words = None if reached is not None else [[decimals(word) for word in target or ()]]
+    [found] = choose.solve(request, goal, _rounding(arm, what, values, words))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(arm, answer))
@@ -158,11 +160,11 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _rounding(arm: Arm, task: Task, values: Array) -> Array:
-    """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with."""
+def _rounding(arm: Arm, task: Task, values: Array, shown: list[list[int]] | None = None) -> Array:
+    """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; shown: how many."""
     from armkin.inverse.answers import rounding as target_rounding
 
-    return target_rounding.printed(units.label_units(task.labels), values, arm.reach)
+    return target_rounding.printed(units.label_units(task.labels), values, arm.reach, shown)
 
 
 def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, rounding: Array | None = None) -> Solutions:

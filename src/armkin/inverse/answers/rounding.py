@@ -64,22 +64,36 @@ def of_targets(
     return Rounding(known, SOLUTION + DEFECTS * known)
 
 
-def printed(units: Sequence[str], values: Array, reach: float) -> Array:
+def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLike | None = None) -> Array:
     """The rounding (N,) [reaches, rad] of targets as they are printed, (N, m) in units ("mm", "deg", "").
 
-    Half the last decimal of each number that has three or more, together; 390 and 400.0 are exact.
+    Half the last decimal of each number that has three or more; 390 and 400.0 are exact. decimals (N, m): how many are
+    printed; by default as many as the row's number with most of them needs. Halves of lengths add as vectors, of
+    angles as sums: two of a pose's three may turn about nearly one axis.
     """
     values = np.asarray(values, float).reshape(-1, len(units))
-    off = np.zeros(values.size)
+    if decimals is None:
+        needed = _needed(values)
+        decimals = np.broadcast_to(needed.max(axis=1, keepdims=True), needed.shape)
+    given = np.asarray(decimals).reshape(values.shape)
+    off = np.where(given >= FEWEST, 0.5 * 10.0 ** -np.minimum(given, 300.0), 0.0)
+    angles = np.array([unit == "deg" for unit in units])
+    scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
+    turned = np.radians(off[:, angles].sum(axis=1))
+    size: Array = np.hypot(np.linalg.norm((off * scale)[:, ~angles], axis=1), turned)
+    return size
+
+
+def _needed(values: Array) -> Array:
+    """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
+    found = np.zeros(values.size)
     left, number = np.arange(values.size), values.ravel()
     for decimals in range(MOST):
         scaled = number * 10.0**decimals
         here = np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0)
         if decimals >= FEWEST:
-            off[left[here]] = 0.5 * 10.0**-decimals
+            found[left[here]] = decimals
         left, number = left[~here], number[~here]
         if not len(left):
             break
-    scale = [np.pi / 180.0 if unit == "deg" else 1.0 / reach if unit == "mm" else 1.0 for unit in units]
-    size: Array = np.linalg.norm(off.reshape(values.shape) * scale, axis=1)
-    return size
+    return found.reshape(values.shape)
