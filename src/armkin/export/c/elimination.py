@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
-from armkin.inverse.elimination.method import Elimination, _shaken
-from armkin.inverse.numeric.tolerances import SHAKES
+from armkin.inverse.elimination.method import Elimination
+from armkin.inverse.elimination.passes import shaken_goal
+from armkin.inverse.elimination.plans import Kind
+from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
 
@@ -28,31 +30,51 @@ if TYPE_CHECKING:
 _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "polish", "elimination")  # each needs those before
 BRANCHES = MOST
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
+OWN = 2  # of a kind of poses
 PASSES = 4  # of the seven; what they leave open is told as doubt
 
 
 def has_form(elimination: Elimination) -> bool:
-    """Whether all pencils carry the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
-    plans = elimination.plans
-    return bool(plans) and all(p.role.slot == 1 or (p.role.at_an_end and p.ends.rank == 9) for p in plans[:PASSES])
+    """Whether all pencils of poses in general are such as C has."""
+    return bool(elimination.plans) and all(map(_is_read, elimination.plans[:PASSES]))
+
+
+def _is_read(pencil: Pencil) -> bool:
+    """Whether a pencil carries the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
+    return pencil.role.slot == 1 or (pencil.role.at_an_end and pencil.ends.rank == 9)
+
+
+def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
+    """The pencils of poses of each kind: the first two are the kind's own, if they have a form, to keep data few."""
+    every = [elimination.of_kind(kind)[:OWN] for kind in Kind]
+    usual = elimination.plans[:passes]
+    return [(*own, *usual[OWN:]) if all(map(_is_read, own)) else usual for own in every]
+
+
+def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:
+    """Different pencils of plans, and the plans as their numbers."""
+    every = {(pencil.role, pencil.psi): pencil for plans in kinds for pencil in plans}
+    place = {key: number for number, key in enumerate(every)}
+    return list(every.values()), [[place[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
 
 
 def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PASSES) -> str:
     """`arm_candidates` of an arm that the elimination solves, and all that it needs."""
-    plans = elimination.plans[:passes]
-    pencils = list({id(plan): plan for plan in plans}.values())
-    place = {id(pencil): k for k, pencil in enumerate(pencils)}
-    loop = elimination.loop
+    kinds = plans_of(elimination, passes)
+    pencils, numbers_of = pencils_of(kinds)
+    loop, passes = elimination.loop, len(kinds[0])
     sizes = {
-        "PASSES": len(plans),
-        "MOST": max(-(-pencil.size // 4) * 4 for pencil in pencils),  # rows are worked on by fours
+        "PASSES": passes,
+        "PRODUCTS": max(pencil.products for pencil in pencils),
+        "WIDTH": max((4 if pencil.role.wide else 2) * (pencil.products + pencil.size) for pencil in pencils),
+        "MOST": max(16, *(-(-pencil.size // 4) * 4 for pencil in pencils)),  # rows are worked on by fours
         "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
-        "ANSWERS": len(plans) * max(pencil.size for pencil in pencils),
+        "ANSWERS": passes * max(pencil.size for pencil in pencils),
     }
-    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2}
+    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL}
     lines = [f"#define ARM_{name} {value}" for name, value in sizes.items()]
     lines += [f"#define ARM_{name} {c_and_js_code.number(value)}" for name, value in numbers.items()]
-    moves = np.concatenate(moves_of(len(plans)))
+    moves = np.concatenate(moves_of(passes))
     lines += [
         "",
         "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
@@ -61,12 +83,12 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
         _array("loop_links", np.concatenate([frame(link) for link in loop.links])),
         _flags("loop_slides", loop.prismatic),
         _array("weights", _WEIGHTS),
-        _array("shakes", SHAKES[: len(plans)]),
+        _array("shakes", SHAKES[:passes]),
         _array("shaking", moves),
         "",
         *(_pencil(k, pencil) for k, pencil in enumerate(pencils)),
         f"static const arm_pencil arm_pencils[] = {{{', '.join(f'ARM_PENCIL_{k}' for k in range(len(pencils)))}}};",
-        _flags("plan", [place[id(plan)] for plan in plans]),
+        _flags("plan", [number for plan in numbers_of for number in plan]),
         "",
     ]
     text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD))
@@ -94,7 +116,7 @@ def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
 
 def moves_of(passes: int) -> list[Array]:
     """How each pass moves the pose, as frames."""
-    return [frame(_shaken(np.eye(4), shake)) for shake in SHAKES[:passes]]
+    return [frame(shaken_goal(np.eye(4), shake)) for shake in SHAKES[:passes]]
 
 
 def _pencil(number: int, pencil: Pencil) -> str:
@@ -105,7 +127,10 @@ def _pencil(number: int, pencil: Pencil) -> str:
     role = pencil.role
     fields = [
         c_and_js_code.number(float(pencil.psi)),
-        *map(str, (slot, int(role.backward), role.hidden, role.dialytic, 15 - ends.rank, r, w, pencil.size)),
+        *map(
+            str,
+            (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), 15 - ends.rank, r, w, pencil.size),
+        ),
         f"{{{', '.join(map(str, role.order))}}}",
         f"{{{', '.join(str(int(p)) for p in pencil.prismatic)}}}",
         *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays
+from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import _WEIGHTS
 from armkin.inverse.elimination.method import Elimination
-from armkin.inverse.numeric.tolerances import SHAKES
+from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
 
@@ -30,21 +30,21 @@ METHOD = ("eigenvalues", "frames", "roots", "elimination")
 
 def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
     """The constants of an arm that the elimination solves, and its `candidates`; `METHOD` has the functions."""
-    plans = elimination.plans[: len(SHAKES)]
-    pencils = list({id(plan): plan for plan in plans}.values())
-    place = {id(pencil): k for k, pencil in enumerate(pencils)}
+    kinds = plans_of(elimination, len(SHAKES))
+    pencils, plans = pencils_of(kinds)
     loop = elimination.loop
     fields = {
         "length": repr(loop.length),
         "residual": repr((loop.length / arm.reach) ** 2),
+        "beside": repr(BESIDE_SPECIAL),
         "fromBase": _array(frame(inverse(loop.base))),
         "fromTool": _array(frame(inverse(loop.tool))),
         "links": _arrays([frame(link) for link in loop.links]),
         "slides": _flags(loop.prismatic),
         "weights": _array(_WEIGHTS),
-        "shakes": _array(SHAKES[: len(plans)]),
-        "shaking": _arrays(moves_of(len(plans))),
-        "plan": repr([place[id(plan)] for plan in plans]),
+        "shakes": _array(SHAKES[: len(kinds[0])]),
+        "shaking": _arrays(moves_of(len(kinds[0]))),
+        "plan": repr(plans),
     }
     lines = ["const LOOP = {", *(f"  {name}: {text}," for name, text in fields.items()), "};"]
     lines += ["/** @type {Pencil[]} */", "const PENCILS = [", *map(_pencil, pencils), "];"]
@@ -69,6 +69,8 @@ def _pencil(pencil: Pencil) -> str:
         "backward": "true" if role.backward else "false",
         "hidden": str(role.hidden),
         "dialytic": str(role.dialytic),
+        "wide": "true" if role.wide else "false",
+        "products": str(pencil.products),
         "rows": str(15 - pencil.ends.rank),
         "r": str(pencil.K_re.shape[1]),
         "w": str(pencil.W.shape[1]),

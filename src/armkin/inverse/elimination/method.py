@@ -42,30 +42,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination import roots, three_prismatic
+from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.merge import Answers, best, concatenate, difference, merge, pack, projection
-from armkin.inverse.elimination.pencil import Pencil
-from armkin.inverse.elimination.plans import TILT, Elimination, Kind, kinds, prepare
-from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
-from armkin.inverse.numeric.tolerances import (
-    ALONE,
-    BLURRED_ROOT,
-    CLOSE_RESIDUAL,
-    ELIMINATED,
-    EXAMINED,
-    GRAZING,
-    NO_PRODUCT,
-    OWN_ROOT,
-    PAIRED,
-    SAME_KEY,
-    SAME_ROOT,
-    SEED,
-    SHAKES,
-    STRAY,
-    UPRIGHT,
-)
-from armkin.model.rotation import inverse
+from armkin.inverse.elimination.merge import Answers, best, concatenate, merge, pack
+from armkin.inverse.elimination.passes import answers_of, attempt, none
+from armkin.inverse.elimination.plans import Elimination, Kind, kinds, prepare
+from armkin.inverse.elimination.polish import refine, tip
+from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SHAKES
 
 __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
 
@@ -73,7 +56,6 @@ Int = NDArray[np.int64]
 
 CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13 MB
 BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
-REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
 GUESSES = 8  # postures close to answers that are kept of a pose
 
 
@@ -92,7 +74,7 @@ def left_open(elimination: Elimination, samples: int = 48) -> float:
     goal[:, :3] = np.moveaxis(frame, -1, 0)
     for number in range(2):
         if len(goal):
-            goal = goal[_attempt(closed, elimination.plans[number], goal, number)[1]]
+            goal = goal[attempt(closed, elimination.plans[number], goal, number)[1]]
     return len(goal) / samples
 
 
@@ -142,7 +124,7 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
     if not elimination.plans:
         answers, touching, settled = _slides(closed, goal)
         shaken = ~settled
-        near = _none()
+        near = none()
     else:
         answers, near, touching, settled, shaken = _passes(elimination, goal)
     answers = answers.take(finite[answers.pose])
@@ -156,7 +138,7 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
 def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
-    found, guesses = [_none()], [_none()]
+    found, guesses = [none()], [none()]
     touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
     settled = np.ones(goal.shape[0], dtype=np.bool_)
     kind = kinds(elimination.loop, goal)
@@ -167,7 +149,7 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bo
             still = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]
-                answers, unsettled, touch, near = _attempt(elimination.loop, pencil, goal[part], number)
+                answers, unsettled, touch, near = attempt(elimination.loop, pencil, goal[part], number)
                 found.append(answers._replace(pose=part[answers.pose]))
                 if number > 0:
                     guesses.append(near._replace(pose=part[near.pose]))
@@ -180,97 +162,9 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bo
     return concatenate(found), concatenate(guesses), touching, settled, shaken
 
 
-def _attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
-    """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
-    careful, shake = number > 0, SHAKES[number]
-    seed = roots.seeds(pencil, inverse(_shaken(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
-    if shake == 0:
-        seed = _without_empty(closed, seed, goal)
-    target = goal[seed.pose]
-    if careful:
-        done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
-    else:
-        done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
-    # In later passes also what is nearly an answer, at a double root: such poses are said to be doubtful.
-    good = done.residual < (10 * GRAZING if careful else ELIMINATED)
-    unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
-    # A complex pair that steps brought near the pose may be a real one, seen through rounding.
-    # A move of the pose may turn two close real roots into such a pair.
-    pair = PAIRED + 10 * np.sqrt(shake)
-    maybe = seed.tilt < pair
-    near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
-    missed = ~good & ((seed.tilt < UPRIGHT) | near)
-    touch = good & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
-    unsure = good & (seed.tilt > 0) & maybe
-    # A real root that was far from the answer it led to may have stood for another one.
-    strayed = good & (seed.tilt == 0) & (done.guess > STRAY + 30 * shake)
-    # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
-    # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
-    weakest = np.zeros(goal.shape[0])
-    np.maximum.at(weakest, seed.pose[good], done.weakness[good])
-    away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
-    own = (np.abs(away) < OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
-    # unless several solutions share the middle joints: these are one root
-    some = np.flatnonzero(strayed & own)
-    own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
-    strayed &= ~own
-    unsettled[seed.pose[missed | unsure | strayed]] = True
-    touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
-    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
-    # and if the two answers are not the same.
-    answers = _answers(closed, seed.pose, done, good)
-    # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
-    stands = good & maybe
-    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > BLURRED_ROOT + 10 * shake
-    order = np.lexsort((hidden, pose))
-    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < SAME_ROOT)
-    close &= blurred[order][1:] | blurred[order][:-1]
-    close &= ~(own[stands][order][1:] & own[stands][order][:-1])
-    unsettled[pose[order][1:][close]] = True
-    # Two real roots that led to one answer: one of them stands for another.
-    real = answers.take(seed.tilt[good] == 0)
-    key = projection(closed.prismatic, real.q)
-    order = np.lexsort((key, real.pose))
-    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
-    if twice.any():  # different answers may have the same key: about one pose in 10,000
-        pairs = np.flatnonzero(twice)
-        step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
-        twice[pairs] = np.abs(step).max(axis=1) < EXAMINED
-    unsettled[real.pose[order][1:][twice]] = True
-    guesses = _answers(closed, seed.pose, done, ~good & (done.residual < SEED))
-    return answers, unsettled, touching, guesses
-
-
-def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array) -> roots.Seeds:
-    """Seeds without roots that stand for nothing.
-
-    A simple root, or a double one with one vector, is one if its vector is no product: a solution's vector is a
-    product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
-    """
-    some = np.flatnonzero((seed.defect > NO_PRODUCT) & (seed.gap > ALONE))
-    target = np.ascontiguousarray(np.moveaxis(goal[seed.pose[some], :3], 0, -1))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
-    kept = np.ones(len(seed.pose), np.bool_)
-    kept[some[pose_error(frame, target)[1] > STRAY]] = False
-    pose, q, hidden, tilt, rough, defect, gap = seed
-    return roots.Seeds(pose[kept], q[kept], hidden[kept], tilt[kept], rough, defect[kept], gap[kept])
-
-
-def _shaken(goal: Array, size: float) -> Array:
-    """Goals (N, 4, 4) moved a little, in a direction that no arm is made for."""
-    if size == 0:
-        return goal
-    x, y, z = size * np.array([0.61, -0.49, 0.63])
-    spin = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    move = np.eye(4)
-    move[:3, :3] = np.linalg.solve(np.eye(3) - spin / 2, np.eye(3) + spin / 2)  # Cayley: a rotation
-    move[:3, 3] = size * np.array([-0.53, 0.57, 0.47])
-    return np.asarray(move @ goal)
-
-
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
     """Both answers of a chain with three prismatic joints; and whether roots touch, and whether they are all, (N,)."""
-    found, touching, all_ = [_none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
+    found, touching, all_ = [none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
     if np.sum(closed.prismatic) > 3:
         return found[0], touching, all_
     for begin in range(0, goal.shape[0], CHUNK):
@@ -281,16 +175,5 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
         good = done.residual < GRAZING
         touching[begin + pose[good & (done.residual > ELIMINATED)]] = True
-        found.append(_answers(closed, begin + pose, done, good))
+        found.append(answers_of(closed, begin + pose, done, good))
     return concatenate(found), touching, all_
-
-
-def _answers(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
-    """The good ones, their revolute joints wrapped to (-pi, pi]."""
-    wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
-    return Answers(pose, wrapped, done.residual, done.weakness).take(good)
-
-
-def _none() -> Answers:
-    """No answers."""
-    return Answers(np.empty(0, dtype=np.int64), np.empty((0, 6)), np.empty(0), np.empty(0))

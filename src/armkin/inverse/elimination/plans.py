@@ -19,14 +19,15 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import closed_loop, roots
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.joint_order import Role, roles
+from armkin.inverse.elimination.passes import TILT, attempt
 from armkin.inverse.elimination.pencil import Pencil, build
-from armkin.inverse.elimination.polish import jacobian, pose_error, refine, tip
-from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, ELIMINATED, ERROR_FLOOR, RANK, SHAKES, STRAY, TINY
+from armkin.inverse.elimination.polish import jacobian, refine, tip
+from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, ELIMINATED, ERROR_FLOOR, RANK, SHAKES, TINY
 from armkin.model.rotation import inverse
 
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
-TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 SAMPLES = 11  # random poses on which roles are compared
+MANY = 0.3  # share of poses left open from which on other roles are tried
 STEEP = 30.0  # norm of the inverse Jacobian above which a posture says little of a role
 STARTS = 20  # random postures from which a pose of a kind is sought, for each that is wanted
 # log10 of a role's raw error: nothing better needed, good enough, unfit
@@ -109,6 +110,10 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
         if _enough(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
+    if not redundant and (rated[0].error >= HEALTHY or rated[0].left_open > MANY):  # beside a spherical wrist, say
+        for slot, hidden in _WIDE:
+            rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
+        rated.sort(key=lambda rating: rating.cost)
     return Elimination(closed, _sequence(closed, rated), rated[0].error)
 
 
@@ -179,6 +184,7 @@ class _Rating(NamedTuple):
 
     cost: float
     error: float
+    left_open: float  # share of these poses
     pencil: Pencil
 
 
@@ -194,7 +200,7 @@ _WIDE = _SEARCH[:6]
 def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
     """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
     quick ones are all known, any that is healthy."""
-    sound = [rating for rating in rated if rating.error < EXCELLENT and rating.pencil.size <= 16]
+    sound = [one for one in rated if one.error < EXCELLENT and one.left_open < MANY and one.pencil.size <= 16]
     if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
         return True
     tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
@@ -204,26 +210,16 @@ def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
 def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
     pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    nearest, spurious = _raw_error(pencil, closed, q, goal)
-    if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
-        return _Rating(20.0 + pencil.size, 0.0, pencil)
-    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
-    # Below 1e-11 accuracy buys nothing; size and spurious roots cost time; a constant N (slot Lb) saves some.
-    cost = 0.15 * pencil.size + 4 * float(np.mean(spurious)) - 0.5 * (role.slot == 1)
-    return _Rating(max(error, -11.0) + cost, error, pencil)
-
-
-def _raw_error(pencil: Pencil, closed: Loop, q: Array, goal: Array) -> tuple[Array, Bool]:
-    """Distance of the nearest candidate before any Newton step, and whether there are real roots that solve
-    nothing, both (N,)."""
     found = roots.seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
-    difference = np.abs(found.q - q[found.pose])
-    turned = np.abs(np.mod(difference + np.pi, 2 * np.pi) - np.pi)
-    distance = np.where(closed.prismatic, difference, turned).max(axis=1, initial=0.0)
+    apart = np.abs(found.q - q[found.pose])
+    turned = np.abs(np.mod(apart + np.pi, 2 * np.pi) - np.pi)
+    distance = np.where(closed.prismatic, apart, turned).max(axis=1, initial=0.0)
     nearest = np.ones(q.shape[0])
     np.minimum.at(nearest, found.pose, distance)
-    target = np.ascontiguousarray(np.moveaxis(goal[found.pose, :3], 0, -1))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(found.q.T))
-    spurious = found.rough.copy()
-    spurious[found.pose[(found.tilt == 0) & (pose_error(frame, target)[1] > STRAY)]] = True
-    return nearest, spurious
+    if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
+        return _Rating(20.0 + pencil.size, 0.0, 1.0, pencil)
+    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
+    left_open = float(np.mean(attempt(closed, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
+    # Below 1e-11 accuracy buys nothing; size and open poses cost time; a constant N (slot Lb) saves some.
+    cost = max(error, -11.0) + 0.15 * pencil.size + 4 * left_open - 0.5 * (role.slot == 1)
+    return _Rating(cost, error, left_open, pencil)

@@ -16,16 +16,32 @@ static double arm_apart(const double *a, const double *b)
     return most;
 }
 
+/* Whether a root whose vector is no product stands for nothing: it is simple, and far from the pose. */
+static int arm_stands_for_nothing(const double *q, const double *goal, const double *re, const double *im, int size, int i)
+{
+    double frame[12], joints[72], error[6];
+    int j;
+    for (j = 0; j < size; j++) {
+        const double a = 1 + re[i] * re[i] + im[i] * im[i], b = 1 + re[j] * re[j] + im[j] * im[j];
+        const double x = re[i] - re[j], y = im[i] - im[j];
+        if (j != i && !(4 * (x * x + y * y) > 1e-6 * a * b))
+            return 0;
+    }
+    return arm_missing(q, goal, frame, joints, error) > 1e-3;
+}
+
 /* One pass over a pose: its answers (`found`, from `count` on), and whether the pass leaves it open; *touching: two
    roots just touch, or just miss each other. */
-static int arm_attempt(const double *goal, int pass, arm_answer *found, int *count, int *touching)
+static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found, int *count, int *touching)
 {
-    const arm_pencil *pencil = &arm_pencils[arm_plan[pass]];
+    const arm_pencil *pencil = &arm_pencils[arm_plan[kind * ARM_PASSES + pass]];
     const double shake = arm_shakes[pass];
     const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden];
     const double pair = 1e-4 + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
-    const int size = pencil->size, lead = 12, c = 12 + size, wide = 12 + ARM_MOST, begin = *count;
-    double moved[12], back[12], E[12 * (12 + ARM_MOST)], G[12 * (12 + ARM_MOST)], C[ARM_MOST * ARM_MOST];
+    const int size = pencil->size, lead = pencil->wide ? 16 : 12, c = lead + size, length = ARM_PRODUCTS + ARM_MOST;
+    const int row = size <= 16 ? 16 : ARM_MOST, begin = *count; /* numbers in a row of C */
+    double moved[12], back[12], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)];
+    double C[ARM_MOST * ARM_MOST];
     double re[ARM_MOST], im[ARM_MOST], most = 0, weakest = 0, hidden[ARM_MOST];
     unsigned char own[ARM_MOST], stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
     arm_ends ends;
@@ -38,38 +54,39 @@ static int arm_attempt(const double *goal, int pass, arm_answer *found, int *cou
     if (!arm_eliminate(pencil, back, &ends))
         return 1;
     arm_equations(pencil, back, ends.N, E);
-    for (i = 0; i < 12; i++)
-        for (j = 0; j < wide; j++)
-            G[i * wide + j] = j < c ? E[i * c + j] : 0;
-    if (!arm_reduce(G, lead, lead, wide))
+    for (i = 0; i < lead; i++)
+        for (j = 0; j < length; j++)
+            G[i * length + j] = j < c ? E[i * c + j] : 0;
+    if (!(pencil->wide ? arm_reduce(G, 16, 16, ARM_PRODUCTS + ARM_MOST) : arm_reduce(G, 12, 12, ARM_PRODUCTS + ARM_MOST)))
         return 1;
-    for (i = 0; i < size * ARM_MOST; i++)
+    for (i = 0; i < size * row; i++)
         C[i] = 0;
     for (i = 0; i < lead; i++)
         for (j = 0; j < size; j++) {
-            C[i * ARM_MOST + j] = -G[i * wide + lead + j];
-            most = fabs(G[i * wide + lead + j]) > most ? fabs(G[i * wide + lead + j]) : most;
+            C[i * row + j] = -G[i * length + lead + j];
+            most = fabs(G[i * length + lead + j]) > most ? fabs(G[i * length + lead + j]) : most;
         }
     for (i = 0; i < lead; i++) /* of a singular pencil the rest may vanish on both sides: its pivots tell */
-        open |= !(fabs(G[i * wide + i]) > 1e-11);
+        open |= !(fabs(G[i * length + i]) > 1e-11);
     for (i = 0; i < size - lead; i++)
-        C[(lead + i) * ARM_MOST + 2 * pencil->r + i] = 1;
+        C[(lead + i) * row + 2 * pencil->r + i] = 1;
     if (!(most <= 1e6)) {
         open = 1;
         if (!(most < 1e300))
             return 1;
     }
-    arm_balance(C, size);
-    arm_hessenberg(C, size);
-    if (!arm_eigenvalues(C, size, re, im))
+    if (!(row == 16 ? arm_roots_of(C, size, 16, re, im) : arm_roots_of(C, size, ARM_MOST, re, im)))
         return 1;
     for (i = 0; i < size; i++) {
         const double tilt = 2 * fabs(im[i]) / (1 + re[i] * re[i] + im[i] * im[i]);
         arm_answer *one = &found[*count];
+        double defect;
         int good;
         if (!(im[i] >= 0) || !(tilt < (careful ? 0.3 : 0.02)) || *count >= ARM_ANSWERS)
             continue;
-        if (!arm_joints_of(pencil, E, back, &ends, re[i], one->q))
+        if (!arm_joints_of(pencil, E, back, &ends, re[i], one->q, &defect))
+            continue;
+        if (defect > 1e-5 && !(shake > 0) && most < 1e5 && arm_stands_for_nothing(one->q, goal, re, im, size, i))
             continue;
         hidden[*count - begin] = one->q[joint];
         arm_refine(goal, careful ? 12 : 4, careful, one);
@@ -156,6 +173,15 @@ static int arm_merge(const double *goal, arm_answer *found, int count, int *merg
     return kept;
 }
 
+/* What a pose of the loop's chain makes of axes 6 and 1: all but parallel 1, meeting 2, else 0. */
+static int arm_kind(const double *frame)
+{
+    const double sine = frame[2] * frame[2] + frame[6] * frame[6], apart = frame[3] * frame[6] - frame[7] * frame[2];
+    if (arm_loop_slides[0] || arm_loop_slides[5])
+        return 0;
+    return sine < ARM_BESIDE * ARM_BESIDE ? 1 : apart * apart < ARM_BESIDE * ARM_BESIDE * sine ? 2 : 0;
+}
+
 /* As of a closed form. goal: twelve numbers, columns x, y, z and the position [mm]. doubt: an answer near a
    singularity, merged answers, touching roots, or a pose that no pass has settled. */
 static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RESTRICT near, double *ARM_RESTRICT q,
@@ -163,7 +189,7 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
 {
     double target[12], scaled[12], there[12];
     arm_answer found[ARM_ANSWERS];
-    int i, j, k, pass, number = 0, open = 1, edge = 0, exact = 0;
+    int i, j, k, kind, pass, number = 0, open = 1, edge = 0, exact = 0;
     (void)near;
     (void)count;
     for (i = 0; i < 3; i++)
@@ -171,9 +197,10 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
             target[4 * i + j] = goal[3 * j + i] / (j == 3 ? ARM_LENGTH : 1);
     arm_times(arm_from_base, target, scaled);
     arm_times(scaled, arm_from_tool, there);
+    kind = arm_kind(there);
     for (pass = 0; pass < ARM_PASSES && open; pass++) {
         edge |= arm_shakes[pass] > 0; /* a singular posture may be missing where the target had to be moved */
-        open = arm_attempt(there, pass, found, &number, &edge);
+        open = arm_attempt(there, kind, pass, found, &number, &edge);
     }
     for (i = 0; i < number; i++)
         exact += found[i].residual < 1e-10;

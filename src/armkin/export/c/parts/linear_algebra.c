@@ -51,7 +51,7 @@ ARM_INLINE int arm_pivot(const double *a, int k, int n, int m)
    right and m are multiples of four. Afterwards the right sides hold the solution. Returns 0 if a pivot vanishes. */
 ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
 {
-    double over[12]; /* one over the pivots: n is at most twelve */
+    double over[16]; /* one over the pivots: n is at most sixteen */
     int i, j, k;
     for (k = 0; k < n; k++) {
         const int best = arm_pivot(a, k, n, m);
@@ -72,57 +72,59 @@ ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
     return 1;
 }
 
-/* The right singular vector of the smallest singular value of a 12 x 12 matrix: inverse iteration on A^T A. */
-static void arm_null_vector(double *a, double *v)
+/* The right singular vector of the smallest singular value of an n x n matrix, n = 12 or 16: inverse iteration on A^T A. */
+ARM_INLINE void arm_null_vector(double *a, double *v, const int n)
 {
-    double w[12], lower[144], over[12], size = 0;
+    double w[16], lower[256], over[16], size = 0;
     int i, k;
-    for (i = 0; i < 144; i++)
+    for (i = 0; i < n * n; i++)
         lower[i] = 0;
-    for (k = 0; k < 12; k++) { /* P A = L U, U in place */
-        const int best = arm_pivot(a, k, 12, 12);
+    for (k = 0; k < n; k++) { /* P A = L U, U in place */
+        const int best = arm_pivot(a, k, n, n);
         if (best != k) {
-            arm_swap(a + 12 * k, a + 12 * best, 0, 12);
-            arm_swap(lower + 12 * k, lower + 12 * best, 0, 12);
+            arm_swap(a + n * k, a + n * best, 0, n);
+            arm_swap(lower + n * k, lower + n * best, 0, n);
         }
-        if (!(fabs(a[12 * k + k]) > 1e-14)) /* rounding's size, and not zero: an exact root has no last pivot */
-            a[12 * k + k] = 1e-14;
-        over[k] = 1 / a[12 * k + k];
-        for (i = k + 1; i < 12; i++) {
-            const double factor = a[12 * i + k] * over[k];
-            lower[12 * i + k] = factor;
-            arm_subtract(a + 12 * i, a + 12 * k, factor, 0, 12);
+        if (!(fabs(a[n * k + k]) > 1e-14)) /* rounding's size, and not zero: an exact root has no last pivot */
+            a[n * k + k] = 1e-14;
+        over[k] = 1 / a[n * k + k];
+        for (i = k + 1; i < n; i++) {
+            const double factor = a[n * i + k] * over[k];
+            lower[n * i + k] = factor;
+            arm_subtract(a + n * i, a + n * k, factor, 0, n);
         }
     }
-    for (i = 0; i < 12; i++)
+    for (i = 0; i < n; i++)
         v[i] = 1.0 + 0.37 * i - 0.11 * i * i; /* any start that no arm is made for */
-    for (i = 0; i < 12; i++) { /* U^T y = v */
+    for (i = 0; i < n; i++) { /* U^T y = v */
         w[i] = v[i] * over[i];
-        arm_subtract(v, a + 12 * i, w[i], 0, 12);
+        arm_subtract(v, a + n * i, w[i], 0, n);
     }
-    for (k = 11; k > 0; k--) /* L^T z = y; the permutations of A^-T and A^-1 cancel */
-        arm_subtract(w, lower + 12 * k, w[k], 0, 12);
-    for (i = 0; i < 12; i++)
+    for (k = n - 1; k > 0; k--) /* L^T z = y; the permutations of A^-T and A^-1 cancel */
+        arm_subtract(w, lower + n * k, w[k], 0, n);
+    for (i = 0; i < n; i++)
         size = fabs(w[i]) > size ? fabs(w[i]) : size;
-    for (i = 0; i < 12; i++)
+    for (i = 0; i < n; i++)
         w[i] /= size;
-    for (i = 1; i < 12; i++) /* L y = z */
+    for (i = 1; i < n; i++) /* L y = z */
         for (k = 0; k < i; k++)
-            w[i] -= lower[12 * i + k] * w[k];
+            w[i] -= lower[n * i + k] * w[k];
     size = 0;
-    for (i = 11; i >= 0; i--) { /* U v = y; the unknown that was found last comes last into the sum */
+    for (i = n - 1; i >= 0; i--) { /* U v = y; the unknown that was found last comes last into the sum */
         double sum = w[i];
-        for (k = 11; k > i; k--)
-            sum -= a[12 * i + k] * v[k];
+        for (k = n - 1; k > i; k--)
+            sum -= a[n * i + k] * v[k];
         v[i] = sum * over[i];
         size = fabs(v[i]) > size ? fabs(v[i]) : size;
     }
-    for (i = 0; i < 12; i++)
+    for (i = 0; i < n; i++)
         v[i] /= size;
 }
 
-/* Similarity transformations that make the rows and columns of a matrix about equally long (Osborne 1960). */
-static void arm_balance(double *a, int n)
+/* Rows of the following matrices are `most` long, a multiple of four that compilers know.
+
+   Similarity transformations that make the rows and columns of a matrix about equally long (Osborne 1960). */
+ARM_INLINE void arm_balance(double *a, int n, const int most)
 {
     int i, j, done = 0, round;
     for (round = 0; round < 20 && !done; round++) {
@@ -131,8 +133,8 @@ static void arm_balance(double *a, int n)
             double c = 0, r = 0, f = 1, before;
             for (j = 0; j < n; j++)
                 if (j != i) {
-                    c += fabs(a[j * ARM_MOST + i]);
-                    r += fabs(a[i * ARM_MOST + j]);
+                    c += fabs(a[j * most + i]);
+                    r += fabs(a[i * most + j]);
                 }
             if (!(c > 0) || !(r > 0))
                 continue;
@@ -144,68 +146,68 @@ static void arm_balance(double *a, int n)
             if ((c + r) / f < 0.95 * before) {
                 done = 0;
                 for (j = 0; j < n; j++)
-                    a[i * ARM_MOST + j] /= f;
+                    a[i * most + j] /= f;
                 for (j = 0; j < n; j++)
-                    a[j * ARM_MOST + i] *= f;
+                    a[j * most + i] *= f;
             }
         }
     }
 }
 
 /* To upper Hessenberg form by eliminations with row pivots (Wilkinson, The Algebraic Eigenvalue Problem, 6.8). */
-static void arm_hessenberg(double *a, int n)
+ARM_INLINE void arm_hessenberg(double *a, int n, const int most)
 {
-    double factor[ARM_MOST], over;
+    double factor[ARM_MOST], over; /* most <= ARM_MOST */
     int i, j, m;
-    for (i = 0; i < ARM_MOST; i++)
+    for (i = 0; i < most; i++)
         factor[i] = 0;
     for (m = 1; m < n - 1; m++) {
-        const int best = 1 + arm_pivot(a + ARM_MOST, m - 1, n - 1, ARM_MOST);
+        const int best = 1 + arm_pivot(a + most, m - 1, n - 1, most);
         if (best != m) {
-            arm_swap(a + best * ARM_MOST, a + m * ARM_MOST, m - 1, ARM_MOST);
+            arm_swap(a + best * most, a + m * most, m - 1, most);
             for (j = 0; j < n; j++) {
-                const double swap = a[j * ARM_MOST + best];
-                a[j * ARM_MOST + best] = a[j * ARM_MOST + m];
-                a[j * ARM_MOST + m] = swap;
+                const double swap = a[j * most + best];
+                a[j * most + best] = a[j * most + m];
+                a[j * most + m] = swap;
             }
         }
-        if (!(fabs(a[m * ARM_MOST + m - 1]) > 1e-300))
+        if (!(fabs(a[m * most + m - 1]) > 1e-300))
             continue;
-        over = 1 / a[m * ARM_MOST + m - 1];
+        over = 1 / a[m * most + m - 1];
         for (i = 0; i <= m; i++)
             factor[i] = 0;
         for (i = m + 1; i < n; i++) {
-            factor[i] = a[i * ARM_MOST + m - 1] * over;
-            arm_subtract(a + i * ARM_MOST, a + m * ARM_MOST, factor[i], m, ARM_MOST);
-            a[i * ARM_MOST + m - 1] = 0;
+            factor[i] = a[i * most + m - 1] * over;
+            arm_subtract(a + i * most, a + m * most, factor[i], m, most);
+            a[i * most + m - 1] = 0;
         }
         for (j = 0; j < n; j++)
-            a[j * ARM_MOST + m] += arm_along(a + j * ARM_MOST, factor, m & ~3, ARM_MOST);
+            a[j * most + m] += arm_along(a + j * most, factor, m & ~3, most);
     }
 }
 
 /* Eigenvalues of an upper Hessenberg matrix by Francis' double-shift QR steps (Martin, Peters & Wilkinson 1970).
    Returns 0 if they do not converge. */
-static int arm_eigenvalues(double *a, int n, double *re, double *im)
+ARM_INLINE int arm_eigenvalues(double *a, int n, const int most, double *re, double *im)
 {
     const double rounding = 2.220446049250313e-16;
     double norm = 0, shift = 0;
     int b, i, j, k, l, m, last = n - 1, steps = 0;
     for (i = 0; i < n; i++)
         for (j = i > 0 ? i - 1 : 0; j < n; j++)
-            norm += fabs(a[i * ARM_MOST + j]);
+            norm += fabs(a[i * most + j]);
     while (last >= 0) {
         double p = 0, q = 0, r = 0, x, y, w, z;
         for (l = last; l > 0; l--) { /* the lowest row from which on nothing is left below the diagonal */
-            double size = fabs(a[(l - 1) * ARM_MOST + l - 1]) + fabs(a[l * ARM_MOST + l]);
+            double size = fabs(a[(l - 1) * most + l - 1]) + fabs(a[l * most + l]);
             if (!(size > 0))
                 size = norm;
-            if (fabs(a[l * ARM_MOST + l - 1]) <= rounding * size) {
-                a[l * ARM_MOST + l - 1] = 0;
+            if (fabs(a[l * most + l - 1]) <= rounding * size) {
+                a[l * most + l - 1] = 0;
                 break;
             }
         }
-        x = a[last * ARM_MOST + last];
+        x = a[last * most + last];
         if (l == last) { /* one root */
             re[last] = x + shift;
             im[last] = 0;
@@ -213,8 +215,8 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
             steps = 0;
             continue;
         }
-        y = a[(last - 1) * ARM_MOST + last - 1];
-        w = a[last * ARM_MOST + last - 1] * a[(last - 1) * ARM_MOST + last];
+        y = a[(last - 1) * most + last - 1];
+        w = a[last * most + last - 1] * a[(last - 1) * most + last];
         if (l == last - 1) { /* two */
             p = (y - x) / 2;
             q = p * p + w;
@@ -241,21 +243,21 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
             double size;
             shift += x;
             for (i = 0; i <= last; i++)
-                a[i * ARM_MOST + i] -= x;
-            size = fabs(a[last * ARM_MOST + last - 1]) + fabs(a[(last - 1) * ARM_MOST + last - 2]);
+                a[i * most + i] -= x;
+            size = fabs(a[last * most + last - 1]) + fabs(a[(last - 1) * most + last - 2]);
             x = y = 0.75 * size;
             w = -0.4375 * size * size;
         }
         steps++;
         for (m = last - 2; m >= l; m--) { /* where two small entries follow each other the step may start */
-            const double *d = a + m * ARM_MOST + m;
+            const double *d = a + m * most + m;
             double u, v, size;
             z = d[0];
             r = x - z;
             u = y - z;
-            p = (r * u - w) / d[ARM_MOST] + d[1];
-            q = d[ARM_MOST + 1] - z - r - u;
-            r = d[2 * ARM_MOST + 1];
+            p = (r * u - w) / d[most] + d[1];
+            q = d[most + 1] - z - r - u;
+            r = d[2 * most + 1];
             size = 1 / (fabs(p) + fabs(q) + fabs(r));
             p *= size;
             q *= size;
@@ -263,17 +265,17 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
             if (m == l)
                 break;
             u = fabs(d[-1]) * (fabs(q) + fabs(r));
-            v = fabs(p) * (fabs(d[-ARM_MOST - 1]) + fabs(z) + fabs(d[ARM_MOST + 1]));
+            v = fabs(p) * (fabs(d[-most - 1]) + fabs(z) + fabs(d[most + 1]));
             if (u <= rounding * v)
                 break;
         }
         for (i = m + 2; i <= last; i++) {
-            a[i * ARM_MOST + i - 2] = 0;
+            a[i * most + i - 2] = 0;
             if (i > m + 2)
-                a[i * ARM_MOST + i - 3] = 0;
+                a[i * most + i - 3] = 0;
         }
         for (k = m; k < last; k++) {
-            double *up = a + k * ARM_MOST, *mid = up + ARM_MOST, *low = mid + ARM_MOST, size, u;
+            double *up = a + k * most, *mid = up + most, *low = mid + most, size, u;
             const int three = k < last - 1, end = last < k + 3 ? last : k + 3;
             if (k > m) {
                 p = up[k - 1];
@@ -308,7 +310,7 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
                 if (k > 0)
                     up[k - 1] = below;
                 for (i = end; i >= l; i--) { /* first the rows that the next step begins with */
-                    double *c = a + i * ARM_MOST + k;
+                    double *c = a + i * most + k;
                     const double t = x * c[0] + y * c[1] + z * c[2];
                     c[0] -= t;
                     c[1] -= t * q;
@@ -321,7 +323,7 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
                     mid[j] -= t * y;
                 }
                 for (i = l; i <= end; i++) {
-                    double *c = a + i * ARM_MOST + k;
+                    double *c = a + i * most + k;
                     const double t = x * c[0] + y * c[1];
                     c[0] -= t;
                     c[1] -= t * q;
@@ -330,4 +332,12 @@ static int arm_eigenvalues(double *a, int n, double *re, double *im)
         }
     }
     return 1;
+}
+
+/* The eigenvalues of a matrix of n rows, each `most` long. Returns 0 if they do not converge. */
+ARM_INLINE int arm_roots_of(double *a, int n, const int most, double *re, double *im)
+{
+    arm_balance(a, n, most);
+    arm_hessenberg(a, n, most);
+    return arm_eigenvalues(a, n, most, re, im);
 }

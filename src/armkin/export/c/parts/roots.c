@@ -1,8 +1,9 @@
-/* The twelve equations (4) of `armkin.inverse.elimination.pencil`, 12 x (12 + size). */
+/* The p equations (4) of `armkin.inverse.elimination.pencil`, p x (p + size); p = 12, 16 of a wide role. */
 static void arm_equations(const arm_pencil *pencil, const double *Y, const double *N, double *out)
 {
-    const int m = pencil->rows, width = 2 * (12 + pencil->size);
-    double moved[ARM_ROWS * 16], rows[ARM_ROWS * 2 * (12 + ARM_MOST)];
+    const int m = pencil->rows, p = pencil->wide ? 16 : 12, factors = pencil->wide ? 4 : 2, c = p + pencil->size;
+    const int width = factors * c;
+    double moved[ARM_ROWS * 16], rows[ARM_ROWS * ARM_WIDTH];
     int i, j, k;
     if (pencil->slot == 1) {
         double R[15 * 16];
@@ -22,15 +23,18 @@ static void arm_equations(const arm_pencil *pencil, const double *Y, const doubl
             arm_subtract(row, pencil->columns + k * width, -N[16 * i + k], 0, width);
     }
     if (!pencil->mix) {
-        for (i = 0; i < 12 * (12 + pencil->size); i++)
+        for (i = 0; i < p * c; i++)
             out[i] = rows[i];
         return;
     }
-    for (i = 0; i < 12; i++)
-        for (j = 0; j < width / 2; j++) {
-            out[i * (width / 2) + j] = 0;
-            for (k = 0; k < 2 * m; k++)
-                out[i * (width / 2) + j] += pencil->mix[i * 2 * m + k] * rows[k * (width / 2) + j];
+    for (i = 0; i < p * c; i++)
+        out[i] = 0;
+    for (i = 0; i < p; i++)
+        for (k = 0; k < factors * m; k++) {
+            const double share = pencil->mix[i * factors * m + k], *row = rows + k * c;
+            if (share < 0 || share > 0)
+                for (j = 0; j < c; j++)
+                    out[i * c + j] += share * row[j];
         }
 }
 
@@ -46,28 +50,46 @@ static double arm_ratio_of(const double *power, int count, int step)
     return above / (below > 1e-300 ? below : 1e-300);
 }
 
-/* The joint values for a root x of the pencil; 0 if it is a slide at infinity. */
-static int arm_joints_of(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, double x,
-    double *q)
+/* How far a joint's part of a solution's vector is from (cos 3f, sin 3f, cos f, sin f), f = q / 2. */
+static void arm_half_powers(double q, double *out)
 {
-    const int r = pencil->r, w = pencil->w, c = 12 + pencil->size, far = fabs(x) > 1;
+    double angle[8] = {0, 0, 0, 0, 0, 0, 0, 0}, cosine[8], sine[8];
+    angle[0] = 1.5 * q;
+    angle[1] = 0.5 * q;
+    arm_turns(angle, cosine, sine);
+    out[0] = cosine[0];
+    out[1] = sine[0];
+    out[2] = cosine[1];
+    out[3] = sine[1];
+}
+
+/* The joint values for a root x of the pencil; 0 if it is a slide at infinity. *defect: the squared sine between its vector
+   and the product that a solution's is; 0 where slides move. */
+static int arm_joints_of(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, double x,
+    double *q, double *defect)
+{
+    const int r = pencil->r, w = pencil->w, p = pencil->wide ? 16 : 12, c = p + pencil->size, far = fabs(x) > 1;
+    const int three = p / 4;
     const int of_hidden = 2 + pencil->hidden, of_dialytic = 2 + pencil->dialytic;
     const int third = 3 - pencil->hidden - pencil->dialytic;
     const double y = far ? 1 / x : x, scale = (far ? x : 1) / (1 + x * x);
-    double A[144], u[12], v[12], middle[3], a[12], b[12], f[16], m[5], part[8], cosine[8], sine[8];
-    double most = 0;
+    double A[256], u[16], v[16], middle[3], a[12], b[12], f[16], m[5], part[8], cosine[8], sine[8];
+    double most = 0, whole = 0;
     int i, j, k, row = 0, column = 0;
-    for (i = 0; i < 12; i++) { /* the equations at x, divided by x^2 if x is large */
+    for (i = 0; i < p; i++) { /* the equations at x, divided by x^2 if x is large */
         const double *e = E + i * c;
         for (j = 0; j < 2 * r; j++)
-            A[12 * i + j] = far ? e[j] + e[12 + j] * y : e[j] * y + e[12 + j];
+            A[p * i + j] = far ? e[j] + e[p + j] * y : e[j] * y + e[p + j];
         for (j = 0; j < w; j++) {
-            const double two = e[2 * r + j], one = e[12 + 2 * r + j], none = e[12 + 2 * r + w + j];
-            A[12 * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
+            const double two = e[2 * r + j], one = e[p + 2 * r + j], none = e[p + 2 * r + w + j];
+            A[p * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
         }
     }
-    arm_null_vector(A, u);
-    for (i = 0; i < 12; i++) {
+    if (pencil->wide)
+        arm_null_vector(A, u, 16);
+    else
+        arm_null_vector(A, u, 12);
+    for (i = 0; i < p; i++) {
         v[i] = 0;
         for (j = 0; j < r; j++) {
             const double a1 = u[j], a2 = u[r + j];
@@ -76,16 +98,21 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
         for (j = 0; j < w; j++)
             v[i] += pencil->W[i * w + j] * u[2 * r + j];
     }
-    for (i = 0; i < 4; i++) { /* v is 4 x 3: its longest row and column are the safest */
-        const double size = v[3 * i] * v[3 * i] + v[3 * i + 1] * v[3 * i + 1] + v[3 * i + 2] * v[3 * i + 2];
+    for (i = 0; i < 4; i++) { /* v is 4 x 3, 4 x 4 of a wide role: its longest row and column are the safest */
+        double size = 0;
+        for (j = 0; j < three; j++)
+            size += v[three * i + j] * v[three * i + j];
+        whole += size;
         if (size > most) {
             most = size;
             row = i;
         }
     }
     most = 0;
-    for (j = 0; j < 3; j++) {
-        const double size = v[j] * v[j] + v[3 + j] * v[3 + j] + v[6 + j] * v[6 + j] + v[9 + j] * v[9 + j];
+    for (j = 0; j < three; j++) {
+        double size = 0;
+        for (i = 0; i < 4; i++)
+            size += v[three * i + j] * v[three * i + j];
         if (size > most) {
             most = size;
             column = j;
@@ -96,11 +123,13 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
     else
         middle[pencil->hidden] = pencil->psi + 2 * atan(x);
     if (pencil->slides[of_dialytic])
-        middle[pencil->dialytic] = arm_ratio_of(v + column, 4, 3);
+        middle[pencil->dialytic] = arm_ratio_of(v + column, 4, three);
     else
-        middle[pencil->dialytic] = 2 * atan2(v[9 + column], v[6 + column]);
+        middle[pencil->dialytic] = 2 * atan2(v[3 * three + column], v[2 * three + column]);
     if (pencil->slides[2 + third])
-        middle[third] = arm_ratio_of(v + 3 * row, 3, 1);
+        middle[third] = arm_ratio_of(v + three * row, three, 1);
+    else if (pencil->wide)
+        middle[third] = 2 * atan2(v[4 * row + 3], v[4 * row + 2]);
     else {
         const double sign = v[3 * row] < 0 ? -1 : 1;
         middle[third] = atan2(sign * v[3 * row + 2], sign * v[3 * row + 1]);
@@ -111,6 +140,21 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
     for (i = 0; i < 8; i++)
         part[i] = i < 3 ? middle[i] : 0;
     arm_turns(part, cosine, sine);
+    *defect = 0;
+    if (!pencil->slides[of_dialytic] && !pencil->slides[2 + third]) {
+        double first[4], second[4], along = 0;
+        arm_half_powers(middle[pencil->dialytic], first);
+        arm_half_powers(middle[third], second);
+        if (!pencil->wide) {
+            second[0] = 1;
+            second[1] = cosine[third];
+            second[2] = sine[third];
+        }
+        for (i = 0; i < 4; i++)
+            for (j = 0; j < three; j++)
+                along += v[three * i + j] * first[i] * second[j];
+        *defect = 1 - along * along / (4 * (whole > 1e-300 ? whole : 1e-300));
+    }
 #define ARM_LINK(i) ((i) == pencil->slot ? Y : pencil->links + 12 * (i))
     for (i = 0; i < 12; i++)
         a[i] = ARM_LINK(1)[i];

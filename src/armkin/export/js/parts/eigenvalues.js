@@ -1,41 +1,42 @@
-/** The right singular vector of the smallest singular value of a 12 x 12 matrix: inverse iteration on A'A.
+/** The right singular vector of the smallest singular value of an n x n matrix, n = v.length: inverse iteration on A'A.
  * @param {Float64Array} a @param {Float64Array} v */
 function nullVector(a, v) {
-  const lower = new Float64Array(144);
-  const w = new Float64Array(12);
-  const over = new Float64Array(12);
-  for (let k = 0; k < 12; k++) {
-    const best = pivot(a, k, k, 12, 12);
+  const n = v.length;
+  const lower = new Float64Array(n * n);
+  const w = new Float64Array(n);
+  const over = new Float64Array(n);
+  for (let k = 0; k < n; k++) {
+    const best = pivot(a, k, k, n, n);
     if (best !== k) {
-      swap(a, 12 * k, 12 * best, 12);
-      swap(lower, 12 * k, 12 * best, 12);
+      swap(a, n * k, n * best, n);
+      swap(lower, n * k, n * best, n);
     }
-    if (!(Math.abs(a[12 * k + k]) > 1e-14)) a[12 * k + k] = 1e-14; // rounding's size: an exact root has no last pivot
-    over[k] = 1 / a[12 * k + k];
-    for (let i = k + 1; i < 12; i++) {
-      const factor = a[12 * i + k] * over[k];
-      lower[12 * i + k] = factor;
-      subtract(a, 12 * i, a, 12 * k, factor, 12);
+    if (!(Math.abs(a[n * k + k]) > 1e-14)) a[n * k + k] = 1e-14; // rounding's size: an exact root has no last pivot
+    over[k] = 1 / a[n * k + k];
+    for (let i = k + 1; i < n; i++) {
+      const factor = a[n * i + k] * over[k];
+      lower[n * i + k] = factor;
+      subtract(a, n * i, a, n * k, factor, n);
     }
   }
-  for (let i = 0; i < 12; i++) v[i] = 1 + 0.37 * i - 0.11 * i * i; // any start that no arm is made for
-  for (let i = 0; i < 12; i++) {
+  for (let i = 0; i < n; i++) v[i] = 1 + 0.37 * i - 0.11 * i * i; // any start that no arm is made for
+  for (let i = 0; i < n; i++) {
     w[i] = v[i] * over[i];
-    subtract(v, 0, a, 12 * i, w[i], 12);
+    subtract(v, 0, a, n * i, w[i], n);
   }
-  for (let k = 11; k > 0; k--) subtract(w, 0, lower, 12 * k, w[k], 12);
+  for (let k = n - 1; k > 0; k--) subtract(w, 0, lower, n * k, w[k], n);
   let size = 0;
-  for (let i = 0; i < 12; i++) size = Math.max(size, Math.abs(w[i]));
-  for (let i = 0; i < 12; i++) w[i] /= size;
-  for (let i = 1; i < 12; i++) for (let k = 0; k < i; k++) w[i] -= lower[12 * i + k] * w[k];
+  for (let i = 0; i < n; i++) size = Math.max(size, Math.abs(w[i]));
+  for (let i = 0; i < n; i++) w[i] /= size;
+  for (let i = 1; i < n; i++) for (let k = 0; k < i; k++) w[i] -= lower[n * i + k] * w[k];
   size = 0;
-  for (let i = 11; i >= 0; i--) {
+  for (let i = n - 1; i >= 0; i--) {
     let sum = w[i];
-    for (let k = 11; k > i; k--) sum -= a[12 * i + k] * v[k];
+    for (let k = n - 1; k > i; k--) sum -= a[n * i + k] * v[k];
     v[i] = sum * over[i];
     size = Math.max(size, Math.abs(v[i]));
   }
-  for (let i = 0; i < 12; i++) v[i] /= size;
+  for (let i = 0; i < n; i++) v[i] /= size;
 }
 
 /** Similarity transformations that make rows and columns about equally long (Osborne 1960).

@@ -110,16 +110,36 @@ function apart6(a, b) {
   return most;
 }
 
+/** Whether a root whose vector is no product stands for nothing: it is simple, and far from the pose.
+ * @param {Float64Array} q @param {Float64Array} goal @param {Float64Array} re @param {Float64Array} im @param {number} i */
+function standsForNothing(q, goal, re, im, i) {
+  const size = 1 + re[i] ** 2 + im[i] ** 2;
+  for (let j = 0; j < re.length; j++) {
+    const away = (re[i] - re[j]) ** 2 + (im[i] - im[j]) ** 2;
+    if (j !== i && !(4 * away > 1e-6 * size * (1 + re[j] ** 2 + im[j] ** 2))) return false;
+  }
+  return missing(q, goal) > 1e-3;
+}
+
+/** What a pose of the loop's chain makes of axes 6 and 1: all but parallel 1, meeting 2, else 0. @param {Numbers} frame */
+function kindOf(frame) {
+  if (LOOP.slides[0] || LOOP.slides[5]) return 0;
+  const sine = Math.hypot(frame[2], frame[6]);
+  if (sine < LOOP.beside) return 1;
+  return Math.abs(frame[3] * frame[6] - frame[7] * frame[2]) < LOOP.beside * sine ? 2 : 0;
+}
+
 /** One pass over a pose: its answers, whether the pass leaves it open, and whether two roots touch or just miss each other.
- * @param {Float64Array} goal @param {number} pass @param {Root[]} found answers are put behind these */
-function attempt(goal, pass, found) {
-  const pencil = PENCILS[LOOP.plan[pass]];
+ * @param {Float64Array} goal @param {number} kind @param {number} pass @param {Root[]} found answers are put behind these */
+function attempt(goal, kind, pass, found) {
+  const pencil = PENCILS[LOOP.plan[kind][pass]];
   const shake = LOOP.shakes[pass];
   const careful = pass > 0;
   const joint = pencil.order[2 + pencil.hidden];
   const pair = 1e-4 + 10 * Math.sqrt(shake); // tilt below which a complex root may be one of two real ones
   const size = pencil.size;
-  const c = 12 + size;
+  const lead = pencil.products;
+  const c = lead + size;
   let [open, touching, weakest] = [false, false, 0];
   let back = new Float64Array(12);
   const moved = new Float64Array(12);
@@ -130,17 +150,17 @@ function attempt(goal, pass, found) {
   if (!ends) return { open: true, touching };
   const E = equations(pencil, back, ends.N);
   const G = Float64Array.from(E);
-  if (!reduce(G, 12, 12, c)) return { open: true, touching };
+  if (!reduce(G, lead, lead, c)) return { open: true, touching };
   const C = new Float64Array(size * size);
   let most = 0;
-  for (let i = 0; i < 12; i++) {
+  for (let i = 0; i < lead; i++) {
     for (let j = 0; j < size; j++) {
-      C[i * size + j] = -G[i * c + 12 + j];
-      most = Math.max(most, Math.abs(G[i * c + 12 + j]));
+      C[i * size + j] = -G[i * c + lead + j];
+      most = Math.max(most, Math.abs(G[i * c + lead + j]));
     }
     open = open || !(Math.abs(G[i * c + i]) > 1e-11); // of a singular pencil the rest may vanish on both sides
   }
-  for (let i = 0; i < size - 12; i++) C[(12 + i) * size + 2 * pencil.r + i] = 1;
+  for (let i = 0; i < size - lead; i++) C[(lead + i) * size + 2 * pencil.r + i] = 1;
   if (!(most <= 1e6)) open = true;
   if (!(most < 1e300)) return { open, touching };
   const [re, im] = [new Float64Array(size), new Float64Array(size)];
@@ -152,8 +172,10 @@ function attempt(goal, pass, found) {
   for (let i = 0; i < size; i++) {
     const tilt = (2 * Math.abs(im[i])) / (1 + re[i] ** 2 + im[i] ** 2);
     if (!(im[i] >= 0) || !(tilt < (careful ? 0.3 : 0.02))) continue;
-    const q = jointsOf(pencil, E, back, ends, re[i]);
-    if (!q) continue;
+    const seed = jointsOf(pencil, E, back, ends, re[i]);
+    if (!seed) continue;
+    const q = seed.q;
+    if (seed.defect > 1e-5 && !(shake > 0) && most < 1e5 && standsForNothing(q, goal, re, im, i)) continue;
     const one = refine(q, goal, careful ? 12 : 4, careful);
     const good = one.residual < (careful ? 3e-9 : 1e-10);
     // a complex pair that steps brought near the pose may be a real one, seen through rounding
@@ -219,9 +241,10 @@ function candidatesOfPose(goal, near, q, miss) {
   /** @type {Root[]} */
   let found = [];
   let [open, edge] = [true, false];
-  for (let pass = 0; pass < LOOP.plan.length && open; pass++) {
+  const kind = kindOf(there);
+  for (let pass = 0; pass < LOOP.shakes.length && open; pass++) {
     edge = edge || LOOP.shakes[pass] > 0; // a singular posture may be missing where the target had to be moved
-    const told = attempt(there, pass, found);
+    const told = attempt(there, kind, pass, found);
     open = told.open;
     edge = edge || told.touching;
   }

@@ -1,7 +1,8 @@
 /**
  * @typedef {object} Pencil see armkin/inverse/elimination/pencil.py for the symbols
  * @property {number} psi @property {number} slot which link carries the pose @property {boolean} backward
- * @property {number} hidden @property {number} dialytic which of the middle joints @property {number} rows
+ * @property {number} hidden @property {number} dialytic which of the middle joints
+ * @property {boolean} wide the third is dialytic, too @property {number} products 12, 16 of a wide role @property {number} rows
  * @property {number} r @property {number} w @property {number} size @property {number[]} order the joints by part
  * @property {boolean[]} slides @property {Float64Array} links @property {Float64Array} columns
  * @property {Float64Array | null} first @property {Float64Array | null} second @property {Float64Array | null} N
@@ -65,11 +66,13 @@ function eliminate(pencil, Y) {
   return { N: basis.slice(5 * 16), recover };
 }
 
-/** The twelve equations (4) of armkin/inverse/elimination/pencil.py, 12 x (12 + size).
+/** The p equations (4) of armkin/inverse/elimination/pencil.py, p x (p + size), p = products.
  * @param {Pencil} pencil @param {Float64Array} Y @param {Float64Array} N @returns {Float64Array} */
 function equations(pencil, Y, N) {
   const m = pencil.rows;
-  const width = 2 * (12 + pencil.size);
+  const p = pencil.products;
+  const factors = pencil.wide ? 4 : 2;
+  const width = factors * (p + pencil.size);
   if (pencil.slot === 1) {
     const R = new Float64Array(15 * 16);
     const moved = new Float64Array(m * 16);
@@ -82,9 +85,11 @@ function equations(pencil, Y, N) {
     for (let k = 0; k < 15; k++) subtract(rows, i * width, pencil.columns, k * width, -N[16 * i + k], width);
   const mix = pencil.mix;
   if (!mix) return rows;
-  const half = width / 2;
-  const out = new Float64Array(12 * half);
-  for (let i = 0; i < 12; i++) for (let k = 0; k < 2 * m; k++) subtract(out, i * half, rows, k * half, -mix[i * 2 * m + k], half);
+  const c = p + pencil.size;
+  const count = factors * m;
+  const out = new Float64Array(p * c);
+  for (let i = 0; i < p; i++)
+    for (let k = 0; k < count; k++) if (mix[i * count + k] !== 0) subtract(out, i * c, rows, k * c, -mix[i * count + k], c);
   return out;
 }
 
@@ -99,31 +104,38 @@ function ratioOf(power, from, count, step) {
   return above / Math.max(below, 1e-300);
 }
 
-/** The joint values for a root x of the pencil; null if it is a slide at infinity.
+/** (cos 3f, sin 3f, cos f, sin f) of f = q / 2. @param {number} q */
+function halfPowers(q) {
+  return [Math.cos(1.5 * q), Math.sin(1.5 * q), Math.cos(0.5 * q), Math.sin(0.5 * q)];
+}
+
+/** The joint values for a root x of the pencil, and the squared sine between its vector and the product that a solution's is
+ * (0 where slides move); null if it is a slide at infinity.
  * @param {Pencil} pencil @param {Float64Array} E @param {Float64Array} Y @param {Ends} ends @param {number} x
- * @returns {Float64Array | null} */
+ * @returns {{q: Float64Array, defect: number} | null} */
 function jointsOf(pencil, E, Y, ends, x) {
-  const { r, w, slides, hidden, dialytic } = pencil;
-  const c = 12 + pencil.size;
+  const { r, w, slides, hidden, dialytic, products: p } = pencil;
+  const c = p + pencil.size;
+  const three = p / 4;
   const far = Math.abs(x) > 1;
   const third = 3 - hidden - dialytic;
   const y = far ? 1 / x : x;
   const scale = (far ? x : 1) / (1 + x * x);
-  const A = new Float64Array(144);
-  for (let i = 0; i < 12; i++) {
+  const A = new Float64Array(p * p);
+  for (let i = 0; i < p; i++) {
     const e = i * c; // the equations at x, divided by x^2 if x is large
-    for (let j = 0; j < 2 * r; j++) A[12 * i + j] = far ? E[e + j] + E[e + 12 + j] * y : E[e + j] * y + E[e + 12 + j];
+    for (let j = 0; j < 2 * r; j++) A[p * i + j] = far ? E[e + j] + E[e + p + j] * y : E[e + j] * y + E[e + p + j];
     for (let j = 0; j < w; j++) {
       const two = E[e + 2 * r + j];
-      const one = E[e + 12 + 2 * r + j];
-      const none = E[e + 12 + 2 * r + w + j];
-      A[12 * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
+      const one = E[e + p + 2 * r + j];
+      const none = E[e + p + 2 * r + w + j];
+      A[p * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
     }
   }
-  const u = new Float64Array(12);
-  const v = new Float64Array(12);
+  const u = new Float64Array(p);
+  const v = new Float64Array(p);
   nullVector(A, u);
-  for (let i = 0; i < 12; i++) {
+  for (let i = 0; i < p; i++) {
     for (let j = 0; j < r; j++) {
       const K_re = /** @type {Float64Array} */ (pencil.K_re)[i * r + j];
       const K_im = /** @type {Float64Array} */ (pencil.K_im)[i * r + j];
@@ -131,22 +143,31 @@ function jointsOf(pencil, E, Y, ends, x) {
     }
     for (let j = 0; j < w; j++) v[i] += pencil.W[i * w + j] * u[2 * r + j];
   }
-  let [row, column, most] = [0, 0, 0];
-  for (let i = 0; i < 4; i++) {
-    const size = v[3 * i] ** 2 + v[3 * i + 1] ** 2 + v[3 * i + 2] ** 2; // v is 4 x 3: its longest row and column are the safest
-    if (size > most) [most, row] = [size, i];
-  }
-  most = 0;
-  for (let j = 0; j < 3; j++) {
-    const size = v[j] ** 2 + v[3 + j] ** 2 + v[6 + j] ** 2 + v[9 + j] ** 2;
-    if (size > most) [most, column] = [size, j];
-  }
+  // v is 4 x 3, 4 x 4 of a wide role: its longest row and column are the safest
+  const rowSize = [0, 0, 0, 0];
+  const columnSize = [0, 0, 0, 0];
+  v.forEach((x, k) => {
+    rowSize[Math.floor(k / three)] += x * x;
+    columnSize[k % three] += x * x;
+  });
+  const row = rowSize.indexOf(Math.max(...rowSize));
+  const column = columnSize.indexOf(Math.max(...columnSize));
   const middle = [0, 0, 0];
   middle[hidden] = pencil.psi + (slides[2 + hidden] ? 1 / (Math.abs(x) < 1e-100 ? 1e-100 : x) : 2 * Math.atan(x));
-  middle[dialytic] = slides[2 + dialytic] ? ratioOf(v, column, 4, 3) : 2 * Math.atan2(v[9 + column], v[6 + column]);
-  const sign = v[3 * row] < 0 ? -1 : 1;
-  middle[third] = slides[2 + third] ? ratioOf(v, 3 * row, 3, 1) : Math.atan2(sign * v[3 * row + 2], sign * v[3 * row + 1]);
+  middle[dialytic] = slides[2 + dialytic] ? ratioOf(v, column, 4, three) : 2 * Math.atan2(v[3 * three + column], v[2 * three + column]);
+  const at = three * row;
+  const sign = v[at] < 0 ? -1 : 1;
+  if (slides[2 + third]) middle[third] = ratioOf(v, at, three, 1);
+  else middle[third] = pencil.wide ? 2 * Math.atan2(v[at + 3], v[at + 2]) : Math.atan2(sign * v[at + 2], sign * v[at + 1]);
   if (!middle.every((value) => Math.abs(value) < 1e4)) return null;
+  let defect = 0;
+  if (!slides[2 + dialytic] && !slides[2 + third]) {
+    const first = halfPowers(middle[dialytic]);
+    const second = pencil.wide ? halfPowers(middle[third]) : [1, Math.cos(middle[third]), Math.sin(middle[third])];
+    let along = 0;
+    v.forEach((x, k) => (along += x * first[Math.floor(k / three)] * second[k % three]));
+    defect = 1 - along ** 2 / (4 * Math.max(dot(rowSize, [1, 1, 1, 1]), 1e-300));
+  }
   const link = (/** @type {number} */ i) => (i === pencil.slot ? Y : pencil.links.subarray(12 * i, 12 * i + 12));
   const a = Float64Array.from(link(1));
   const b = new Float64Array(12);
@@ -177,5 +198,5 @@ function jointsOf(pencil, E, Y, ends, x) {
   part[5] = Math.atan2(across, level);
   const q = new Float64Array(6);
   for (let k = 0; k < 6; k++) q[pencil.order[k]] = pencil.backward ? -part[k] : part[k];
-  return q;
+  return { q, defect };
 }

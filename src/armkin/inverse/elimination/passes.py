@@ -1,0 +1,136 @@
+"""One pass over poses: their answers by one pencil, and which of them it leaves open.
+
+See `method` for what leaves a pose open, and why.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.elimination import roots
+from armkin.inverse.elimination.closed_loop import Loop
+from armkin.inverse.elimination.merge import Answers, difference, projection
+from armkin.inverse.elimination.pencil import Pencil
+from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
+from armkin.inverse.numeric.tolerances import (
+    ALONE,
+    BLURRED_ROOT,
+    CLOSE_RESIDUAL,
+    ELIMINATED,
+    EXAMINED,
+    GRAZING,
+    NO_PRODUCT,
+    OWN_ROOT,
+    PAIRED,
+    SAME_KEY,
+    SAME_ROOT,
+    SEED,
+    SHAKES,
+    STRAY,
+    UPRIGHT,
+)
+from armkin.model.rotation import inverse
+
+Int = NDArray[np.int64]
+
+TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
+REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
+
+
+def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
+    """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
+    careful, shake = number > 0, SHAKES[number]
+    seed = roots.seeds(pencil, inverse(shaken_goal(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
+    if shake == 0:
+        seed = _without_empty(closed, seed, goal)
+    target = goal[seed.pose]
+    if careful:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
+    else:
+        done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
+    # In later passes also what is nearly an answer, at a double root: such poses are said to be doubtful.
+    good = done.residual < (10 * GRAZING if careful else ELIMINATED)
+    unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
+    # A complex pair that steps brought near the pose may be a real one, seen through rounding.
+    # A move of the pose may turn two close real roots into such a pair.
+    pair = PAIRED + 10 * np.sqrt(shake)
+    maybe = seed.tilt < pair
+    near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
+    missed = ~good & ((seed.tilt < UPRIGHT) | near)
+    touch = good & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
+    unsure = good & (seed.tilt > 0) & maybe
+    # A real root that was far from the answer it led to may have stood for another one.
+    strayed = good & (seed.tilt == 0) & (done.guess > STRAY + 30 * shake)
+    # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
+    # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
+    weakest = np.zeros(goal.shape[0])
+    np.maximum.at(weakest, seed.pose[good], done.weakness[good])
+    away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
+    own = (np.abs(away) < OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    # unless several solutions share the middle joints: these are one root
+    some = np.flatnonzero(strayed & own)
+    own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
+    strayed &= ~own
+    unsettled[seed.pose[missed | unsure | strayed]] = True
+    touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
+    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
+    # and if the two answers are not the same.
+    answers = answers_of(closed, seed.pose, done, good)
+    # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
+    stands = good & maybe
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > BLURRED_ROOT + 10 * shake
+    order = np.lexsort((hidden, pose))
+    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < SAME_ROOT)
+    close &= blurred[order][1:] | blurred[order][:-1]
+    close &= ~(own[stands][order][1:] & own[stands][order][:-1])
+    unsettled[pose[order][1:][close]] = True
+    # Two real roots that led to one answer: one of them stands for another.
+    real = answers.take(seed.tilt[good] == 0)
+    key = projection(closed.prismatic, real.q)
+    order = np.lexsort((key, real.pose))
+    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
+    if twice.any():  # different answers may have the same key: about one pose in 10,000
+        pairs = np.flatnonzero(twice)
+        step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
+        twice[pairs] = np.abs(step).max(axis=1) < EXAMINED
+    unsettled[real.pose[order][1:][twice]] = True
+    guesses = answers_of(closed, seed.pose, done, ~good & (done.residual < SEED))
+    return answers, unsettled, touching, guesses
+
+
+def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array) -> roots.Seeds:
+    """Seeds without roots that stand for nothing.
+
+    A simple root, or a double one with one vector, is one if its vector is no product: a solution's vector is a
+    product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
+    """
+    some = np.flatnonzero((seed.defect > NO_PRODUCT) & (seed.gap > ALONE))
+    target = np.ascontiguousarray(np.moveaxis(goal[seed.pose[some], :3], 0, -1))
+    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
+    kept = np.ones(len(seed.pose), np.bool_)
+    kept[some[pose_error(frame, target)[1] > STRAY]] = False
+    pose, q, hidden, tilt, rough, defect, gap = seed
+    return roots.Seeds(pose[kept], q[kept], hidden[kept], tilt[kept], rough, defect[kept], gap[kept])
+
+
+def shaken_goal(goal: Array, size: float) -> Array:
+    """Goals (N, 4, 4) moved a little, in a direction that no arm is made for."""
+    if size == 0:
+        return goal
+    x, y, z = size * np.array([0.61, -0.49, 0.63])
+    spin = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    move = np.eye(4)
+    move[:3, :3] = np.linalg.solve(np.eye(3) - spin / 2, np.eye(3) + spin / 2)  # Cayley: a rotation
+    move[:3, 3] = size * np.array([-0.53, 0.57, 0.47])
+    return np.asarray(move @ goal)
+
+
+def answers_of(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
+    """The good ones, their revolute joints wrapped to (-pi, pi]."""
+    wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
+    return Answers(pose, wrapped, done.residual, done.weakness).take(good)
+
+
+def none() -> Answers:
+    """No answers."""
+    return Answers(np.empty(0, dtype=np.int64), np.empty((0, 6)), np.empty(0), np.empty(0))
