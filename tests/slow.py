@@ -188,7 +188,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_a_legal_posture_of_an_edge_is_listed",
         "test_what_stands_within_limits_is_not_said_to_be_outside",
     ),
-    "inverse/test_lines.py": (),
+    "inverse/test_linkages.py": (),
     "inverse/test_rounded_targets.py": ("test_machine_code_stays_as_python_does",),
     "inverse/test_memory.py": ("test_memory_beyond_the_results_does_not_grow_with_the_batch",),
     "inverse/test_near.py": (),

@@ -12,7 +12,7 @@ import armkin
 from armkin import Status
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.singular import regular_targets
+from armkin.inverse.singular import components, regular_targets
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 
@@ -42,9 +42,8 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
     def nothing(goals: Goals, q: np.ndarray, valid: np.ndarray) -> regular_targets.Regular:
         decided.append(len(q))
         none = np.zeros(len(q), bool)
-        return regular_targets.Regular(
-            none, np.zeros(q.shape[:2], bool), none, np.zeros((len(q), q.shape[2]), bool), q, none
-        )
+        branch = np.zeros(q.shape[:2], bool)
+        return regular_targets.Regular(none, branch, none, np.zeros((len(q), q.shape[2]), bool), q, none, branch)
 
     monkeypatch.setattr(regular_targets, "settle", nothing)
     _, one_by_one = nearly_singular(name, least, most)
@@ -83,3 +82,24 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     assert known[0].mean() > 0.9, known[0].mean()
     assert len(known[0]) > 50
     assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
+
+
+def test_two_folds_in_one_posture_are_a_boundary_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stretched elbow under a wrist over the shoulder: eight candidates in three postures, each a multiple root."""
+    arm = shipped("ur5e")[0]
+    T = armkin.fk(arm, np.radians([[180.0, 90.0, 0.0, 90.0, 135.0, -135.0], [-90.0, -90.0, 0.0, 90.0, -135.0, -90.0]]))
+    monkeypatch.setattr(components, "examine", None)  # not asked
+    s = armkin.ik(arm, T)
+    assert (s.status == Status.BOUNDARY).all()
+    assert s.valid.sum(axis=1).tolist() == [3, 3]
+
+
+def test_a_linkage_that_cannot_move_is_one_posture() -> None:
+    """A UR stretched out with a straight wrist: one value of the free joint alone solves its target."""
+    arm = shipped("ur5e")[0]
+    q = np.radians([180.0, -135.0, 0.0, -90.0, -180.0, 90.0])
+    s = armkin.ik(arm, armkin.fk(arm, q))
+    assert s.status == Status.BOUNDARY
+    assert s.valid.sum() == 1
+    assert s.complete
+    assert newton.wrapped_distance(arm, s.q[s.valid], q).max() < 1e-6

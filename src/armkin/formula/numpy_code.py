@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -13,6 +15,13 @@ from armkin.formula.python_code import function_of
 from armkin.formula.recording import BOOLEAN, FLIPS, Node, Recording, axes_of, branch_signs
 
 Run = Callable[..., tuple[Any, ...]]
+# Functions that are not rounded to the nearest number, as plain Python has them.
+_ROUNDED: dict[str, Callable[..., Any]] = {
+    "arctan2": np.frompyfunc(math.atan2, 2, 1),
+    "tan": np.frompyfunc(math.tan, 1, 1),
+    "cbrt": np.frompyfunc(math.cbrt, 1, 1),
+    "power": np.frompyfunc(operator.pow, 2, 1),
+}
 Place = tuple[int | slice, ...]
 
 
@@ -33,10 +42,11 @@ def workspace(buffers: list[Buffer], length: int) -> list[NDArray[Any]]:
     return made
 
 
-def write(recording: Recording) -> tuple[Run, list[Buffer]]:
+def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
     """One numpy call a line, its result in a buffer that is free again after its last use.
 
-    A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``.
+    A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``. scalar: functions
+    that numpy may round another way in its vectorised loops are called number by number.
     Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
     """
     names = {id(node): f"i{k}" for k, node in enumerate(recording.inputs)}
@@ -113,6 +123,8 @@ def write(recording: Recording) -> tuple[Run, list[Buffer]]:
     outputs = list(map(name, recording.outputs))
     scope = {**constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
     scope |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
+    if scalar:
+        scope |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
     scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in scope}
     return function_of(parameters, lines, outputs, scope), buffers
 
@@ -138,3 +150,9 @@ def _flip(axis: int, a: Any, out: NDArray[Any]) -> None:
 def _where(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:
     """`numpy.where` into a buffer, which may be that of a or b."""
     np.copyto(out, np.where(mask, a, b))
+
+
+def _one_by_one(function: Any, *arguments: Any) -> None:
+    """A function of numbers into a buffer, the last argument."""
+    *values, out = arguments
+    out[...] = function(*values)

@@ -28,6 +28,7 @@ class StraightLineCode:
 
         self._recording = record(formula, inputs)
         self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
+        self._exact: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
         self._kept = threading.local()
 
@@ -57,6 +58,15 @@ class StraightLineCode:
             return self._batch[0](*inputs, *workspace)
         finally:
             np.setbufsize(before)
+
+    def exactly(self, inputs: Sequence[Array]) -> list[Array]:
+        """The formula's outputs for inputs (N,), to the last digit those of `numbers`, in arrays of their own."""
+        from armkin.formula import numpy_code
+
+        if self._exact is None:
+            self._exact = numpy_code.write(self._recording, scalar=True)
+        run, buffers = self._exact
+        return [np.array(x) for x in run(*inputs, *numpy_code.workspace(buffers, len(inputs[0])))]
 
     def axes(self) -> list[tuple[int, ...]]:
         """Lengths of the branch axes of each output."""

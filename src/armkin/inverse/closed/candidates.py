@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import StraightLineCode
+from armkin.formula.trace import LazyCode, StraightLineCode
 from armkin.forward import fk
 from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+FEW = 8  # targets that plain Python does sooner than arrays
 FREED = 24  # values tried for joints that a target leaves free
+CLOSER = 14  # times that the best of these is sought four times closer: to 1e-8 rad
 BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
 SHAKEN = 8  # moves of a target to where nothing is free
 
@@ -58,8 +60,35 @@ class Recorded:
             miss = np.maximum(miss, _sum_miss(self.task, values, goal))
         return [*values, miss, found.doubt.edge, found.doubt.free]
 
+    @cached_property
+    def _preferring(self) -> LazyCode:
+        """The candidates for given values of free joints: of the target's entries and these values' pairs."""
+        inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
+        slides = self.arm.prismatic.tolist()
+
+        def formula(entries: list[Entry]) -> list[Entry]:
+            rest = iter(entries[inputs:])
+            pairs = [Pair(next(rest), None if slide else next(rest)) for slide in slides]
+            return self.candidates(entries[:inputs], pairs)
+
+        return LazyCode(formula, inputs + 2 * len(slides) - sum(slides))
+
+    def with_values(self, target: Array, values: Array) -> Array:
+        """Candidates of targets N for values (N, n) of the joints that are free, (N, B, n + 1): the last their squared
+        residuals."""
+        goal, prefer = entries(self.task, target), preferred(self.arm, values)
+        code = self._preferring.get(len(target))
+        if code is None:
+            found = self.candidates(goal, prefer)
+        else:
+            flat = [*goal, *(x for pair in prefer for x in pair if x is not None)]
+            found = list(code.run(flat, code.workspace(len(target))))
+        return as_rows(found[: self.arm.n + 1], len(target))
+
     def in_numbers(self, target: Array) -> list[Array]:
-        """`candidates` in plain Python: to the last digit the same, whatever a target is asked together with."""
+        """`candidates` to the last digit the same, whatever a target is asked together with."""
+        if len(target) > FEW:
+            return self.code.exactly(entries(self.task, target))
         full = self.task.orientation == "full"
         return self.code.one_by_one([pose.read_one(one) if full else one.tolist() for one in target])
 
@@ -77,10 +106,7 @@ class Recorded:
         which do not, and of some classes from many starts. Everywhere: of places where a self-motion meets another one.
         nan where there is none, or where the candidate is far from its target. near: (N, n).
         """
-        # beside round values: where a wrist is straight its joints are free, too, and jump to what is preferred
-        steps = ((np.arange(FREED) + BESIDE_ROUND) * 2.0 / FREED - 1.0)[:, None]
-        unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
-        q, miss = self._at(np.repeat(target[:, None], FREED, axis=1), near[:, None] + steps * unit)
+        q, miss = self._all_round(target, near)
         exact = np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
         kept, held = four_bars.one_a_circuit(self.arm, exact, near)
         known: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
@@ -105,6 +131,37 @@ class Recorded:
         branch = np.concatenate([np.arange(part.shape[1]) % q.shape[2] for part in more])
         return np.concatenate(more, axis=1), branch
 
+    def samples(self, target: Array, near: Array) -> Array:
+        """Candidates (N, FREED, B, n) with values for free joints all round; nan where they miss their target."""
+        q, miss = self._all_round(target, near)
+        return np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
+
+    def best_shift(self, target: Array, near: Array, loose: Bool) -> Array:
+        """How far from `near` the free joints of targets are best: (N, 1), [rad, parts of the reach].
+
+        Where none of the values all round solves the target by a loose candidate (N, B), they are sought closer and
+        closer about the best one.
+        """
+        shift, apart = self._steps(), 2.0 * np.pi / FREED
+        best = np.zeros((len(target), 1))
+        for _ in range(CLOSER):
+            values = near[:, None] + (best[:, None] + shift) * np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
+            _, miss = self._at(np.repeat(target[:, None], len(shift), axis=1), values)
+            place = np.where(loose[:, None], miss, np.inf).min(axis=2).argmin(axis=1)
+            best, apart = best + shift[place], apart / 4
+            shift = apart * np.arange(-4.0, 5.0)[:, None]
+        return best
+
+    def _steps(self) -> Any:
+        """Values of a joint all round, as steps from `near` [rad]: (FREED, 1)."""
+        # beside round values: where a wrist is straight its joints are free, too, and jump to what is preferred
+        return (np.arange(FREED)[:, None] + BESIDE_ROUND) * (2.0 * np.pi / FREED) - np.pi
+
+    def _all_round(self, target: Array, near: Array) -> tuple[Array, Array]:
+        """Candidates (N, FREED, B, n) with values for free joints all round; squared residuals."""
+        unit = np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
+        return self._at(np.repeat(target[:, None], FREED, axis=1), near[:, None] + self._steps() * unit)
+
     def _random(self, target: Array, near: Array) -> Array:
         """Candidates (N, M, n) with random values for joints that are free, and of targets moved to where none is."""
         rng, n = np.random.default_rng(4), self.arm.n
@@ -119,9 +176,7 @@ class Recorded:
     def _at(self, goals: Array, values: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) of targets (N, S, ...) with values (N, S, n) for free joints; squared residuals."""
         N, S = goals.shape[:2]
-        prefer = preferred(self.arm, values.reshape(-1, self.arm.n))
-        found = self.candidates(entries(self.task, goals.reshape(-1, *goals.shape[2:])), prefer)
-        rows = as_rows(found[: self.arm.n + 1], N * S)
+        rows = self.with_values(goals.reshape(-1, *goals.shape[2:]), values.reshape(-1, self.arm.n))
         rows = rows.reshape(N, S, *rows.shape[1:])
         return rows[..., :-1], rows[..., -1]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import jacobian
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, TINY
+from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, SOLUTION, TINY
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -51,11 +51,14 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     lowest, highest = _diagonals(at.bars, at.spherical)
     # the diagonal beside a joint is that of the other two bars, too
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
+    # equal bars, or nearly: there are several postures in one line, and the curve may fall into others that cross
+    ends = np.abs(np.stack([lowest - least, lowest - most, highest - least, highest - most]))
+    several = ((ends < NEAR).sum(axis=0) > 1).any(axis=1)
+    # where all bars come so near to one line that the posture in it solves the target, two circuits are one
+    least, most = least - SOLUTION, most + SOLUTION
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
     length = np.where(at.spherical[:, None], np.sin(at.bars), at.bars)
-    ends = np.stack([lowest - least, lowest - most, highest - least, highest - most, length])
-    # where all bars can lie in one line, or nearly, circuits cross or all but meet: there they are walked
-    known[rows] = (at.planar | at.spherical) & (np.abs(ends) > NEAR).all(axis=(0, 2))
+    known[rows] = (at.planar | at.spherical) & (length > NEAR).all(axis=1) & ~several
     two = np.flatnonzero(~reaches.all(axis=1))
     joint[rows[two]] = which[two, reaches[two].argmin(axis=1)]
     return known, joint

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
 from armkin.inverse.answers.solutions import Status
-from armkin.inverse.closed.candidates import Recorded, as_rows, entries, preferred
-from armkin.inverse.numeric.tolerances import ACCEPTED, SAME
-from armkin.inverse.singular import components, lines, regular_targets
+from armkin.inverse.closed.candidates import Recorded
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, SAME, SOLUTION
+from armkin.inverse.singular import components, linkages, regular_targets
 
 AT_ONCE = 256  # targets examined together
 
@@ -46,7 +47,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
 
     Where a joint is free, the candidates are not all.
     """
-    arm, _, target, near = goals
+    arm, task, target, near = goals
     left = doubts.free.copy()
     for start in range(0, len(left), AT_ONCE):
         part = start + np.flatnonzero(~doubts.free[start : start + AT_ONCE])
@@ -54,6 +55,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             continue
         rows = doubts.rows[part]
         found = regular_targets.settle(goals.of(rows), doubts.q[part], doubts.valid[part])
+        found.known[...] &= found.branch.any(axis=1) & (newton.missing(arm, task, near[rows], target[rows]) > SOLUTION)
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
         new = np.flatnonzero(found.known & (found.double | found.changed | moving))
@@ -69,15 +71,17 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
 
     rows = doubts.rows[left]  # what is singular hangs on the last digit
     some = as_doubts(runner, runner.in_numbers(target[rows]), rows, np.arange(len(rows)))
-    first, other, loose, ends = _freed(goals, runner, some)
-    at_ends = np.zeros(len(rows), bool)
-    at_ends[ends] = True
-    open_ = ~_on_lines(goals, out, rows, first, other, loose, some.free & ~at_ends)
+    freed = _freed(goals, runner, some)
+    out, done = _on_linkages(goals, runner, out, some, freed)
+    open_ = ~done
     if not open_.any():
         return out
-    rows, first, other, loose = rows[open_], first[open_], other[open_], loose[open_]
-    some = Doubts(rows, some.q[open_], some.valid[open_], some.free[open_])
-    ends = np.flatnonzero(at_ends[open_])
+    if len(part := np.flatnonzero(open_ & freed.narrow)):  # there may be another part
+        whole = rows[part]
+        freed.first[part], freed.other[part], _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
+        freed.other[part] = np.where(freed.loose[part][:, :, None], freed.other[part], np.nan)
+    rows, tight = rows[open_], some.q[open_]
+    first, other, loose, at_ends = freed.first[open_], freed.other[open_], freed.loose[open_], freed.ends[open_]
 
     def candidates(of: NDArray[np.intp]) -> tuple[Array, Bool]:
         """With the preferred values for joints that are free, and those that other values would change."""
@@ -85,62 +89,96 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             return first[of], loose[of]
         more = [other[of]]
         if runner.geometry.ends:
-            more.append(some.q[of])  # it may be that the joint is not quite free
+            more.append(tight[of])  # it may be that the joint is not quite free
         fixed = np.zeros((len(of), sum(part.shape[1] for part in more)), bool)
         return np.concatenate([first[of], *more], axis=1), np.concatenate([loose[of], fixed], axis=1)
 
     unsettled = None
     if runner.geometry.ends:
         unsettled = np.zeros(len(target), bool)
-        unsettled[rows[ends]], out.complete[rows[ends]] = True, False
+        unsettled[rows[at_ends]], out.complete[rows[at_ends]] = True, False
     return examined(goals, out, rows, candidates, runner.others, unsettled)
 
 
-def _on_lines(
-    goals: Goals, out: Batch, rows: NDArray[np.intp], first: Array, other: Array, loose: Bool, asked: Bool
-) -> Bool:
-    """Write those of the asked targets rows (K,) that are singular by two joints about one line alone; which (K,)."""
-    done = np.zeros(len(rows), bool)
-    for start in range(0, len(rows), AT_ONCE):
-        part = start + np.flatnonzero(asked[start : start + AT_ONCE])
-        if not len(part):
-            continue
-        line = lines.settle(goals.of(rows[part]), first[part], other[part], loose[part])
-        order = np.argsort(~line.branch, axis=1, kind="stable")[line.known]
-        there = np.take_along_axis(line.branch[line.known], order, axis=1)
-        part = part[line.known]
-        kept = np.take_along_axis(first[part], order[:, :, None], axis=1)
-        write(goals.arm, out, rows[part], kept, there, order, goals.near[rows[part]])
-        out.status[rows[part]], out.free[rows[part]] = Status.SINGULAR, line.free[line.known]
-        done[part] = True
-    return done
+class _Freed(NamedTuple):
+    """Candidates of K targets, those that leave a joint free with preferred values: as near `near` first (K, B, n).
 
-
-def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> tuple[Array, Array, Bool, NDArray[np.intp]]:
-    """Candidates of the doubted targets, those that leave a joint free with preferred values, as near `near`.
-
-    And the same with other values, nan where these change nothing; which candidates they change (K, B); and the targets
-    on which the joints that the geometry calls ends are free.
+    other: the same with other values, nan where these change nothing; loose: (K, B) which candidates they change;
+    ends: (K,) targets on which the joints that the geometry calls ends are free; narrow: (K,) those with solutions for
+    a part of these values, which `near` is not in.
     """
-    arm, task, target, near = goals
+
+    first: Array
+    other: Array
+    loose: Bool
+    ends: Bool
+    narrow: Bool
+
+
+def _on_linkages(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts, freed: _Freed) -> tuple[Batch, Bool]:
+    """The same with those targets (K,) written whose self-motions are known in closed form; which these are (K,)."""
+    done, asked = np.zeros(len(doubts.rows), bool), doubts.free & ~freed.ends
+    for start in range(0, len(done), AT_ONCE):
+        part = start + np.flatnonzero(asked[start : start + AT_ONCE])
+        q = np.stack([freed.first[part], freed.other[part]], axis=1)
+        for _ in range(2):
+            if not len(part):
+                break
+            rows, some = doubts.rows[part], goals.of(doubts.rows[part])
+            found = linkages.settle(some, q, freed.loose[part])
+            known = np.flatnonzero(found.known)
+            order = np.argsort(np.where(found.branch[known], found.label, found.q.shape[1]), axis=1, kind="stable")
+            order = order[:, : int(found.branch.sum(axis=1).max(initial=1))]
+            there = np.take_along_axis(found.branch[known], order, axis=1)
+            kept = np.take_along_axis(found.q[known], order[:, :, None], axis=1)
+            width = order.shape[1]
+            if width > out.q.shape[1]:
+                out = wider(out, width)
+            write(goals.arm, out, rows[known], kept, there, named(found.label[order], there), some.near[known])
+            out.status[rows[known]], out.free[rows[known]] = Status.SINGULAR, found.free[known]
+            done[part[known]] = True
+            lacking = np.flatnonzero(found.lacking)
+            part, q = part[lacking], q[lacking]
+            if len(part):
+                q = np.concatenate([q, runner.samples(some.target[lacking], some.near[lacking])], axis=1)
+    return out, done
+
+
+def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> _Freed:
+    """Candidates of the doubted targets, with preferred values for joints that are free."""
+    _, _, target, near = goals
     rows = np.flatnonzero(doubts.free)
-    first, loose = doubts.q.copy(), np.zeros(doubts.q.shape[:2], bool)
-    other, ends = np.full(first.shape, np.nan), [rows[:0]]
+    out = _Freed(
+        first=doubts.q.copy(),
+        other=np.full(doubts.q.shape, np.nan),
+        loose=np.zeros(doubts.q.shape[:2], bool),
+        ends=np.zeros(len(doubts.q), bool),
+        narrow=np.zeros(len(doubts.q), bool),
+    )
     for start in range(0, len(rows), AT_ONCE):
         part = rows[start : start + AT_ONCE]
         whole = doubts.rows[part]
-        goal = entries(task, target[whole])
-        first[part], second = (
-            as_rows(runner.candidates(goal, preferred(arm, near[whole] + shift))[: arm.n], len(part))
-            for shift in (0.0, 1.0)
-        )
-        apart = np.abs(first[part] - second)
+        first, second, solved = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
+        apart = np.abs(first - second)
         changed = ~(apart.max(axis=2) < SAME)
-        loose[part] = changed
-        other[part] = np.where(changed[:, :, None], second, np.nan)
+        lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
+        if len(lost):  # solutions for some values of the free joints alone, or for one
+            rest = whole[lost]
+            best = near[rest] + runner.best_shift(target[rest], near[rest], changed[lost])
+            first[lost], second[lost], solved = _at_two(runner, target[rest], best, best + FOLD_WAY)
+            out.narrow[part[lost]] = solved[1].any(axis=1)
+        out.first[part], out.loose[part] = first, changed
+        out.other[part] = np.where(changed[:, :, None], second, np.nan)
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
-        ends.append(part[(apart > SAME).any(axis=(1, 2))])
-    return first, other, loose, np.concatenate(ends)
+        out.ends[part] = (apart > SAME).any(axis=(1, 2))
+    return out
+
+
+def _at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tuple[Array, Array, Bool]:
+    """Candidates for two values of free joints, (N, B, n) each, and which solve their targets (2, N, B)."""
+    found = runner.with_values(np.concatenate([target, target]), np.concatenate([values, others]))
+    solved = found[..., -1].reshape(2, len(target), -1) <= ACCEPTED**2
+    return found[: len(target), :, :-1], found[len(target) :, :, :-1], solved
 
 
 def examined(

@@ -6,6 +6,8 @@ double root at a limit is off it by as much as arithmetic can tell its halves ap
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,9 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, OFF_LIMITS, ON_MANIFOLD, SOLUTION
 from armkin.inverse.singular import components
 from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
 
 
 def with_legal_postures(goals: Goals, out: Batch) -> Batch:
@@ -32,15 +37,10 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         """Further candidates: none, those that were found are all."""
         return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64)
 
-    edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
-    for k in edge[~out.within[edge].any(axis=1)]:
+    rows = np.flatnonzero(((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR)) & ~out.within.any(axis=1))
+    for k in rows[_may_be_legal(goals, out, rows)]:
         q = out.q[k, out.valid[k]]
-        beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-        at_limit = (beyond < OFF_LIMITS).all(axis=1)
-        sigma, *_ = newton.null_space(arm, task, q, np.repeat(target[k : k + 1], len(q), axis=0))
-        # a joint that is held is outside; or the curve is of small residuals, not as exact as the branches
-        if not (at_limit | ((beyond < OFF_LIMITS) | out.free[k]).all(axis=1) & (sigma < ON_MANIFOLD)).any():
-            continue
+        at_limit = _at_limits(arm, q).all(axis=1).any()
         legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
         # the correction may take a double root beyond its limit
@@ -49,7 +49,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
-        if miss > (0.9 * SOLUTION if at_limit.any() else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
+        if miss > (0.9 * SOLUTION if at_limit else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
@@ -64,3 +64,23 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed
         out.free[k] |= found.free[0]
     return out
+
+
+def _at_limits(arm: Arm, q: Array) -> Bool:
+    """Which joints of postures (..., n) are within limits or at one."""
+    beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
+    return np.asarray(beyond < OFF_LIMITS)
+
+
+def _may_be_legal(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bool:
+    """Which targets have a posture at a limit, or on a self-motion that may lead within limits: (len(rows),)."""
+    arm, task, target, _ = goals
+    k, b = np.nonzero(out.valid[rows])
+    inside = _at_limits(arm, out.q[rows[k], b])
+    # else a joint that is held is outside; or the curve is of small residuals, not as exact as the branches
+    some = np.flatnonzero((inside | out.free[rows[k]]).all(axis=1))
+    on: Bool = np.asarray(inside.all(axis=1))
+    some = some[~on[some]]
+    sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
+    on[some] = sigma < ON_MANIFOLD
+    return np.bincount(k[on], minlength=len(rows)) > 0

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Goals
@@ -43,11 +44,15 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+ANGLES = np.linspace(0.0, np.pi, 128, endpoint=False)  # [rad] of directions in a plane
+
+
 class Regular(NamedTuple):
     """What is known of K targets: known (K,) whether anything is, branch (K, B) candidates that are its branches.
 
     double: (K,) a branch stands for two roots, or arithmetic cannot tell it from another. free: (K, n) joints that
-    move along a self-motion. q: (K, B, n) the candidates, those of changed targets (K,) corrected.
+    move along a self-motion. q: (K, B, n) the candidates, those of changed targets (K,) corrected. firm: (K, B) no
+    branch beside it can be one with it.
     """
 
     known: Bool
@@ -56,6 +61,7 @@ class Regular(NamedTuple):
     free: Bool
     q: Array
     changed: Bool
+    firm: Bool
 
 
 class Folds(NamedTuple):
@@ -118,6 +124,33 @@ def folds(arm: Arm, task: Task, q: Array, target: Array, linear: Linear | None =
     )
 
 
+def _twice_folded(arm: Arm, task: Task, q: Array, target: Array, linear: Linear, rows: NDArray[np.intp]) -> Array:
+    """How far the components of postures q (M, n) reach that lose two directions: (M,), nan where that is not known.
+
+    To second order the residual along the two directions u that the Jacobian cannot reach is a quadratic form of the
+    way in the plane that it loses. If that is zero in no direction of the plane the root is isolated, and a multiple
+    one. linear: of more postures, of which these are rows (M,).
+    """
+    out = np.full(len(q), np.nan)
+    some = np.flatnonzero((linear.S[rows, -3] > CLEAR) & square(arm, task)) if arm.n > 2 else rows[:0]
+    if not len(some):
+        return out
+    r, U, V = linear.r[rows[some]], linear.U[rows[some]], linear.V[rows[some]]
+    first, second, unit = V[:, -1], V[:, -2], radian_or_reach(arm)
+    bends = []
+    for way in (first, second, (first + second) / 2**0.5):
+        both = np.concatenate([q[some] + FOLD_WAY * way * unit, q[some] - FOLD_WAY * way * unit])
+        ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target[some]] * 2)), 2)
+        bends.append(np.einsum("mik,mi->mk", U[:, :, -2:], (ahead + behind - 2.0 * r) / FOLD_WAY**2))
+    c, s = np.cos(ANGLES)[:, None, None], np.sin(ANGLES)[:, None, None]
+    mixed = bends[2] - 0.5 * (bends[0] + bends[1])
+    size = np.linalg.norm(c * c * bends[0] + s * s * bends[1] + 2.0 * c * s * mixed, axis=2)  # (angles, M)
+    least = size.min(axis=0)
+    sure = (least > 10 * BENT) & (least > 2 * (ANGLES[1] - ANGLES[0]) * size.max(axis=0))
+    out[some[sure]] = 2.0 * np.sqrt(2.0 * SOLUTION / least[sure])
+    return out
+
+
 class _Slopes(NamedTuple):
     """Residuals of candidates, r (K, B, k) and their size (K, B), and the Jacobian J (K, B, k, n)."""
 
@@ -142,17 +175,19 @@ class _Weak(NamedTuple):
 
 
 def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
-    """Candidates (K, B, n) of K targets, of which valid ones (K, B) were accepted."""
-    arm, task, target, near = goals
-    K, B, n = q.shape
-    both = np.concatenate([near[:, None], q], axis=1).reshape(-1, n)
-    r, J = newton.scaled(arm, task, both, np.repeat(target, B + 1, axis=0))
-    size = np.sqrt((r * r).sum(axis=1)).reshape(K, B + 1)
-    at = _Slopes(r.reshape(K, B + 1, -1)[:, 1:], size[:, 1:], J.reshape(K, B + 1, *J.shape[1:])[:, 1:])
+    """Candidates (K, B, n) of K targets, nan where there is none, of which valid ones (K, B) were accepted.
+
+    That `near` solves its target itself is for others to decide.
+    """
+    arm, task, target, _ = goals
+    K, B, _ = q.shape
+    there = ~np.isnan(q[..., 0])
+    r, J = newton.scaled(arm, task, q[there], np.repeat(target, there.sum(axis=1), axis=0))
+    at = _Slopes(np.zeros((K, B, *r.shape[1:])), np.full((K, B), np.inf), np.zeros((K, B, *J.shape[1:])))
+    at.r[there], at.size[there], at.J[there] = r, np.sqrt((r * r).sum(axis=1)), J
     q, valid, changed = _corrected(arm, task, q, valid, at, target)
-    # `near` is no branch itself, accepted candidates need no correction, and others are beyond it
-    known = (size[:, 0] > SOLUTION) & valid.any(axis=1)
-    known &= ~(valid & ~(at.size < CLOSED)).any(axis=1)
+    # accepted candidates need no correction, and others are beyond it
+    known = ~(valid & ~(at.size < CLOSED)).any(axis=1)
     sigma, weak = _weak(arm, task, q, valid, at, target)
     known &= ~weak.open
     with np.errstate(invalid="ignore"):
@@ -168,16 +203,21 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
         clusters[k, i] = newton.missing(arm, task, q[k, i] + mean * radian_or_reach(arm), target[k]) < at.size[k, i]
     one = np.triu((weak.same | weak.same.swapaxes(1, 2)) & valid[:, :, None] & valid[:, None], 1)
     same = 2 * SAME + np.minimum(MERGED_ROUNDING / np.maximum(sigma, TINY), MERGED_ROOTS)
-    known &= ~clusters.any(axis=1) & ~(close & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
-    one &= known[:, None, None]
     either = one | one.swapaxes(1, 2)
-    known &= (either.sum(axis=2) < 2).all(axis=1)
+    clusters &= (near_by & ~either & ~np.eye(B, dtype=bool)).any(axis=2)
+    known &= ~clusters.any(axis=1)
+    known &= ~(close & ~one & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
+    one &= known[:, None, None]
+    either &= known[:, None, None]
+    known &= ~((either @ either) & ~either & ~np.eye(B, dtype=bool)).any(
+        axis=(1, 2)
+    )  # what is one with two makes them one
     known &= ~(either & weak.moving[:, :, None]).any(axis=(1, 2))
     for row in np.flatnonzero(known & weak.moving.any(axis=1)):
         known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])
     branch = valid & ~one.any(axis=1)  # the first of two stays
     double, free = either.any(axis=(1, 2)) | (branch & weak.edge).any(axis=1), weak.joints.any(axis=1)
-    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed)
+    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed, sigma >= FOLDED)
 
 
 def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, Bool, Bool]:
@@ -245,7 +285,14 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     found.open[k[~own & ~beyond]] = True
     own &= ~found.open[k]
     several = own & (S[:, -2] < WEAK)
-    found.open[k[several]] = True
+    two = np.flatnonzero(several)
+    if len(two):
+        radius = _twice_folded(arm, task, q[k[two], b[two]], target[k[two]], Linear(at.r[k, b], U, S, V), two)
+        found.open[k[two[np.isnan(radius)]]] = True
+        found.edge[k[two], b[two]] = True
+        with np.errstate(invalid="ignore"):
+            away = newton.wrapped_distance(arm, q[k[two]], q[k[two], b[two]][:, None])
+            found.same[k[two], b[two]] = away < radius[:, None]
     rest = np.flatnonzero(own & ~several)
     if len(rest):
         k, b, S = k[rest], b[rest], S[rest]

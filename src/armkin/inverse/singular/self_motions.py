@@ -56,47 +56,49 @@ def drop_contained(
     that do not move along the one direction that it loses: a curve that moves such a joint is another. `near`, the
     first, stays.
     """
-    for k in np.flatnonzero(curve.any(axis=(1, 2))):
+    pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside
+    for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
         mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
         few = curve[k, mine].sum(axis=1) <= arm.n // 2
         for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            beside = mine[(away < CLOSE_BY) & few]
-            one = _grows_from(arm, task, q[k, i], q[k, beside], curve[k, beside], target[k])
-            if sigma[k, i] < WEAK:
-                one |= bool((away[few] < 10 * TURNED).any())
+            pairs += [(int(k), int(i), int(j)) for j in mine[(away < CLOSE_BY) & few]]
+            if sigma[k, i] < WEAK and i:
+                one = bool((away[few] < 10 * TURNED).any())
                 on = (j for j in mine[(away < TURNED) & ~few] if _leads_to(arm, task, q[k, j], q[k, i], target[k]))
-                one |= any(True for _ in on)
-            chosen[k, i] = i == 0 or not one
+                chosen[k, i] = not (one or any(True for _ in on))
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
             if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
                 chosen[k, i] = False
+    if pairs:
+        row, mid, other = np.array(pairs).T
+        grows = _grows_from(arm, task, q[row, mid], q[row, other], curve[row, other], target[row]) & (mid > 0)
+        chosen[row[grows], mid[grows]] = False
 
 
-def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, target: Array) -> bool:
-    """Whether q (n,) is one with a posture of a self-motion: with the one that has its values of the joints that move.
+def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, target: Array) -> Bool:
+    """Whether q (M, n) are one with self-motions: with the postures that have their values of the joints that move.
 
-    others: (J, n) postures of self-motions, curve: (J, n) the joints that these move. Two are one if the posture
+    others: (M, n) postures of self-motions, curve: (M, n) the joints that these move. Two are one if the posture
     between them solves the target, too. The other is sought beside q, and in the direction that q loses: where two
     directions are lost a curve of small residuals leaves the self-motion, off which the residual grows.
     """
     unit = radian_or_reach(arm)
     apart = np.where(curve, 0.0, newton.difference(arm, others, q))
-    (sigma,), V, _ = newton.null_space(arm, task, q[None], target[None])
-    held = np.where(curve, 0.0, V[0, -1])
+    sigma, V, _ = newton.null_space(arm, task, q, target)
+    held = np.where(curve, 0.0, V[:, -1])
     far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), TINY)
-    ahead = apart + np.where(curve, V[0, -1] * np.clip(far, -CLOSE_BY, CLOSE_BY)[:, None], 0.0)
-    start = q + np.concatenate([apart, ahead]) * unit
-    goal = np.repeat(target[None], len(start), axis=0)
-    there, size = newton.correct(arm, task, start, goal, steps=6, least=WEAK)
+    ahead = apart + np.where(curve, V[:, -1] * np.clip(far, -CLOSE_BY, CLOSE_BY)[:, None], 0.0)
+    q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
+    there, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=WEAK)
     way = newton.difference(arm, there, q)
     near = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) < CLOSE_BY))
-    start, goal = np.repeat(q[None], len(near), axis=0), goal[near]
-    miss = newton.missing(arm, task, start, goal)
-    return bool(roots.joined(arm, task, start, way[near], miss, np.full(len(near), sigma), goal).any())
+    miss, out = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
+    out[near] = roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
+    return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
 def _leads_to(arm: Arm, task: Task, q: Array, meeting: Array, target: Array) -> bool:

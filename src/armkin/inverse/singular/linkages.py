@@ -1,0 +1,241 @@
+"""Self-motions in closed form, decided all at once: two joints about one line, and linkages of four bars.
+
+Two joints about one line (a straight wrist, a wrist over the shoulder) move at the same pace, so the tool's pose is a
+trigonometric polynomial of second degree in the way: it keeps its target everywhere if it does at five places. Four
+bars move as `closed.four_bars` says. What else these targets have is decided by `regular_targets`; what is closer, or
+loses more than one direction, is left to `singular.components`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.closed import four_bars
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSE_BY, CLOSED, FOLDED, SAME, SOLUTION, THERE, TURNED
+from armkin.inverse.singular import regular_targets
+
+if TYPE_CHECKING:
+    from armkin.inverse.answers.batch import Goals
+    from armkin.model.arm import Arm
+
+PLACES = np.arange(1.0, 5.0)[:, None]  # [rad] along a line; zero is the fifth
+
+Int = NDArray[np.int64]
+
+
+class Linkages(NamedTuple):
+    """What is known of K targets.
+
+    known: (K,) whether all is; lacking: (K,) more candidates may tell. q: (K, M, n) postures, of which branch (K, M)
+    are listed, named label (M,). free: (K, n) joints that a self-motion moves.
+    """
+
+    known: Bool
+    lacking: Bool
+    q: Array
+    branch: Bool
+    label: Int
+    free: Bool
+
+
+class _Motions(NamedTuple):
+    """Self-motions that columns of candidates (K, B) lie on.
+
+    line: (K, B) two joints about one line; else four bars. d: (K, B, n) how the joints of a line move, of four bars 1
+    where they do. base: (K, B, n) a posture. joint: (K, B) whose sine tells two circuits of four bars apart, or -1.
+    """
+
+    line: Bool
+    d: Array
+    base: Array
+    joint: Int
+
+
+def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
+    """Candidates q (K, S, B, n) for S values of the joints that are free; loose: (K, B) those that these change.
+
+    The first value is that of `near`, the second 1 rad more. Others than the loose ones are only asked for at the
+    first.
+    """
+    arm, task, target, near = goals
+    K, S, B, n = q.shape
+    found = Linkages(
+        known=np.zeros(K, bool),
+        lacking=np.zeros(K, bool),
+        q=q.reshape(K, S * B, n).copy(),
+        branch=np.zeros((K, S * B), bool),
+        label=np.tile(np.arange(B), S),
+        free=np.zeros((K, n), bool),
+    )
+    if not (regular_targets.square(arm, task) and task.orientation == "full"):
+        return found
+    asked = ~np.isnan(q[..., 0])
+    asked[:, 1:] &= loose[:, None]
+    size = np.full(asked.shape, np.inf)
+    size[asked] = newton.missing(arm, task, q[asked], np.repeat(target, asked.sum(axis=(1, 2)), axis=0))
+    there, own = (size < CLOSED) & loose[:, None], newton.missing(arm, task, near, target)
+    known, motions = _motions(goals, q, there, loose)
+    found.lacking[...] = (loose & (there.sum(axis=1) < 2)).any(axis=1)
+    known &= ~found.lacking & ~((own > CLOSED) & (own <= SOLUTION))
+    stands: Bool = known & (own <= CLOSED)
+    one, apart = _columns(arm, motions, loose)
+    known &= apart
+    circuit = np.zeros((K, S, B), bool)
+    k, s, b = np.nonzero(there & known[:, None, None] & (motions.joint >= 0)[:, None])
+    if len(k):
+        circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
+    there[:, 1:] &= ~motions.line[:, None]  # of a line the posture at the first value is the nearest
+    key = np.where(there, 2 * one[:, None] + circuit, 2 * B).reshape(K, -1)
+    lacks = _one_circuit(key, motions.joint, B)
+    found.lacking[...] |= known & lacks
+    known &= ~lacks
+    with np.errstate(invalid="ignore"):
+        motion = np.abs(newton.difference(arm, found.q, near[:, None])).sum(axis=2)
+    listed = _nearest(key, motion) & (key < 2 * B)
+    known &= _replaced(goals, found.q, listed, key, motions, one, loose, stands)
+    known &= _one_direction(goals, found.q, listed & known[:, None], key)
+    found.free[...] = ((motions.d != 0.0) & loose[:, :, None]).any(axis=1)
+    found.branch[...] = listed
+    rows = np.flatnonzero(known)
+    if len(rows) and not loose[rows].all():
+        _beside(goals, q[:, 0], size[:, 0], loose, motions, rows, stands, known, found)
+    found.known[...] = known & (found.branch.any(axis=1))
+    return found
+
+
+def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _Motions]:
+    """What the loose candidates that solve their targets, there (K, S, B), move on; known: (K,) if it is all known."""
+    arm, task, target, _ = goals
+    base = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
+    with np.errstate(invalid="ignore"):
+        moving: Bool = np.asarray(
+            ((np.abs(newton.difference(arm, q, base[:, None])) > SAME) & there[..., None]).any(axis=1)
+        )
+        way = newton.difference(arm, q[:, 1], q[:, 0])
+        even = ((np.abs(np.abs(way) - 1.0) < SAME) & ~arm.prismatic | ~moving).all(axis=2)
+    first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
+    line: Bool = np.asarray(loose & there[:, 0] & there[:, 1] & even & (count == 2) & (last - first == 2))
+    d = np.where(line[:, :, None], np.where(moving, np.sign(way), 0.0), moving)
+    k, b = np.nonzero(line)
+    if len(k):
+        places = (q[k, 0, b][:, None] + PLACES * d[k, b][:, None]).reshape(-1, arm.n)
+        miss = newton.missing(arm, task, places, np.repeat(target[k], len(PLACES), axis=0)).reshape(-1, len(PLACES))
+        line[k, b] = (miss < CLOSED).all(axis=1)
+    joint = np.full(line.shape, -1)
+    k, b = np.nonzero(loose & (count == 4))
+    bars = np.zeros_like(line)
+    bars[k, b], joint[k, b] = four_bars.dead_points(arm, base[k, b], moving[k, b])
+    return np.asarray((line | bars | ~loose).all(axis=1)), _Motions(line, d, base, joint)
+
+
+def _held(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
+    """How far postures (..., n) differ besides a way along self-motions d (..., n), lines or four bars: (...)."""
+    with np.errstate(invalid="ignore"):
+        way = newton.difference(arm, a, b)
+        held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
+        if line.any():
+            # what the two that turn differ by, besides a way along the line; before and behind the first of them
+            first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
+            left = np.abs(wrapped(np.where(first, d * way, -d * way).sum(axis=-1)))
+            held = np.where(line, np.maximum(held, left), held)
+        return np.asarray(held)
+
+
+def _columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
+    """The first column (K, B) on the same self-motion as each; and whether all others are clearly apart (K,)."""
+    B = loose.shape[1]
+    held = _held(arm, at.base[:, None], at.base[:, :, None], at.d[:, :, None], at.line[:, :, None])  # (K, B, B)
+    alike = ((at.d[:, :, None] != 0.0) == (at.d[:, None] != 0.0)).all(axis=3)
+    sense = at.d.prod(axis=2, where=at.d != 0.0)
+    alike &= sense[:, :, None] == sense[:, None]
+    pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)
+    same = pair & alike & (held < TURNED)
+    apart = ~(pair & ~same & ~(held > APART_ROOTS)).any(axis=(1, 2))
+    return np.where(same, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(apart)
+
+
+def _one_circuit(key: Int, joint: Int, B: int) -> Bool:
+    """Of which targets (K,) a self-motion of two circuits has candidates on one of them alone."""
+    seen = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
+    return np.asarray(((joint >= 0) & (seen.sum(axis=2) == 1)).any(axis=1))
+
+
+def _nearest(key: Int, motion: Array) -> Bool:
+    """Of candidates (K, M) the one of each key with the least motion."""
+    order = np.argsort(motion, axis=1, kind="stable")
+    order = np.take_along_axis(order, np.argsort(np.take_along_axis(key, order, 1), axis=1, kind="stable"), 1)
+    first, out = np.ones(key.shape, bool), np.zeros(key.shape, bool)
+    first[:, 1:] = np.diff(np.take_along_axis(key, order, axis=1), axis=1) != 0
+    np.put_along_axis(out, order, first, axis=1)
+    return out
+
+
+def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
+    """Of which targets (K,) every listed self-motion has a posture that loses one direction alone."""
+    k, m = np.nonzero(listed)
+    for _ in range(2):  # the posture that is listed; else, for it may be where bars are in one line, all others
+        if not len(k):
+            break
+        row, other = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
+        _, J = newton.scaled(goals.arm, goals.task, q[k[row], other], goals.target[k[row]])
+        fine = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > FOLDED], minlength=len(k)) > 0
+        k, m, listed = k[~fine], m[~fine], np.ones_like(listed)
+    out = np.ones(len(q), bool)
+    out[k] = False
+    return out
+
+
+def _replaced(
+    goals: Goals, q: Array, listed: Bool, key: Int, at: _Motions, one: Int, loose: Bool, stands: Bool
+) -> Bool:
+    """Put `near` in place of what is listed of the self-motion that it is on; (K,) False where it may be on another.
+
+    stands: (K,) targets that `near` solves.
+    """
+    arm, _, _, near = goals
+    k = np.flatnonzero(stands)
+    known = np.ones(len(q), bool)
+    if not len(k):
+        return known
+    held = _held(arm, near[k, None], at.base[k], at.d[k], at.line[k])
+    held = np.where(loose[k], held, np.inf)
+    b, least = held.argmin(axis=1), held.min(axis=1)
+    known[k[(least >= TURNED) & (least < APART_ROOTS)]] = False
+    k, b = k[least < TURNED], b[least < TURNED]
+    mine = 2 * one[k, b]
+    if len(two := np.flatnonzero(at.joint[k, b] >= 0)):
+        mine[two] += four_bars.sides(arm, near[k[two]], at.d[k[two], b[two]] != 0.0, at.joint[k[two], b[two]])
+    row, m = np.nonzero(listed[k] & (key[k] == mine[:, None]))
+    q[k[row], m] = near[k[row]]
+    stands[k[row]] = False
+    return known
+
+
+def _beside(
+    goals: Goals, q: Array, size: Array, loose: Bool, at: _Motions, rows: Int, stands: Bool, known: Bool, out: Linkages
+) -> None:
+    """Decide what else targets rows have, q (K, B, n): change known and out.
+
+    stands: (K,) `near` solves its target, but not on a self-motion.
+    """
+    arm, _, _, near = goals
+    B = q.shape[1]
+    rest = np.where(loose[rows][..., None], np.nan, q[rows])
+    found = regular_targets.settle(goals.of(rows), rest, (size[rows] < CLOSED) & ~loose[rows])
+    held = _held(arm, found.q[:, :, None], at.base[rows][:, None], at.d[rows][:, None], at.line[rows][:, None])
+    pair = found.branch[:, :, None] & loose[rows][:, None]
+    least = np.where(found.firm, APART_ROOTS, CLOSE_BY)[:, :, None]
+    good = found.known & ~(pair & ~(held > least)).any(axis=(1, 2))
+    with np.errstate(invalid="ignore"):
+        own = (newton.wrapped_distance(arm, found.q, near[rows][:, None]) < THERE) & found.branch
+    good &= ~stands[rows] | own.any(axis=1)
+    there = np.where((own & stands[rows][:, None])[..., None], near[rows][:, None], found.q)
+    known[rows] = good
+    out.q[rows, :B] = np.where(loose[rows][..., None], out.q[rows, :B], there)
+    out.branch[rows, :B] |= found.branch
+    out.free[rows] |= found.free
