@@ -59,7 +59,7 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/elimination inverse/branches keep_out motors export/c",
     "compiled": "keep_out keep_out/shapes"
     " errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
-    " inverse/answers inverse/singular inverse/solvers inverse/run export/c",
+    " inverse/answers inverse/singular inverse/solvers inverse/run export/c columns",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
     "board/ports": "errors",
     "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion board/ports"

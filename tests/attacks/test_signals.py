@@ -46,7 +46,7 @@ def test_signals_while_rows_are_read_are_not_lost() -> None:
     """pyarrow's reader lost one in twenty: a command that was told to end went on to its end, with exit code 0."""
     columns = Columns(("q1", "q2", "q3"), "pose")
     columns.begun = True
-    lines = [b"1,2,3"] * 16_000
+    text = b"1,2,3\n" * 16_000
     seen: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))
     try:
@@ -54,7 +54,7 @@ def test_signals_while_rows_are_read_are_not_lost() -> None:
             sender = threading.Timer(delay, os.kill, (os.getpid(), signal.SIGTERM))
             sender.start()
             while sender.is_alive():
-                assert columns.all_plain(lines) is not None
+                assert columns.all_plain(text) is not None
     finally:
         signal.signal(signal.SIGTERM, before)
     assert len(seen) == 100

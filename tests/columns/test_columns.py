@@ -17,6 +17,7 @@ from armkin.cli.csv_rows import Columns
 from armkin.columns import parts, text
 from armkin.columns.cells import csv_line
 from armkin.columns.table import Table, Words
+from armkin.compiled import text as compiled_text
 from armkin.errors import UnfinishedError
 from command_line import THREE_DOF, Result, run
 
@@ -54,13 +55,27 @@ def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: 
     assert json_rows[len(ODD) - 1]["value"] is None
 
 
+def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(11)
+    doubles = rng.integers(0, 2**64, 40_000, dtype=np.uint64).view(np.float64)
+    near = [10.0 ** rng.uniform(-6, 18, 20_000), 2.0 ** np.arange(-1074, 1024), rng.uniform(-400, 400, 20_000).round(3)]
+    for values in (doubles, *near):
+        one: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
+        assert text.csv(one, compiled_text.lines) == by_python(one, monkeypatch)[0]
+    fast = text.csv(table, compiled_text.lines), text.json_lines(table, compiled_text.lines)
+    assert fast == by_python(table, monkeypatch)
+    assert text.csv({name: column[:0] for name, column in one.items()}, compiled_text.lines) == b""
+    whole = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
+    assert text.csv({"a": whole}, compiled_text.lines).decode().split() == list(map(str, whole.tolist()))
+
+
 @given(st.lists(st.floats(-1e9, 1e9), min_size=4, max_size=4), st.sampled_from(["%r", " %r", "%.3f", "%.17e"]))
 def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> None:
     words = [form % value for value in row]
-    lines = [",".join(words).encode()] * 3000
+    text = (",".join(words).encode() + b"\n") * 3000
     columns = Columns("abcd", "a test")
     columns.begun = True
-    found = columns.all_plain(lines)
+    found = columns.all_plain(text)
     assert found is not None
     assert found.tolist() == [[float(word) for word in words]] * 3000
 

@@ -7,7 +7,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 
+import kills
 import numpy as np
 import pytest
 
@@ -106,6 +108,29 @@ def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
     for other in (spread, pool):
         assert {**other, "seconds": 0} == {**alone, "seconds": 0}
     assert one.read_bytes() == two.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def kills_cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[kills.Cluster]:
+    cluster = kills.Cluster(tmp_path_factory.mktemp("kills"), 2)
+    yield cluster
+    cluster.close()
+
+
+@pytest.mark.parametrize("who", ["worker", "client", "scheduler"])
+def test_a_kill_costs_at_most_the_chunks_in_hand(who: str, kills_cluster: kills.Cluster, tmp_path: Path) -> None:
+    """One of each here; twenty of each: tests/bench/bench_kills.py."""
+    given, one = tmp_path / "in.csv", tmp_path / "one.csv"
+    kills.rows(given, 60_000)
+    assert kills.batch(given, one).wait(kills.PATIENCE) in (0, 3)
+    told = kills.disturbed(
+        given, tmp_path / "two.csv", kills.digest(one), who, kills_cluster, Random(len(who)), count=3
+    )
+    assert told.same, told
+    assert told.redone == 0
+    assert told.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[who], told
+    if told.code == 1:
+        assert "the scheduler is gone" in told.err
 
 
 def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__
@@ -73,6 +74,7 @@ class Job(NamedTuple):
     questions: Questions
     as_json: bool
     format: str  # the ending of what is written
+    compiled: bool = False  # machine code prints the rows
 
 
 class Done(NamedTuple):
@@ -94,7 +96,12 @@ class Done(NamedTuple):
 def work(job: Job, piece: Piece) -> Done:
     """Answer one piece of the input: a pure function, wherever it runs."""
     tally, data, heading, problem = Tally(), [], [], None
-    encoded = format_of(f"x{job.format}").encoded
+    format = format_of(f"x{job.format}")
+    encoded = format.encoded
+    if job.compiled and format.is_text:
+        from armkin.compiled.text import lines
+
+        encoded = partial(encoded, lines=lines)
     rows = parsed(piece)
     while True:
         try:
@@ -150,6 +157,11 @@ class Batch:
     asked: Mapping[str, Any]  # what the bytes depend on besides robot and input, for --resume
 
     @property
+    def compiled(self) -> bool:
+        """Whether machine code may be used."""
+        return bool(self.asked.get("compiled"))
+
+    @property
     def engine(self) -> Engine:
         """Where the work is done."""
         return Engine(self.workers, self.cluster)
@@ -162,7 +174,7 @@ class Batch:
             raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away")
         if self.resume and not to_file:
             raise UsageError("--resume goes on with --out FILE; give the file")
-        job = Job(self.questions, self.as_json, "" if format.name == "csv" else f".{format.name}")
+        job = Job(self.questions, self.as_json, "" if format.name == "csv" else f".{format.name}", self.compiled)
         tally = Tally()
         if to_file and _is_file(str(self.out)):
             _ToFile(self, format, job, tally, pieces.size).run(pieces)

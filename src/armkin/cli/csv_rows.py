@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import itertools
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import IO, TYPE_CHECKING
 
 from armkin import files
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 WORTH = 2_000  # rows for which pyarrow is worth its import
 LONGEST = 100_000  # characters of a line: what is longer is no CSV file
-AT_ONCE = 8  # lines read before their lengths are looked at
+SIZE = 1 << 18  # characters read at once
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
@@ -79,19 +77,19 @@ class Columns:
                     raise UsageError(f"separate the numbers with commas, not with {separator!r}")
         return numbers(cells, self.names, self.what)
 
-    def all_plain(self, lines: list[bytes]) -> Array | None:
+    def all_plain(self, text: bytes) -> Array | None:
         """All numbers (N, m) of lines whose wanted cells are ordinary numbers: the fast way; None: look closer."""
         import numpy as np
 
-        if not self.begun or len(lines[-1]) >= LONGEST:
-            return None
-        text = b"\n".join(line.rstrip(b"\r\n") for line in lines) if lines[0][-1:] == b"\n" else b"\n".join(lines)
+        if b"\r" in text:
+            text = text.replace(b"\r\n", b"\n")
+        text = text.removesuffix(b"\n")
         width = len(self.heading) if self.places is not None else len(self.names)
         if not text.translate(None, _PLAIN):
-            values = _regular(text, len(lines), width)
+            values = _regular(text, width)
             if values is not None and self.places is not None:
                 values = values[:, self.places]
-        elif self.places is not None and b'"' not in text:
+        elif self.places is not None and b'"' not in text and len(max(lines := text.split(b"\n"), key=len)) < LONGEST:
             values = _among_others([line.split(b",") for line in lines], width, self.places)
         else:
             return None
@@ -136,11 +134,11 @@ def _all_rows(
     columns = Columns(names, what, named)
     first, empty = 1, True
     with opened(source) as file:
-        while lines := lines_of(file, source):
-            for chunk in chunk_of(lines, first, columns, source):
+        for block in blocks(file, source):
+            for chunk in chunk_of(block, first, columns, source):
                 empty = False
                 yield chunk
-            first += len(lines)
+            first += count(block)
     if columns.skipped:
         output.warn(f"{columns.skipped} row{'s' * (columns.skipped > 1)} without {','.join(names)} skipped")
     if empty:
@@ -179,18 +177,24 @@ def opened(source: str) -> Iterator[IO[bytes]]:
         yield file
 
 
-def _regular(text: bytes, count: int, width: int) -> Array | None:
-    """The numbers (count, width) of lines without anything else in them; None if they are not all that wide."""
+def _regular(text: bytes, width: int) -> Array | None:
+    """The numbers (N, width) of lines without anything else in them; None if they are not all that wide."""
     import numpy as np
 
     marks = np.frombuffer(text, np.uint8)
     ends = marks[(marks == ord(",")) | (marks == ord("\n"))] == ord("\n")
-    if len(ends) + 1 != count * width or ends.sum() + 1 != count or not ends[width - 1 :: width].all():
+    rows = int(ends.sum()) + 1
+    if len(ends) + 1 != rows * width or not ends[width - 1 :: width].all():
         return None
-    if count >= WORTH and (values := _by_arrow(text, width)) is not None:
+    if (
+        len(text) >= LONGEST
+        and np.diff(np.flatnonzero(marks == ord("\n")), prepend=-1, append=len(text)).max() > LONGEST
+    ):
+        return None
+    if rows >= WORTH and (values := _by_arrow(text, width)) is not None:
         return values
     try:
-        return np.array([float(cell) for cell in text.replace(b"\n", b",").split(b",")]).reshape(count, width)
+        return np.array([float(cell) for cell in text.replace(b"\n", b",").split(b",")]).reshape(rows, width)
     except ValueError:
         return None
 
@@ -234,17 +238,43 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
     return np.column_stack([column.to_numpy() for column in found.columns])
 
 
-def lines_of(file: IO[bytes], source: str) -> list[bytes]:
-    lines: list[bytes] = []
-    endless = iter(partial(file.readline, LONGEST), b"")
+def blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
+    """The text in blocks of ROWS lines, each as soon as it can be read; a line of LONGEST characters ends it."""
+    held: list[bytes] = []
+    lines = open_ = 0  # lines that end in what is held, and characters behind them
+    while some := _read(file, source):
+        ends = some.count(b"\n")
+        while lines + ends >= ROWS:
+            cut = _behind(some, ROWS - lines)
+            yield b"".join([*held, some[:cut]])
+            some, ends, held, lines, open_ = some[cut:], ends - (ROWS - lines), [], 0, 0
+        held.append(some)
+        lines, open_ = lines + ends, len(some) - some.rfind(b"\n") - 1 if ends else open_ + len(some)
+        if open_ >= LONGEST:  # no use in reading on
+            break
+    if last := b"".join(held):
+        yield last
+
+
+def _read(file: IO[bytes], source: str) -> bytes:
+    """What can be read now; nothing at the end."""
     try:
-        while some := list(itertools.islice(endless, min(ROWS - len(lines), AT_ONCE))):
-            lines += some
-            if max(map(len, some)) >= LONGEST:  # no use in reading on
-                break
+        return bytes(file.read1(SIZE))  # type: ignore[attr-defined]
     except (OSError, ValueError) as error:  # ValueError: closed
         raise _unread(source, error) from None
-    return lines
+
+
+def _behind(text: bytes, lines: int) -> int:
+    """Where so many lines have ended."""
+    at = 0
+    for _ in range(lines):
+        at = text.index(b"\n", at) + 1
+    return at
+
+
+def count(block: bytes) -> int:
+    """How many lines a block has."""
+    return block.count(b"\n") + (not block.endswith(b"\n"))
 
 
 def _line(file: IO[bytes], source: str) -> bytes:
@@ -262,29 +292,30 @@ def name_of(source: str) -> str:
     return "standard input" if source == "-" else source
 
 
-def chunk_of(lines: list[bytes], first: int, columns: Columns, source: str) -> Iterator[Chunk]:
+def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator[Chunk]:
     import numpy as np
 
     index: list[int] = []
     good: list[list[float]] = []
     problem: UsageError | None = None
-    tried = False
-    for number, line in enumerate(lines, first):
+    at, number, tried = 0, first, False
+    while at < len(text):
         if columns.begun and not tried:  # what the columns are is known: the rest in one go, if it is plain
-            tried, rest = True, lines[number - first :]
-            values = columns.all_plain(rest)
+            tried, values = True, columns.all_plain(text[at:])
             if values is not None:
-                index += range(number, first + len(lines))
-                yield Chunk(index, np.concatenate([np.array(good), values]) if good else values)
+                rest = range(number, number + len(values))
+                yield Chunk([*index, *rest], np.concatenate([good, values])) if good else Chunk(rest, values)
                 return
+        end = text.find(b"\n", at) + 1 or len(text)
         try:
-            row = columns.row(line, number)
+            row = columns.row(text[at:end], number)
         except UsageError as error:
             problem = error.within(f"{name_of(source)}: row {number}", row=number)
             break
         if row is not None:
             index.append(number)
             good.append(row)
+        at, number = end, number + 1
     if good:
         yield Chunk(index, np.array(good))
     if problem is not None:

@@ -100,18 +100,18 @@ class Rows:
         learner = Columns(self.names, self.what, self.named)  # learns the heading, for the pieces after it
         number, first = 0, 1
         with csv_rows.opened(source) as file:
-            while lines := csv_rows.lines_of(file, source):
+            for block in csv_rows.blocks(file, source):
                 columns = copy.copy(learner)
                 columns.skipped = 0
-                yield Piece(number, first, csv_rows.name_of(source), self.names, b"".join(lines), columns)
-                for i, line in enumerate(lines, first):
+                yield Piece(number, first, csv_rows.name_of(source), self.names, block, columns)
+                for i, line in enumerate([] if learner.begun else block.split(b"\n"), first):
                     if learner.begun:
                         break
                     try:
                         learner.row(line, i)
                     except UsageError:
                         break
-                number, first = number + 1, first + len(lines)
+                number, first = number + 1, first + csv_rows.count(block)
 
 
 def parsed(piece: Piece) -> Iterator[Chunk]:
@@ -120,10 +120,7 @@ def parsed(piece: Piece) -> Iterator[Chunk]:
         yield from _checked(piece, piece.values)
         return
     assert piece.columns is not None
-    lines = piece.lines.split(b"\n")
-    if not lines[-1]:
-        lines.pop()
-    yield from csv_rows.chunk_of(lines, piece.first, piece.columns, piece.source)
+    yield from csv_rows.chunk_of(piece.lines, piece.first, piece.columns, piece.source)
 
 
 def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import IO
 
 from armkin.columns import npz, parquet, text
-from armkin.columns.table import Table
 
 Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the other, as often as it is called
 
 
 @dataclass(frozen=True)
 class Format:
-    """encoded: a chunk's bytes; together: writes the file of all chunks."""
+    """encoded: a chunk's bytes; of text, `lines` may say what prints them. together: writes the file of all chunks."""
 
     name: str
-    encoded: Callable[[Table], bytes]
+    encoded: Callable[..., bytes]
     together: Callable[[IO[bytes], Source], None]
     is_text: bool = False
 

@@ -3,6 +3,7 @@
 arm.py         `compile`, and what it returns
 one_target.py  one target at a time, in microseconds
 results.py     results of a batch, as `Solutions` has them
+text.py        columns as lines of text
 source.py      the C file: the formulas of `armkin.export.c`, and the loop over a batch in parts/
 toolchain.py   the system's compiler, and the folder of what it has built
 """

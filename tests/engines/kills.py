@@ -1,0 +1,173 @@
+"""A batch on a Dask cluster of processes of its own, of which any is killed with SIGKILL at any moment."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+from typing import Any, NamedTuple
+
+import numpy as np
+
+PATIENCE = 240.0  # [s] for anything: a crowded machine is slow
+
+
+class Cluster:
+    """A scheduler, and a nanny with so many workers."""
+
+    def __init__(self, folder: Path, workers: int) -> None:
+        self.folder, self.count = folder, workers
+        self.start()
+
+    def start_again(self) -> None:
+        """A new scheduler with new workers."""
+        self.close()
+        self.start()
+
+    def start(self) -> None:
+        """Start all processes."""
+        folder, workers = self.folder, self.count
+        self.file = folder / f"scheduler-{time.monotonic_ns()}.json"
+        common = ["--scheduler-file", str(self.file), "--no-dashboard"]
+        self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", "0", *common)
+        self.nanny = _dask("worker", *common, "--nworkers", str(workers), "--nthreads", "1")
+        until(lambda: self.file.exists() and self.file.stat().st_size > 0)
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler."""
+        import json
+
+        return str(json.loads(self.file.read_text())["address"])
+
+    def workers(self) -> list[int]:
+        """The processes that answer chunks."""
+        return [pid for pid in children(self.nanny.pid) if b"spawn_main" in command_line(pid)]
+
+    def close(self) -> None:
+        """End all of it."""
+        for process in (self.nanny, self.scheduler):
+            pids = [process.pid, *children(process.pid)]
+            for pid in pids:
+                kill(pid)
+            process.wait(PATIENCE)
+
+
+class Told(NamedTuple):
+    """How a command that was disturbed ended, and whether its bytes were those of an undisturbed one."""
+
+    code: int
+    err: str
+    killed: bool  # the kill came before its end
+    kept: int  # parts that were finished at the kill
+    redone: int  # of these, answered again
+    same: bool
+
+
+def rows(path: Path, count: int) -> None:
+    """Targets of a UR5e as CSV."""
+    rng = np.random.default_rng(3)
+    values = np.column_stack([rng.uniform(-500, 500, (count, 3)), rng.uniform(-180, 180, (count, 3))]).round(3)
+    with path.open("w") as file:
+        file.write("x,y,z,roll,pitch,yaw\n")
+        np.savetxt(file, values, fmt="%.3f", delimiter=",")
+
+
+def batch(given: Path, out: Path, *more: str) -> subprocess.Popen[str]:
+    """The command."""
+    words = [sys.executable, "-m", "armkin", "ik", "ur5e", "--batch", str(given), "--out", str(out), *more]
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def digest(path: Path) -> str:
+    """Of a file's bytes."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def disturbed(given: Path, out: Path, expected: str, who: str, cluster: Cluster, rng: Random, count: int) -> Told:
+    """A batch of `count` parts during which a worker, the scheduler or the client is killed; then it goes on.
+
+    A killed scheduler has another in its place.
+    """
+    process = batch(given, out, "--cluster", cluster.address)
+    parts = Path(f"{out}.parts")
+    wanted = rng.randrange(count)
+    until(lambda: len(finished(parts)) >= wanted or process.poll() is not None)
+    time.sleep(rng.uniform(0.0, 0.3))
+    killed = process.poll() is None
+    if who == "worker":
+        until(lambda: bool(cluster.workers()) or process.poll() is not None)
+        for pid in cluster.workers()[:1]:
+            kill(pid)
+    else:
+        kill(process.pid if who == "client" else cluster.scheduler.pid)
+    _, err = process.communicate(timeout=PATIENCE)
+    before = finished(parts)
+    if who == "scheduler":
+        cluster.start_again()
+    if process.returncode in (0, 3):
+        return Told(process.returncode, err, killed, len(before), 0, digest(out) == expected)
+    again = batch(given, out, "--cluster", cluster.address, "--resume")
+    redone: set[str] = set()
+    while again.poll() is None:  # a part that is written anew is another file
+        now = finished(parts)
+        redone |= {name for name, file in before.items() if name in now and now[name] != file}
+        time.sleep(0.02)
+    again.communicate(timeout=PATIENCE)
+    good = again.returncode in (0, 3) and digest(out) == expected and not parts.exists()
+    return Told(process.returncode, err, killed, len(before), len(redone), good)
+
+
+def finished(parts: Path) -> dict[str, int]:
+    """The parts that are there, and which file each is."""
+    found = {}
+    for path in parts.glob("[0-9]*[0-9]"):
+        try:
+            found[path.name] = path.stat().st_ino
+        except OSError:
+            continue  # gone meanwhile
+    return found
+
+
+def until(ready: Any) -> None:
+    """Wait for something."""
+    end = time.monotonic() + PATIENCE
+    while not ready():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def kill(pid: int) -> None:
+    """SIGKILL, to a process that may have ended."""
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+def children(pid: int) -> list[int]:
+    """All processes below one."""
+    try:
+        own = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+    return [one for child in own for one in (child, *children(child))]
+
+
+def command_line(pid: int) -> bytes:
+    """Of a process; empty for one that has ended."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def _dask(*words: str) -> subprocess.Popen[bytes]:
+    whole: Sequence[str] = [sys.executable, "-m", "dask", *words]
+    return subprocess.Popen(whole, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
