@@ -5,12 +5,13 @@ What `armkin.inverse.choose` answers target by target, on arrays; only branches 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.columns.table import Table, Words
+from armkin.columns.table import Table, Words, joined
 from armkin.forward import fk
 from armkin.inverse import choose
 from armkin.inverse.answers.solutions import Solutions, Status
@@ -23,6 +24,7 @@ from armkin.model.lock import unlock
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
 
+BLOCK = 2_048  # targets of which all arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
 
@@ -46,25 +48,63 @@ def columns(request: choose.Request, targets: Array, rows: NDArray[np.integer], 
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
         q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, s.q)
         within = within & ~limits.outside(arm, q).any(axis=-1)
-    motion = _sum(units.joints_out(arm, np.abs(q - near)))
-    key = np.where(s.valid, motion.round(EQUAL), np.inf)
     free = within & s.clear if arm.keep_out else within
-    wanted = free if request.branch is None else free & np.isin(s.branch, find(s.names, request.branch))
+    names = () if request.branch is None else find(s.names, request.branch)
+    parts = [
+        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, every)
+        for i in range(0, max(len(q), 1), BLOCK)
+    ]
+    return Listed(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
+
+
+class _Found(NamedTuple):
+    """Some targets of a batch: q (N, B, n) of the whole arm, within limits, and free besides (N, B); near (n,).
+
+    names: the branches that may be taken, none for all.
+    """
+
+    s: Solutions
+    some: slice
+    q: Array
+    within: Bool
+    free: Bool
+    near: Array
+    names: Sequence[int]
+
+
+def _listed(request: choose.Request, found: _Found, rows: NDArray[np.integer], every: bool) -> Listed:
+    s, some, arm = found.s, found.some, request.arm
+    q, within, free, valid = found.q[some], found.within[some], found.free[some], s.valid[some]
+    away = q - found.near
+    np.abs(away, out=away)
+    away /= units.scale(arm)
+    motion = _sum(away)
+    key = np.where(valid, motion.round(EQUAL), np.inf)
+    wanted = free if request.branch is None else free & np.isin(s.branch[some], found.names)
     unsolved = np.asarray(~wanted.any(axis=1))
     if every:
-        count = s.valid.sum(axis=1)
+        count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
         there = np.repeat(count > 0, lines)
         place = np.arange(len(target)) - np.repeat(np.cumsum(lines) - lines, lines)
-        rank = np.lexsort((key, within & ~free, ~within, ~s.valid), axis=-1)  # equal ones as found
-        branch = rank[target[there], place[there]]
+        branch = _ranked(key, valid, within, free)[target[there], place[there]]
     else:
         target, there = np.arange(len(unsolved)), ~unsolved
         branch = np.where(wanted, key, np.inf)[there].argmin(axis=1) if there.any() else np.zeros(0, int)
     chosen = target[there], branch
-    table = _table(request, s, rows[target], target, there, q[chosen], within[chosen], motion[chosen], chosen)
-    return Listed(table, unsolved)
+    values = _Lines(target, there, q[chosen], within[chosen], motion[chosen], *chosen)
+    return Listed(_table(request, s, rows[some], some, values), unsolved)
+
+
+def _ranked(key: Array, valid: Bool, within: Bool, free: Bool) -> NDArray[np.intp]:
+    """Branches (N, B) in the order in which they are listed: free, with hits, outside limits; equal ones as found."""
+    rank = np.argsort(key, axis=1, kind="stable")
+    other = np.flatnonzero((free != valid).any(axis=1))
+    if len(other):
+        k, v, w, f = key[other], valid[other], within[other], free[other]
+        rank[other] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
+    return rank
 
 
 def _sum(values: Array) -> Array:
@@ -77,40 +117,52 @@ def _sum(values: Array) -> Array:
     return total
 
 
-def _table(
-    request: choose.Request,
-    s: Solutions,
-    rows: NDArray[np.integer],
-    target: NDArray[np.intp],
-    there: Bool,
-    q: Array,
-    within: Bool,
-    motion: Array,
-    chosen: tuple[NDArray[np.intp], NDArray[np.intp]],
-) -> Table:
-    """One line for each of `target`, with numbers where a branch is `there`."""
-    mm, rad = _missed(s, *chosen)
+class _Lines(NamedTuple):
+    """Lines (L,), of the targets `of`, with K of them a branch: which are `there`, and what the branches are."""
+
+    of: NDArray[np.intp]  # (L,)
+    there: Bool  # (L,)
+    q: Array  # (K, n)
+    within: Bool  # (K,)
+    motion: Array  # (K,)
+    target: NDArray[np.intp]  # (K,)
+    branch: NDArray[np.intp]  # (K,)
+
+
+def _table(request: choose.Request, s: Solutions, rows: NDArray[np.integer], some: slice, lines: _Lines) -> Table:
+    """One line for each target, or branch of it, with numbers where there is a branch."""
+    there, every = lines.there, bool(lines.there.all())
+    mm, rad = _missed(request, s, some, lines)
     names = tuple(name.replace(",", "") for name in s.names)  # so that `cut` sees one column
-    label = np.full(len(target), -1)
-    label[there] = s.branch[chosen]
-    table: Table = {"row": rows, "status": Words(s.status[target], _STATUS), "branch": Words(label, names)}
-    joints = units.joints_out(request.arm, q)
-    for i, name in enumerate(request.arm.joint_names):
-        table[name] = _spread(joints[:, i], there)
-    legal = np.zeros(len(target), bool)
-    legal[there] = within
-    table["within_limits"] = legal
-    table["residual_mm"], table["residual_deg"] = _spread(mm, there), _spread(units.angles_out(rad), there)
-    table["motion"] = _spread(motion, there)
-    return table
+    label = np.full(len(there), -1)
+    label[there] = s.branch[some][lines.target, lines.branch]
+    table: Table = {
+        "row": rows[lines.of],
+        "status": Words(s.status[some][lines.of], _STATUS),
+        "branch": Words(label, names),
+    }
+    joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
+    legal = np.zeros(len(there), bool)
+    legal[there] = lines.within
+    table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": legal}
+    table |= {"residual_mm": mm, "residual_deg": units.angles_out(rad), "motion": lines.motion}
+    if every:
+        return table
+    numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
+    return table | {name: _spread(np.asarray(table[name]), there) for name in numbers}
 
 
-def _missed(s: Solutions, target: NDArray[np.intp], branch: NDArray[np.intp]) -> tuple[Array, Array]:
+def _missed(request: choose.Request, s: Solutions, some: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
-    q = s.q[target, branch]
-    missing = residual(s.task, fk(s.arm, q), q, s.target[target])
+    q = s.q[some][lines.target, lines.branch] if request.held else lines.q
+    missing = residual(s.task, fk(s.arm, q), q, s.target[some][lines.target])
     p = s.task.position
-    return np.linalg.norm(missing[:, :p], axis=1), np.linalg.norm(missing[:, p:], axis=1)
+    return _norm(missing[:, :p]), _norm(missing[:, p:])
+
+
+def _norm(values: Array) -> Array:
+    """Lengths of rows."""
+    return np.asarray(np.sqrt(_sum(values * values))) if values.shape[1] else np.zeros(len(values))
 
 
 def _spread(values: Array, there: Bool) -> Array:

@@ -42,6 +42,19 @@ def part(table: Table, some: slice) -> Table:
     }
 
 
+def joined(tables: Sequence[Table]) -> Table:
+    """Tables of the same columns, one behind the other."""
+    if len(tables) == 1:
+        return tables[0]
+    return {name: _joined([table[name] for table in tables]) for name in tables[0]}
+
+
+def _joined(columns: Sequence[Any]) -> Column:
+    if isinstance(columns[0], Words):
+        return Words(np.concatenate([column.index for column in columns]), columns[0].names)
+    return np.concatenate(columns)
+
+
 def of_records(heading: Sequence[str], records: Sequence[Sequence[Any]]) -> Table:
     """A table of rows of numbers, words and None."""
     columns = zip(*records, strict=True) if records else [()] * len(heading)
