@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
-from armkin.formula.trace import LazyCode, StraightLineCode
+from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
 from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
@@ -61,7 +61,7 @@ class Recorded:
         return [*values, miss, found.doubt.edge, found.doubt.free]
 
     @cached_property
-    def _preferring(self) -> LazyCode:
+    def _preferring(self) -> StraightLineCode:
         """The candidates for given values of free joints: of the target's entries and these values' pairs."""
         inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
         slides = self.arm.prismatic.tolist()
@@ -71,18 +71,14 @@ class Recorded:
             pairs = [Pair(next(rest), None if slide else next(rest)) for slide in slides]
             return self.candidates(entries[:inputs], pairs)
 
-        return LazyCode(formula, inputs + 2 * len(slides) - sum(slides))
+        return StraightLineCode(formula, inputs + 2 * len(slides) - sum(slides))
 
     def with_values(self, target: Array, values: Array) -> Array:
         """Candidates of targets N for values (N, n) of the joints that are free, (N, B, n + 1): the last their squared
         residuals."""
         goal, prefer = entries(self.task, target), preferred(self.arm, values)
-        code = self._preferring.get(len(target))
-        if code is None:
-            found = self.candidates(goal, prefer)
-        else:
-            flat = [*goal, *(x for pair in prefer for x in pair if x is not None)]
-            found = list(code.run(flat, code.workspace(len(target))))
+        flat = [*goal, *(x for pair in prefer for x in pair if x is not None)]
+        found = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
         return as_rows(found[: self.arm.n + 1], len(target))
 
     def in_numbers(self, target: Array) -> list[Array]:
