@@ -2,10 +2,11 @@
 
     python tests/inverse/exact_postures.py
 
-Angles are multiples of 15 degrees and those of right triangles of whole sides (and their doubles), lengths are whole
-numbers, so that every entry of a chain is in the rationals with sqrt(2) and sqrt(3). They are computed in the field of
-integers modulo a prime of 31 bits in which 2 and 3 are squares: no number is rounded, none compared with a threshold. A
-rank can only come out too small, where a prime divides a minor; singular postures are computed by two primes.
+Angles are multiples of 15 degrees, those of right triangles of whole sides (and their doubles), and halves of these and
+of 45 degrees; lengths are whole numbers, so that every entry of a chain is in the rationals with some roots: of 2, 3,
+10, 26 and 2 + sqrt(2). They are computed in the field of integers modulo a prime of 31 bits that has these: no number
+is rounded, none compared with a threshold. A rank can only come out too small, where a prime divides a minor; singular
+postures are computed by two primes.
 
 With t = tan of half of each joint's motion the equations are polynomials. Those of full rank are solved for as many
 joints as power series in the others (implicit function theorem); what is left of the equations has the Hilbert
@@ -24,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FILE = Path(__file__).with_suffix(".txt")
-PRIMES = 2147483543, 2147483423  # 23 modulo 24: 2, 3 are squares and their roots a power
-COUNT = 260  # postures an arm
+PRIMES = 2147481359, 2147481311  # 47 modulo 48: 2, 3, 2 + sqrt(2) are squares, 10 and 26, too; their roots a power
+COUNT, HALVES = 260, 40  # postures an arm, and those with halves of angles
 DEGREE = {0: 1, 1: 12, 2: 6, 3: 4}  # of the power series, by the directions that are lost
 DEGREE |= dict.fromkeys((4, 5, 6), 3)
 
@@ -54,8 +55,9 @@ ARMS: dict[str, tuple[str, str, list[tuple[int, int, int]]]] = {
     "point, slide": ("xyz", "RRP", [(300, 0, 1), (50, 0, 1), (0, 0, 0)]),
 }  # fmt: skip
 TRIANGLES = (3, 4, 5), (5, 12, 13), (24, 7, 25)
-# letters of the file: 24 multiples of 15 degrees, then triangles' angles in all quadrants
-LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXabcdefghijkl"
+# letters of the file: 24 multiples of 15 degrees, triangles' angles in all quadrants, odd multiples of 22.5 degrees,
+# and halves of the first two triangles' angles in all quadrants
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXabcdefghijklmnopqrstuvwxyzYZ"
 KINDS = [
     [k for k in range(24) if k % 6 == 0],
     [k for k in range(24) if k % 3 == 0],
@@ -64,6 +66,7 @@ KINDS = [
     [0, 6, 12, 18, *range(24, 36)],
     list(range(36)),
 ]
+KINDS_OF_HALVES = [[0, 6, 12, 18, *range(36, 44)], [0, 6, 12, 18, *range(44, 52)], list(range(36, 52)), list(range(52))]
 SLIDES = (0, 100, 154, 200, 250, 300)  # [mm] a slide's values, by letter
 
 
@@ -82,8 +85,11 @@ def radians(letter: str) -> float:
     k = LETTERS.index(letter)
     if k < 24:
         return float(np.radians(15.0 * (k - 24 if k > 12 else k)))
-    (a, b, _), quadrant = TRIANGLES[(k - 24) // 4], (k - 24) % 4
-    angle = np.arctan2(a, b) + quadrant * np.pi / 2
+    if 36 <= k < 44:
+        angle = np.radians(22.5 + 45.0 * (k - 36))
+    else:
+        (a, b, _), quadrant = TRIANGLES[(k - 24 if k < 36 else k - 44) // 4], k % 4
+        angle = np.arctan2(a, b) / (1.0 if k < 36 else 2.0) + quadrant * np.pi / 2
     return float(angle - 2 * np.pi if angle > np.pi else angle)
 
 
@@ -105,11 +111,13 @@ def read() -> list[Posture]:
 
 
 class Field:
-    """Integers modulo a prime p, with the roots of 2 and 3."""
+    """Integers modulo a prime p, with the roots of 2, 3, 10, 26 and 2 + sqrt(2)."""
 
     def __init__(self, p: int) -> None:
         self.p = p
-        self.root = {2: pow(2, (p + 1) // 4, p), 3: pow(3, (p + 1) // 4, p)}
+        self.root = {k: pow(k, (p + 1) // 4, p) for k in (2, 3, 10, 26)}
+        more = 2 + self.root[2]
+        self.root[more] = pow(more, (p + 1) // 4, p)
         assert all(r * r % p == k for k, r in self.root.items())
 
     def over(self, a: int, b: int) -> int:
@@ -118,18 +126,25 @@ class Field:
     def angle(self, k: int) -> tuple[int, int]:
         """Cosine and sine of the k-th letter."""
         p = self.p
-        if k >= 24:
+        if k >= 44:  # tangents 1/3 and 1/5
+            a, c = [(3, 10), (5, 26)][(k - 44) // 4]
+            quadrant, start = k % 4, (self.over(a, self.root[c]), self.over(1, self.root[c]))
+        elif k >= 36:
+            cos = self.over(self.root[2 + self.root[2]], 2)
+            sin = self.over(self.root[2], 4 * cos)
+            quadrant, start = (k - 36) // 2, (cos, sin) if k % 2 == 0 else (sin, cos)
+        elif k >= 24:
             (a, b, c), quadrant = TRIANGLES[(k - 24) // 4], (k - 24) % 4
             start = self.over(b, c), self.over(a, c)
         else:
             two, three = self.root[2], self.root[3]
             quadrant, rest = k // 6, k % 6
             # 0, 15, .. 75 degrees
-            cos = [
+            cosines = [
                 1, self.over(two * (three + 1), 4), self.over(three, 2), self.over(two, 2), self.over(1, 2),
                 self.over(two * (three - 1), 4),
             ]  # fmt: skip
-            start = cos[rest] % p, (cos[6 - rest] if rest else 0) % p
+            start = cosines[rest] % p, (cosines[6 - rest] if rest else 0) % p
         c, s = start
         for _ in range(quadrant):
             c, s = -s % p, c
@@ -288,23 +303,28 @@ def _multiplicity(field: Field, series: Series, g: Ints) -> int:
     return 0
 
 
-def main() -> None:
-    rng = np.random.default_rng(1)
+def rows(rng: np.random.Generator, number: int, choices: list[list[int]], count: int) -> list[str]:
+    """Lines of the file: so many postures of an arm, of letters as choices say."""
+    arm, (_, kinds, _) = list(ARMS.items())[number]
     first, second = map(Field, PRIMES)
-    lines = ["# arm, joints' letters, lost directions, multiplicity (0: a curve), joints that move: exact_postures.py"]
-    for number, (arm, (_, kinds, _)) in enumerate(ARMS.items()):
-        seen: set[str] = set()
-        while len(seen) < COUNT:
-            choice = KINDS[int(rng.integers(len(KINDS)))]
-            letters = "".join(
-                LETTERS[int(rng.integers(len(SLIDES)) if kind == "P" else rng.choice(choice))] for kind in kinds
-            )
-            if letters in seen:
-                continue
-            seen.add(letters)
+    seen: dict[str, str] = {}
+    while len(seen) < count:
+        choice = choices[int(rng.integers(len(choices)))]
+        letters = "".join(
+            LETTERS[int(rng.integers(len(SLIDES)) if kind == "P" else rng.choice(choice))] for kind in kinds
+        )
+        if letters not in seen:
             found = structure(first, arm, letters)
             assert not found.lost or found == structure(second, arm, letters)
-            lines.append(f"{number} {letters} {found.lost} {found.multiplicity} {found.moving or '-'}")
+            seen[letters] = f"{number} {letters} {found.lost} {found.multiplicity} {found.moving or '-'}"
+    return list(seen.values())
+
+
+def main() -> None:
+    lines = ["# arm, joints' letters, lost directions, multiplicity (0: a curve), joints that move: exact_postures.py"]
+    for seed, choices, count in ((1, KINDS, COUNT), (2, KINDS_OF_HALVES, HALVES)):
+        rng = np.random.default_rng(seed)
+        lines += [line for number in range(len(ARMS)) for line in rows(rng, number, choices, count)]
     FILE.write_text("\n".join(lines) + "\n")
 
 

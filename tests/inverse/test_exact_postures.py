@@ -1,4 +1,4 @@
-"""Words and branches of 2,340 typed postures against exact arithmetic: `exact_postures`."""
+"""Words and branches of 2,700 typed postures against exact arithmetic: `exact_postures`."""
 
 from __future__ import annotations
 
