@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -100,7 +101,7 @@ def _needs_emulator(item: pytest.Item) -> bool:
     if "firmware" in Path(item.path).parts:
         return True
     used = vars(item.module).values() if isinstance(item, pytest.Function) else ()
-    return any({getattr(x, "__name__", None), getattr(x, "__module__", None)} & _HELPERS for x in used)
+    return any(getattr(x, "__name__" if isinstance(x, ModuleType) else "__module__", None) in _HELPERS for x in used)
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import armkin
-from armkin.inverse.branches.turns import nearest_copy, turns
+from armkin.inverse.branches.turns import nearest_copy, nearest_number, turns
 from armkin.model.arm import from_links
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -38,6 +38,7 @@ def test_nearest_legal_copy(limits: tuple[float, float], value: float, near: flo
     copies = value + 2 * np.pi * np.arange(-6, 7)
     legal = copies[(copies >= lower - 1e-9) & (copies <= upper + 1e-9)]
     assert bool(np.all(inside)) == (len(legal) > 0)
+    assert nearest_number(value, near, lower, upper, False) == (float(got[0]), len(legal) > 0)
     turn = (got[0] - value) / (2 * np.pi)
     assert turn == pytest.approx(round(turn), abs=1e-9)
     if len(legal):
