@@ -131,7 +131,7 @@ def lines(count: int) -> None:
         try:
             end = armkin.path(arm, ends).motion.end
             off = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _place(ends[1])[:2])
-            found = off < 0.01
+            found = bool(off < 0.01)
         except armkin.NoSolutionError:
             found = False
         whole, right = whole + carried, right + (found == carried)
@@ -153,7 +153,7 @@ def homes() -> None:
             continue
         tally = [0, 0, 0, 0]
         for way in np.concatenate([20 * np.eye(3), -20 * np.eye(3)]):
-            moves = {"start": "home", "moves": [{"offset": {"xyz": way.tolist()}}]}
+            moves: dict[str, object] = {"start": "home", "moves": [{"offset": {"xyz": way.tolist()}}]}
             kind = _tried(arm, moves)
             T = np.tile(armkin.fk(arm, arm.home), (201, 1, 1))
             T[:, :3, 3] += np.linspace(0, 1, 201)[:, None] * way
