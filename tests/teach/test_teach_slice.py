@@ -49,6 +49,6 @@ def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
 
 
 def test_seven_joints_hold_one_and_no_task_is_told() -> None:
-    assert reach_slice(armkin.load("iiwa7"))["held"] == "J3"
+    assert reach_slice(armkin.load("iiwa7"))["held"] == "J7"
     with pytest.raises(UsageError, match="no task fits"):
         reach_slice(armkin.load("pan_tilt"))
