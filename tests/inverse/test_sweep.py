@@ -38,6 +38,7 @@ def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
 
 
 def test_each_value_is_prepared_once_for_all_rows() -> None:
+    choose.solve(SWEPT, TARGETS[:1])  # the arm with its redundant joint at zero
     for joint, most in (("q2", 3), ("q1", 1)):  # of q1, the redundant one, all values have one arm
         request = replace(SWEPT, swept={joint: [1.25, 2.5, 3.75]})
         before = solver.cache_info().misses
