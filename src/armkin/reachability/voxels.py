@@ -19,10 +19,14 @@ TURN = 2 * np.pi
 
 
 class Layer(NamedTuple):
-    """Voxels of a plane: places (V, 2) along its axes, in steps of the grid; row (V,): the cell of each."""
+    """Voxels of a plane: places (V, 2) along its axes, in steps of the grid; row (V,): the cell of each.
+
+    centres: (V, 3) in the reach frame [mm].
+    """
 
     places: NDArray[np.intp]
     row: NDArray[np.intp]
+    centres: Array
 
     def table(self, column: Array) -> Array:
         """A column of the cells as an image (rows upwards, columns to the right); nan where there is no cell."""
@@ -68,4 +72,4 @@ def _square(grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _layer(grid: Grid, first: NDArray[np.intp], second: NDArray[np.intp], centres: Array) -> Layer:
     row = rows_at(grid, centres)
     there = row >= 0
-    return Layer(np.stack([first, second], axis=1)[there], row[there])
+    return Layer(np.stack([first, second], axis=1)[there], row[there], centres[there])

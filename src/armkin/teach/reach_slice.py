@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from armkin.model.lock import lock
 from armkin.reachability import voxels
 from armkin.reachability.map import reach
@@ -34,12 +32,10 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
     plane = voxels.section(found.grid)
     share = found.columns["share"][plane.row]
     there = share > 0
-    a, c = plane.places[there].T
-    centres = np.stack([(a + 0.5) * found.grid.step, 0.0 * a, c * found.grid.step], axis=1)
     return {
         "size": found.grid.step,
         "frame": found.grid.frame.tolist(),
-        "centres": centres.round(3).ravel().tolist(),
+        "centres": plane.centres[there].round(3).ravel().tolist(),
         "shares": share[there].round(4).tolist(),
         "of": found.orientations,
         "held": held,

@@ -67,9 +67,7 @@ def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         part("head"),
         *_exported(arm, task),
         *_data(arm, turned, task, geometry, branches, driven),
-        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
-        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
-        _of_joints("targetOf", formulas.target(turned, task)),
+        *_kinematics(turned, task),
         *_keep_outs(arm, turned),
         *map(part, _SOLVER),
         *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
@@ -104,9 +102,7 @@ def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
         *_data(arm, turned, task, spare.geometry, 0, driven),
         f"const REDUNDANT = {_text(redundant)};",
         f"const OTHERS = (() => {{\n{inner}return {{ ik, branch_names }};\n}})();",
-        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), arm.n)),
-        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), arm.n)),
-        _of_joints("targetOf", formulas.target(turned, task)),
+        *_kinematics(turned, task),
         *_keep_outs(arm, turned),
         part("poses"),
         part("redundant").replace("@TARGET@", _target_is(task)),
@@ -156,6 +152,15 @@ def _of_joints(name: str, recorded: recording.Recording) -> str:
 def _function(head: str, lines: list[str]) -> str:
     body = "\n".join(f"  {line}" for line in lines)
     return f"{head} {{\n{body}\n}}\n"
+
+
+def _kinematics(turned: Arm, task: Task) -> list[str]:
+    """The recorded functions of joint values: the tool's pose, the Jacobian, the target that is reached."""
+    return [
+        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
+        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
+        _of_joints("targetOf", formulas.target(turned, task)),
+    ]
 
 
 def _exported(arm: Arm, task: Task) -> list[str]:

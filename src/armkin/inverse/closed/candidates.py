@@ -141,8 +141,7 @@ class Recorded:
         shift, apart = self._steps(), 2.0 * np.pi / FREED
         best = np.zeros((len(target), 1))
         for _ in range(CLOSER):
-            values = near[:, None] + (best[:, None] + shift) * np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
-            _, miss = self._at(np.repeat(target[:, None], len(shift), axis=1), values)
+            _, miss = self._shifted(target, near, best[:, None] + shift)
             place = np.where(loose[:, None], miss, np.inf).min(axis=2).argmin(axis=1)
             best, apart = best + shift[place], apart / 4
             shift = apart * np.arange(-4.0, 5.0)[:, None]
@@ -155,8 +154,12 @@ class Recorded:
 
     def _all_round(self, target: Array, near: Array) -> tuple[Array, Array]:
         """Candidates (N, FREED, B, n) with values for free joints all round; squared residuals."""
-        unit = np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
-        return self._at(np.repeat(target[:, None], FREED, axis=1), near[:, None] + self._steps() * unit)
+        return self._shifted(target, near, self._steps())
+
+    def _shifted(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
+        """Candidates (N, S, B, n) with free joints so far from `near`, (S, 1) or (N, S, 1); squared residuals."""
+        values = near[:, None] + shift * np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
+        return self._at(np.repeat(target[:, None], values.shape[1], axis=1), values)
 
     def _random(self, target: Array, near: Array) -> Array:
         """Candidates (N, M, n) with random values for joints that are free, and of targets moved to where none is."""

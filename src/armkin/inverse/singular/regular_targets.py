@@ -209,9 +209,8 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
     known &= ~(close & ~one & (away < np.maximum(same[:, :, None], same[:, None]))).any(axis=(1, 2))
     one &= known[:, None, None]
     either &= known[:, None, None]
-    known &= ~((either @ either) & ~either & ~np.eye(B, dtype=bool)).any(
-        axis=(1, 2)
-    )  # what is one with two makes them one
+    # what is one with two makes them one
+    known &= ~((either @ either) & ~either & ~np.eye(B, dtype=bool)).any(axis=(1, 2))
     known &= ~(either & weak.moving[:, :, None]).any(axis=(1, 2))
     for row in np.flatnonzero(known & weak.moving.any(axis=1)):
         known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])

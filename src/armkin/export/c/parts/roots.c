@@ -50,7 +50,7 @@ static double arm_ratio_of(const double *power, int count, int step)
     return above / (below > 1e-300 ? below : 1e-300);
 }
 
-/* How far a joint's part of a solution's vector is from (cos 3f, sin 3f, cos f, sin f), f = q / 2. */
+/* (cos 3f, sin 3f, cos f, sin f) of f = q / 2. */
 static void arm_half_powers(double q, double *out)
 {
     double angle[8] = {0, 0, 0, 0, 0, 0, 0, 0}, cosine[8], sine[8];
