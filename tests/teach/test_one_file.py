@@ -99,6 +99,21 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(browser: Bro
         assert page.evaluate("location.hash") != posture
 
 
+def test_it_is_printed_on_one_page_with_its_picture(browser: Browser, tmp_path: Path) -> None:
+    with opened(browser, written(tmp_path, "ur5e") + "#q=20,-70,80,10,20,30") as page:
+        paper = page.pdf(format="A4")  # as by hand, it says beforeprint
+        assert len(re.findall(rb"/Type\s*/Page\b", paper)) == 1
+        assert len(re.findall(rb"/Subtype\s*/Image\b", paper)) >= 1
+        page.emulate_media(media="print")
+        assert page.locator("#printed").is_visible()
+        picture = page.locator("#printed").get_attribute("src") or ""
+        assert len(picture) > 10_000  # an empty one has a tenth of that
+        for shown in ("#box-1", "#target input", "#answer", "#branch-7"):
+            assert page.locator(shown).first.is_visible(), shown
+        for gone in ("#canvas", "#sliders input[type=range]", "#views", "#share", "#poses"):
+            assert not page.locator(gone).first.is_visible(), gone
+
+
 @pytest.mark.parametrize("fragment", ["#q=<img src=x onerror=alert(1)>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00"])
 def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path, fragment: str) -> None:
     with opened(browser, written(tmp_path, "three_dof") + fragment) as page:

@@ -12,6 +12,7 @@ import { get } from "./dom.js";
 import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
 import { Pointing } from "./pointing.js";
+import { printing } from "./printing.js";
 import { Slice } from "./slice.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
@@ -71,8 +72,7 @@ export class View {
     this.base.matrixAutoUpdate = false;
     this.base.matrix.fromArray(arm.base.flat()).transpose();
     this.tool = new AxesHelper(length);
-    this.tool.matrixAutoUpdate = false;
-    for (const axes of [this.base, this.tool]) axes.setColors(0xd62728, 0x2ca02c, 0x1f4fd6);
+    for (const axes of [this.base, this.tool]) axes.setColors(0xd62728, 0x2ca02c, 0x1f4fd6).matrixAutoUpdate = false;
     this.scene.add(this.base, this.tool);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.addEventListener("change", () => this.draw());
@@ -84,6 +84,7 @@ export class View {
     this.inside = false; // whether the whole arm was in the picture when it last rested
     this.theme();
     new ResizeObserver(() => this.size()).observe(canvas);
+    printing(this);
   }
 
   /** Whether the processor draws. */
