@@ -236,6 +236,17 @@ def talks(name: str, suffix: str = "") -> None:
     t.say(config(0, 0, bytes(bad)), ack(1))
     t.say(commit(1, bytes(bad)), ack(1, 7))
     t.say(status(3), report(3, 1, 7, 0, 0, 0, 0, vector(0, 0, 0, 1510)))
+    t.note("max_rate may be more than a rate can be: one whose way back is no rate is refused")
+    fast = image()[: 12 + 21 + 13] + b"\xff" * 4 + image()[12 + 21 + 17 :]
+    t.say(hello(1, 2003), info(1, 2003, 0, 0, 0))
+    t.say(config(0, 0, fast[:100]), ack(1))
+    t.say(config(1, 100, fast[100:]), ack(2))
+    t.say(commit(2, fast), ack(3))
+    t.say(set_position(3, 2, [0]), ack(4))
+    t.say(enable(4, 1), ack(5))
+    t.say(home(5, 0, 0, 26, 100, 1000, 10, vector(0, -(1 << 31), 0)), ack(5, 16, 1))
+    t.say(hello(1, 2004), info(1, 2004, zlib.crc32(fast), 2, 0b101))
+    t.say(jog(0, vector(0, -(1 << 31), 0)), ack(0, 16, 1))
     t.write(f"refuse{suffix}.talk")
 
     t = Talk("A joint limit of coupled motors: Y and Z turn one joint by their sum", name)

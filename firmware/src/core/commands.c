@@ -166,7 +166,7 @@ static enum error check_rates(const int32_t rate[AXES], bool jogging) {
         const uint32_t most = memory.image.axis[i].max_rate;
         const uint32_t slow = most / SLOW_WHILE_LOST ? most / SLOW_WHILE_LOST : 1;
         const uint32_t size = rate[i] < 0 ? 0U - (uint32_t)rate[i] : (uint32_t)rate[i];
-        if (size > (jogging && lost ? slow : most)) {
+        if (size > (jogging && lost ? slow : most) || size > INT32_MAX) {  // its way back has to be a rate, too
             return fault(E_RATE, i);
         }
     }

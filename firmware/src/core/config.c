@@ -114,7 +114,7 @@ void config_activate(void) {
     memset(&limits, 0, sizeof limits);
     for (uint8_t i = 0; i < AXES; i++) {
         const struct axis_config *axis = &memory.image.axis[i];
-        if (!memory.config || !(axis->flags & USED)) {
+        if (!memory.config || !(axis->flags & USED) || !axis->max_accel) {  // COMMIT takes no such one
             continue;
         }
         limits.used |= 1U << i;

@@ -14,8 +14,8 @@ const uint32_t crc_table[256] HAL_TABLE = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_
 uint32_t crc_block(const void *data, uint16_t length) {
     const uint8_t *byte = data;
     uint32_t crc = CRC_START;
-    while (length--) {
-        crc = crc_byte(crc, *byte++);
+    for (uint16_t i = 0; i < length; i++) {
+        crc = crc_byte(crc, byte[i]);
     }
     return ~crc;
 }

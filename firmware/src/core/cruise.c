@@ -27,7 +27,7 @@ void cruise_vector(int8_t sign, bool bounded) {
         }
         const float seconds = (float)size(rate[i]) / memory.image.axis[i].max_accel;
         longest = seconds > longest ? seconds : longest;
-        cruise.rate[i] = sign < 0 ? -rate[i] : rate[i];
+        cruise.rate[i] = sign < 0 ? (int32_t)(0U - (uint32_t)rate[i]) : rate[i];
         cruise.axes |= 1U << i;
         if (size(rate[i]) > size(rate[cruise.leader])) {
             cruise.leader = i;

@@ -77,17 +77,16 @@ APART void link_send(const uint8_t *payload, uint8_t size) {
     const uint32_t sum = crc_block(payload, size);
     const uint8_t tail[CRC_SIZE] = {sum, sum >> 8, sum >> 16, sum >> 24};
     const uint8_t total = size + CRC_SIZE;
-#define BYTE(i) ((i) < size ? payload[i] : tail[(uint8_t)((i) - size)])
-    for (uint8_t at = 0; at <= total;) {
-        uint8_t run = 0;
-        while (at + run < total && BYTE(at + run)) {
-            run++;
+#define BYTE(i) ((i) < size ? payload[i] : tail[(uint8_t)((i) - size) % CRC_SIZE])
+    for (uint8_t at = 0; at <= total; at++) {
+        uint8_t end = at;
+        while (end < total && BYTE(end)) {
+            end++;
         }
-        hal_send(run + 1);
-        for (uint8_t i = 0; i < run; i++) {
-            hal_send(BYTE(at + i));
+        hal_send(end - at + 1);
+        for (; at < end; at++) {
+            hal_send(BYTE(at));
         }
-        at += run + 1;
     }
     hal_send(0);
 #undef BYTE

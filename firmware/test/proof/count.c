@@ -21,6 +21,16 @@ int main(void) {
             }
         }
     }
+    for (uint32_t at = 0; at <= UINT16_MAX; at++) {  // and every piece of an image that a CONFIG may bring
+        static const uint8_t data[256];
+        for (uint16_t length = 0; length < 256; length++) {
+            const bool fits = at + length <= sizeof memory.image;
+            if ((config_write(at, data, length) == OK) != fits) {
+                return 1;
+            }
+            calls++;
+        }
+    }
     printf("%u calls, no overflow\n", calls);
     return 0;
 }

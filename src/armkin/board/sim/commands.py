@@ -139,7 +139,8 @@ class Commands:
             if not self._setup.powered(i):
                 raise RefusedError(Error.DISABLED, i)
             most = self._setup.image.axes[i].max_rate
-            if abs(rate[i]) > (max(most // 8, 1) if slow else most):
+            most = max(most // 8, 1) if slow else most
+            if abs(rate[i]) > min(most, 2**31 - 1):  # its way back has to be a rate, too
                 raise RefusedError(Error.RATE, i)
 
     def _home(self, payload: bytes) -> None:
