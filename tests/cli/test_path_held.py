@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +83,55 @@ def test_joint_moves_need_no_task(tmp_path: Path) -> None:
     done = run("path", arm, path)
     assert done.code == 2
     assert "no task fits its 2 joints" in done.err
+
+
+SEVEN = "task: pose\nstart: home\nmoves:\n  - point: [400, 0, 400, 180, 0, 0]\n  - line: [400, 150, 400, 180, 0, 0]\n"
+
+
+@pytest.mark.parametrize(("robot", "held"), [("panda", 45.0), ("iiwa7", None)])
+def test_of_seven_joints_the_redundant_one_is_held_where_it_carries_the_path(robot: str, held: float | None) -> None:
+    """panda's J7 stays at home; iiwa7's does not carry there, and goes to the nearest value that does."""
+    done = run("path", robot, "-", "--json", stdin=SEVEN.encode())
+    assert done.code == 0, done.err
+    arm, plan = armkin.load(robot), done.json
+    assert plan["held"]["J7"] == plan["joints"][6]
+    assert plan["held"]["J7"] == (held if held is not None else pytest.approx(-2.4648, abs=1e-3))
+    assert plan["start_joints"] == pytest.approx(np.rad2deg(arm.home).tolist())
+    at_end = armkin.fk(arm, np.deg2rad(plan["joints"]))
+    assert at_end[:3, 3] == pytest.approx([400, 150, 400])
+    again = armkin.path(
+        arm_with_rates(robot), {"moves": [{"point": [400, 0, 400, 180, 0, 0]}, {"line": [400, 150, 400]}]}
+    )
+    assert again.held["J7"] == np.deg2rad(plan["held"]["J7"])
+    assert "held: J7 at" in run("path", robot, "-", stdin=SEVEN.encode()).out
+
+
+def arm_with_rates(robot: str) -> armkin.Arm:
+    arm = armkin.load(robot)
+    return replace(arm, max_speed=np.full(7, 0.5), max_accel=np.full(7, 1.0))
+
+
+def test_joint_moves_say_where_the_redundant_joint_is_held_and_agree() -> None:
+    joint = "  - joint: [0, -17, 0, -120, 0, 110, 30]\n"
+    down = "  - offset: {xyz: [0, 0, -30]}\n"
+    done = run("path", "panda", "-", "--json", stdin=(SEVEN + joint + down).encode())
+    assert done.code == 0, done.err
+    assert done.json["held"] == {"J7": pytest.approx(30.0)}
+    other = joint.replace("30]", "31]")
+    refused = run("path", "panda", "-", stdin=(SEVEN + joint + other + down).encode())
+    assert refused.code == 2
+    assert (
+        "standard input:7: move 4: J7 is redundant and held along a path: it cannot be at 30 and then at 31 deg"
+        in refused.err
+    )
+    some = run("path", "panda", "-", "--json", stdin=(SEVEN + "  - joint: {J1: 30}\n").encode())
+    assert some.json["held"] == {"J7": pytest.approx(45.0)}
+    moves = run("path", "panda", "-", "--json", stdin=b"moves:\n  - joint: [0, -17, 0, -120, 0, 110, 30]\n")
+    assert moves.code == 0
+    assert "held" not in moves.json  # joint moves alone hold nothing
+
+
+def test_info_names_the_redundant_joint() -> None:
+    assert run("info", "panda", "--json").json["redundant"] == "J7"
+    assert "J7 is redundant: ik lists the intervals of its values" in run("info", "panda").out
+    assert "redundant" not in run("info", "ur5e", "--json").json

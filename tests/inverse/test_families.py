@@ -137,14 +137,6 @@ def test_with_keep_outs_the_posture_of_an_interval_is_free(tmp_path: object) -> 
         assert abs(answer["branches"][0]["joints"][6] - best["joints"][6]) > 1
 
 
-def test_a_path_follows_single_branches_and_asks_for_a_held_joint() -> None:
-    done = run(
-        "path", "panda", "-", "--start", "home", stdin=b"task: pose\nmoves:\n  - line: [450, 0, 400, 180, 0, 0]\n"
-    )
-    assert (done.code, done.out) == (2, "")
-    assert "7 joints for the 6 constraints of task pose leave 1 degree of freedom" in done.err
-
-
 def test_a_nearly_stretched_arm_has_its_short_families() -> None:
     """All values of J7 that answer lie within half a degree: it was called unreachable."""
     arm = armkin.load("iiwa7")

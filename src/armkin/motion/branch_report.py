@@ -155,10 +155,16 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "nearest_singularity": None
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
+        **({"held": held(plan)} if plan.held else {}),
         **({} if plan.turned is None else {"turned_deg": float(np.rad2deg(plan.turned))}),
         **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
         **({} if plan.clearance is None else {"clearance": plan.clearance}),
     }
+
+
+def held(plan: PathPlan) -> dict[str, float]:
+    """Joints that are held along a path, and where [deg | mm]."""
+    return {name: _shown(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
 
 
 def _approach(move: Trajectory) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.free import checked
 from armkin.motion.path import path
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import approach, check_jerk, check_rates
+from armkin.motion.plan import approach, check_jerk, check_rates, straight
 from armkin.motion.time_optimal import Knots
 from armkin.motion.trajectory import Straight, Stretch
 
@@ -33,12 +33,14 @@ def path_held(
     start: ArrayLike | None = None,
     near: ArrayLike | None = None,
     jerk: Array | None = None,
+    begin: Array | None = None,
     **options: Any,
 ) -> PathPlan:
     """`armkin.path` with joints held: joint name -> value [rad | mm]. The plan is one of the whole arm.
 
     start, near, jerk: (n,) of all joints, options as in `armkin.path`. The held joints go to their values in the plan's
-    approach. Raises as `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
+    approach; begin: (n,) where the motion begins instead, with a joint move to its first posture. Raises as
+    `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
     """
     check_rates(arm)
     free = lock(arm, held)
@@ -57,10 +59,16 @@ def path_held(
         raise
     whole, begun = _of_all(plan, arm, held), unlock(arm, held, plan.motion.start)
     made = [_widened(one, arm, held) for one in plan.motion.stretches]
+    pace = plan.speed, options.get("accel", 1.0), check_jerk(arm, jerk)
+    if begin is not None and (first := straight(arm, begin, begun, *pace)).duration > 0:
+        made, begun, shift = [first, *made], begin, 1
+    else:
+        shift = 0
     for k, (_, base) in plan.on_path.items():
-        whole.along(k, made[k], base)
-    whole.approach = approach(arm, here, begun, plan.speed, options.get("accel", 1.0), check_jerk(arm, jerk))
-    return checked(whole.finished(begun, made, plan.markers))
+        whole.along(k + shift, made[k + shift], base)
+    whole.approach = approach(arm, here, begun, *pace)
+    markers = [replace(one, before=one.before + shift) for one in plan.markers]
+    return checked(whole.finished(begun, made, markers))
 
 
 def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
@@ -73,6 +81,7 @@ def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
     return replace(
         plan,
         arm=arm,
+        held=dict(held),
         runs=[replace(r, start_joints=whole(r.start_joints), end_joints=whole(r.end_joints)) for r in plan.runs],
         branches=[replace(b, start_joints=whole(b.start_joints)) for b in plan.branches],
         reconfigurations=[

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion import path_numbers, wrist_turn
 from armkin.motion.branch_path import Pace
 from armkin.motion.free import checked
@@ -55,8 +56,9 @@ def path(
     [mm/s]; jerk: [rad/s3 | mm/s3] for all joints or each; hold: how many times max_accel a joint may be asked for
     when the board holds on the path, None: no matter. split: change the branch, by a joint move, where none
     carries on. Where the moves begin elsewhere than at `start`, the plan's `approach` is the joint move from there to
-    its first posture, and no part of its motion. Raises UsageError for moves that make no sense, NoSolutionError if
-    some part is not carried: its `plan` then tells how far every branch goes.
+    its first posture, and no part of its motion. With one joint more than the task asks for, the redundant one is
+    held (`PathPlan.held`), as near to where it stands as carries the whole path. Raises UsageError for moves that
+    make no sense, NoSolutionError if some part is not carried: its `plan` then tells how far every branch goes.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")
@@ -70,6 +72,14 @@ def path(
     check_rates(arm)
     file = path_numbers.moves(arm, moves, task)
     check_robot(file, arm.name, arm.path)
+    if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.of_tool(file):
+        from armkin.motion.redundant import path_redundant
+
+        return path_redundant(
+            arm, file, spare, start=start, near=near, branch=branch, task=task, tolerance=tolerance, corners=corners,
+            blend=blend, speed=speed, accel=accel, tool_speed=tool_speed, jerk=jerk, hold=hold, split=split,
+            samples=samples,
+        )  # fmt: skip
     for name, value in (("speed", speed), ("accel", accel)):
         check_share(name, value)
     for name, least, given in (("tool_speed", LEAST_TOOL_SPEED, tool_speed), ("tolerance", LEAST_TOLERANCE, tolerance)):

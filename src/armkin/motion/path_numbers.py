@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
+OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
+
 
 def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
     """Whatever `armkin.path` takes as the model of a path file."""
@@ -44,6 +46,13 @@ def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
         raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
     listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
     return path_file.validated({"moves": listed, "task": definition.name})
+
+
+def of_tool(file: PathFile) -> bool:
+    """Whether a path has targets of the tool, and not joint values alone."""
+    start = file.start
+    point = start is not None and not isinstance(start, str) and start.joints is None
+    return point or any(move.kind not in OF_JOINTS for move in file.moves)
 
 
 def joints(arm: Arm, now: Array, value: Any) -> Array:

@@ -96,6 +96,7 @@ class PathPlan:
     trajectory: Trajectory | None = None
     approach: Trajectory | None = None  # the joint move from where the arm stands to the start, no part of the motion
     clearance: dict[str, Any] | None = None  # mm (a lower bound), s_mm, body, with: where there are keep-outs
+    held: dict[str, float] = field(default_factory=dict)  # joints held all along, and where [rad | mm]
     on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
 
     def along(self, number: int, stretch: Stretch, base: float) -> None:

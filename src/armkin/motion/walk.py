@@ -25,6 +25,7 @@ from armkin.motion.curve import Curve, Smoothed, way_of, ways_of
 from armkin.motion.dense import FIT, PLAN, Polyline
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.grid import deviation, missed
+from armkin.motion.path_numbers import OF_JOINTS
 from armkin.motion.path_plan import Marker, PathPlan
 from armkin.motion.plan import approach, straight
 from armkin.motion.profile import at_rest
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
     from armkin.motion.route import Route
     from armkin.motion.time_optimal import Knots
     from armkin.path_file import Move, PathFile
-
-_OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
 
 
 @dataclass(frozen=True)
@@ -348,7 +347,7 @@ def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
     try:
         return task_for(arm, name)
     except UsageError:
-        if name is None and all(move.kind in _OF_JOINTS for move in file.moves):
+        if name is None and all(move.kind in OF_JOINTS for move in file.moves):
             return None
         raise
 

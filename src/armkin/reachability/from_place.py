@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import isolated as ik
+from armkin.inverse.solve import ik, isolated
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import rotation_about
 from armkin.reachability import carrying
@@ -98,7 +98,7 @@ def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> N
     """At which of some yaws (K,) one branch carries all targets."""
     arm, K = question.arm, question.yaws
     if question.arcs:
-        s = ik(arm, seen_from(question, at, 0.0), question.task.name)
+        s = isolated(arm, seen_from(question, at, 0.0), question.task.name)
         whole, low, high = carrying.ranges(s, s.valid)
         allowed = whole & carrying.within(arm, low, high, range(1, arm.n))
         first, length = carrying.arc(arm, low[:, 0], high[:, 0], K, question.sense)
@@ -119,7 +119,8 @@ def legal_from(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
 
 def free_from(question: Question, at: Array, turn: float, within: bool = True) -> tuple[Solutions, NDArray[np.bool_]]:
     """The branches of all targets from one place, and which are free (N, B); within: and within limits."""
-    s = ik(question.arm, seen_from(question, at, turn), question.task.name)
+    find = ik if within else isolated  # of a family every posture is an answer, but what one branch carries is another
+    s = find(question.arm, seen_from(question, at, turn), question.task.name)
     legal = s.within_limits if within else s.valid
     if question.arm.keep_out:
         legal = legal & s.clear

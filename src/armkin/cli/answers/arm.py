@@ -186,6 +186,7 @@ class Solving(TypedDict):
     target_units: list[str]
     solver: Solver | None
     ik_refuses: Annotated[str | None, "why there is no solver"]
+    redundant: Annotated[NotRequired[str], "the joint that ik gives intervals of, where one is to spare"]
 
 
 class BodySegment(_Ends):

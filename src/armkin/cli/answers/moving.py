@@ -117,6 +117,7 @@ class Path(Head, Tooled):
     limits: Annotated[dict[str, dict[str, float]] | None, "speed, accel, jerk: greatest share of each joint's limit"]
     nearest_singularity: NearestSingularity | None
     segments: Annotated[int | None, "that a board is sent; null without drives"]
+    held: Annotated[NotRequired[dict[str, float]], "joints that are held along the path, and where [deg or mm]"]
     turned_deg: Annotated[NotRequired[float], "by which the tool is turned at wrist singularities, if it is"]
     approach: Annotated[NotRequired[Approach], "absent where the arm stands at the path's start"]
     clearance: Annotated[NotRequired[PathClearance], "where there are keep-outs"]

@@ -348,6 +348,8 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
             lines[0] += f", {found['segments']} segments"
         if "approach" in found:
             lines.append(f"  before it {found['approach']['duration_s']:.3f} s from where the arm stands to its start")
+    if plan.held:
+        lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in found['held'].items())}")
     for run in found["runs"]:
         names = ", then ".join(
             f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
