@@ -46,8 +46,8 @@ MAY_IMPORT: dict[str, str] = {
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
     "motion": "keep_out keep_out/shapes"
-    " errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers inverse motors"
-    " path_file",
+    " errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers inverse/solvers"
+    " inverse motors path_file",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
     " inverse inverse/answers inverse/solvers inverse/tasks motion path_file",
     "export": "errors formula robot_file model forward inverse/tasks view",

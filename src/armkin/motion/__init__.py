@@ -1,6 +1,7 @@
 """Waypoints and paths to a trajectory: joint values over time.
 
-The way of a path (`path.py`, `armkin.path`; `walk.py` goes through its moves, `moves.py` says what each kind does):
+The way of a path (`path.py`, `armkin.path`, which asks `planned.py`, of arms with a redundant joint `redundant.py`;
+`walk.py` goes through its moves, `moves.py` says what each kind does):
 
 path_numbers.py     the moves of a path file, in degrees, as joint values and targets
 placing.py          where a drawing stands, and how the tool is held on it

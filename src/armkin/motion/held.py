@@ -15,9 +15,9 @@ from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.free import checked
-from armkin.motion.path import path
 from armkin.motion.path_plan import PathPlan
 from armkin.motion.plan import approach, check_jerk, check_rates, straight
+from armkin.motion.planned import planned
 from armkin.motion.time_optimal import Knots
 from armkin.motion.trajectory import Straight, Stretch
 
@@ -52,7 +52,7 @@ def path_held(
         name: np.asarray(value)[kept] for name, value in (("near", near), ("jerk", jerk)) if value is not None
     }
     try:
-        plan = path(free, moves, start=here[kept], **parts, **options)
+        plan = planned(free, moves, start=here[kept], **parts, **options)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)
