@@ -91,7 +91,7 @@ def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Bool]:
     T = forward(arm, q)
     plan = method.prepare(*arm)
     assert plan.complete
-    found, doubtful, *_ = method.solve(plan, T)
+    found, near_singular, *_ = method.solve(plan, T)
     lost = miss(arm, q, found) > within
     assert not lost.any(), f"{lost.sum()} of {len(q)} lost, the first: {q[lost][0]}"
     assert pose_residual(arm, found, T) < 1e-10
@@ -104,13 +104,13 @@ def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Bool]:
         assert np.isnan(branches[len(rows) :]).all()
         apart = distance(arm, rows[:, None], rows[None]) + np.eye(len(rows))
         assert apart.min(initial=1.0) > 1e-7
-    return found, doubtful
+    return found, near_singular
 
 
 @pytest.mark.parametrize("name", [name for name in ARMS if name not in ("PUMA", "STANFORD")])
 def test_generating_joints_are_among_the_branches(name: str) -> None:
-    _, doubtful = check(ARMS[name], random_joints(ARMS[name], 300, 1))
-    assert doubtful.mean() < 0.05
+    _, near_singular = check(ARMS[name], random_joints(ARMS[name], 300, 1))
+    assert near_singular.mean() < 0.05
 
 
 @pytest.mark.parametrize("name", ["PUMA", "STANFORD"])
@@ -237,12 +237,12 @@ def test_near_singular_poses(name: str, nearness: float) -> None:
     arm = ARMS[name]
     q = singular_joints(arm, 25)
     q[:, 4] += nearness
-    found, doubtful = solve(arm, forward(arm, q))
+    found, near_singular = solve(arm, forward(arm, q))
     # The two may be told apart down to 2e-6; below, one answer between them is as good as the pose tells.
     assert miss(arm, q, found).max() < max(1e-6, 3e-7 if nearness > 1e-6 else 3e-6)
     assert (~np.isnan(found[..., 0])).sum(axis=1).max() <= 16
     if nearness < 1e-4:
-        assert doubtful.all()
+        assert near_singular.all()
 
 
 def singular_joints(arm: Arm, count: int) -> Array:
@@ -267,9 +267,9 @@ def singular_joints(arm: Arm, count: int) -> Array:
 def test_double_root_on_the_singularity_is_one_answer() -> None:
     arm = ARMS["JACO"]
     q = singular_joints(arm, 20)
-    found, doubtful = solve(arm, forward(arm, q))
+    found, near_singular = solve(arm, forward(arm, q))
     assert miss(arm, q, found).max() < 1e-4  # a double root: the square root of rounding
-    assert doubtful.all()
+    assert near_singular.all()
     for branches, generating in zip(found, q, strict=True):
         assert (distance(arm, branches, generating) < 1e-3).sum() == 1
 
@@ -287,9 +287,9 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
     for way in (1e-10, -1e-10):
         beyond = T.copy()
         beyond[:, :3, 3] += way * 1000 * left[:, :3, 5]
-        found, doubtful, *_ = method.solve(plan, beyond)
+        found, near_singular, *_ = method.solve(plan, beyond)
         assert (~np.isnan(found[..., 0])).sum(axis=1).min() >= 1
-        assert doubtful.all()
+        assert near_singular.all()
         assert pose_residual(arm, found, beyond) < 1e-9
         beyond[:, :3, 3] += 1e5 * way * 1000 * left[:, :3, 5]  # and 1e-5 m: inside two answers, outside none
         found, _, *_ = method.solve(plan, beyond)
@@ -302,16 +302,16 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
 def test_no_targets_unreachable_targets_and_targets_that_are_no_numbers() -> None:
     arm = ARMS["JACO"]
     plan = method.prepare(*arm)
-    found, doubtful, *_ = method.solve(plan, np.empty((0, 4, 4)))
+    found, near_singular, *_ = method.solve(plan, np.empty((0, 4, 4)))
     assert found.shape == (0, 0, 6)
-    assert doubtful.shape == (0,)
+    assert near_singular.shape == (0,)
     T = forward(arm, random_joints(arm, 3, 14))
     alone, _, *_ = method.solve(plan, T[2:])
     T[0, 0, 3] += 1e4
     T[1, 1, 1] = np.nan
-    found, doubtful, *_ = method.solve(plan, T)
+    found, near_singular, *_ = method.solve(plan, T)
     assert np.isnan(found[:2]).all()
-    assert not doubtful[:2].any()
+    assert not near_singular[:2].any()
     np.testing.assert_allclose(found[2], alone[0], atol=1e-11)
 
 
@@ -321,10 +321,10 @@ def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPat
     T = forward(arm, random_joints(arm, 600, 15))
     whole, doubt, *_ = method.solve(plan, T)
     monkeypatch.setattr(method, "BLOCK", 512)
-    together, doubtful, *_ = method.solve(plan, T)
+    together, near_singular, *_ = method.solve(plan, T)
     np.testing.assert_array_equal(np.isnan(together), np.isnan(whole))
     np.testing.assert_allclose(together, whole, atol=1e-9)
-    np.testing.assert_array_equal(doubtful, doubt)
+    np.testing.assert_array_equal(near_singular, doubt)
     together, _, *_ = method.solve(plan, T)
     for i in (0, 255, 256, 599):
         alone, _, *_ = method.solve(plan, T[i : i + 1])
@@ -351,9 +351,9 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     arm = dh([0, 90, 90, 60, 60, 0], [0, 300, 0, 50, 0, 0], [100, 50, 20, 250, 80, 100], [0.0] * 6)
     plan = method.prepare(*arm)
     assert not plan.complete
-    found, doubtful, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
+    found, near_singular, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
     assert found.shape[1] <= 16
-    assert doubtful[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
+    assert near_singular[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
 
 
 def test_answers_of_equal_keys_are_not_taken_for_one() -> None:

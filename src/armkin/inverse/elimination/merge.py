@@ -94,7 +94,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         target = np.ascontiguousarray(np.moveaxis(goal[pose[first], :3], 0, -1))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(HALFWAY, 4 * np.maximum(residual[first], residual[second]))
-        # How far off an answer may be itself: its next Newton step, along a valley that may well be curved.
+        # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
         same = (distance < np.maximum(ALIKE, reach)) | (halfway < blur)
@@ -105,21 +105,21 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
 
 
 def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
-    """Answers, poses ascending, as (N, B, 6) with NaN past a pose's last one; and the doubtful poses (N,).
+    """Answers, poses ascending, as (N, B, 6) with NaN past a pose's last one; and which poses are near singular (N,).
 
-    Doubtful are poses with an answer near a singularity or with more answers than can be isolated; of
+    Near singular are poses with an answer near a singularity or with more answers than can be isolated; of
     these the 16 furthest from singularities are given.
     """
     number = np.bincount(answers.pose, minlength=count)
-    doubtful = number > MOST
-    doubtful[answers.pose[answers.weakness > ILL]] = True
+    near_singular = number > MOST
+    near_singular[answers.pose[answers.weakness > ILL]] = True
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = _column(number)
         answers, number = answers.take(rank < MOST), np.minimum(number, MOST)
     q = np.full((count, int(number.max(initial=0)), 6), np.nan)
     q[answers.pose, _column(number)] = answers.q
-    return q, doubtful
+    return q, near_singular
 
 
 def best(answers: Answers, count: int, most: int) -> Array:

@@ -31,7 +31,7 @@ longer.  This goes on until a pass shows none of these, or nine are done; all pa
 goes when the pose is moved, so that of a pose settled by none of the first four passes nothing is claimed.
 Hence every isolated solution whose Jacobian's smallest singular value is above about 1e-7 (lengths scaled by
 the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
-self-motion is a curve of solutions of which only some points are given: such poses are reported as doubtful.
+self-motion is a curve of solutions of which only some points are given: such poses are reported as near singular.
 
 Three prismatic joints leave the orientation to the three others: `slides`, in closed form.
 """
@@ -82,7 +82,7 @@ class Branches(NamedTuple):
     """What `solve` returns; see there."""
 
     q: Array
-    doubtful: Bool
+    near_singular: Bool
     settled: Bool
     shaken: Bool
     guesses: Array
@@ -98,7 +98,7 @@ def solve(elimination: Elimination, T: Array) -> Branches:
     Returns:
         q: (N, B, 6) [rad in (-pi, pi] | mm], sorted by a fixed projection, NaN past a target's last branch;
         B is the largest number of branches, at most 16.
-        doubtful: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
+        near_singular: (N,), targets with an answer near a singularity (|J^-1| > 1e4, lengths scaled), with
         answers that were merged across more than rounding, or with two roots that just touch or just miss.
         settled: (N,), targets of which some pass showed none of the signs of (v): every isolated branch is listed.
         shaken: (N,), targets of which no pass that left them where they are did: a singular posture may be missing.
@@ -107,13 +107,13 @@ def solve(elimination: Elimination, T: Array) -> Branches:
     count = T.shape[0]
     parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
     q = np.full((count, max((part.q.shape[1] for part in parts), default=0), 6), np.nan)
-    doubtful, settled, shaken = np.zeros((3, count), dtype=np.bool_)
+    near_singular, settled, shaken = np.zeros((3, count), dtype=np.bool_)
     guesses = np.full((count, max((part.guesses.shape[1] for part in parts), default=0), 6), np.nan)
     for number, part in enumerate(parts):
-        rows = slice(number * BLOCK, number * BLOCK + len(part.doubtful))
-        q[rows, : part.q.shape[1]], doubtful[rows], settled[rows], shaken[rows] = part[:4]
+        rows = slice(number * BLOCK, number * BLOCK + len(part.near_singular))
+        q[rows, : part.q.shape[1]], near_singular[rows], settled[rows], shaken[rows] = part[:4]
         guesses[rows, : part.guesses.shape[1]] = part.guesses
-    return Branches(q, doubtful, settled, shaken, guesses)
+    return Branches(q, near_singular, settled, shaken, guesses)
 
 
 def _solve_block(elimination: Elimination, T: Array) -> Branches:

@@ -48,7 +48,7 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
     else:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
-    # In later passes also what is nearly an answer, at a double root: such poses are said to be doubtful.
+    # In later passes also what is nearly an answer, at a double root: such poses are said to be near singular.
     good = done.residual < (10 * GRAZING if careful else ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.

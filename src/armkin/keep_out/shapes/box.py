@@ -26,7 +26,7 @@ class Box:
     def distance(self, a: Array, b: Array) -> Array:
         """Least signed distance over segments: a, b (3, ...) -> (...).
 
-        The signed distance to a box is a convex function, so along a segment it has one valley. Outside, its
+        The signed distance to a box is a convex function, so along a segment it has one minimum. Outside, its
         square is a sum of (|p| - h)^2 over the axes on which the point is beyond: the derivative is linear between
         the places where the segment crosses the six planes of the faces. Inside, it is the greatest of six linear
         functions, which is least at an end or where two of them meet.
