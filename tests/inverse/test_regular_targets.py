@@ -43,7 +43,7 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monk
         decided.append(len(q))
         none = np.zeros(len(q), bool)
         branch = np.zeros(q.shape[:2], bool)
-        return regular_targets.Regular(none, branch, none, np.zeros((len(q), q.shape[2]), bool), q, none, branch)
+        return regular_targets.Regular(none, branch, none, np.zeros((len(q), q.shape[2]), bool), q, none, branch, none)
 
     monkeypatch.setattr(regular_targets, "settle", nothing)
     _, one_by_one = nearly_singular(name, least, most)

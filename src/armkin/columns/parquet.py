@@ -37,7 +37,9 @@ def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     for part in parts():
         table = pa.ipc.open_stream(part.read()).read_all()
         if writer is None:
-            writer = pa.parquet.ParquetWriter(file, table.schema)
+            words = [field.name for field in table.schema if pa.types.is_string(field.type)]
+            # a dictionary of numbers of which no two are equal takes time and room
+            writer = pa.parquet.ParquetWriter(file, table.schema, use_dictionary=words)
         writer.write_table(table)
     if writer is not None:
         writer.close()

@@ -109,7 +109,7 @@ class Recorded:
         linkage = np.asarray(known.any(axis=1))
         # what else does not depend on the free joint is known already
         kept = np.where(linkage[:, None, None], kept & known[:, None], miss < HOPELESS**2)
-        more = [np.where((kept & lost[:, None, None])[..., None], q, np.nan).reshape(len(q), -1, self.arm.n)]
+        more = [_each_once(np.where((kept & lost[:, None, None])[..., None], q, np.nan))]
         on = np.where((miss < SEED**2)[..., None], q, np.nan)
         meeting = crossings.beside(self.arm, self.task, on, target)
         with np.errstate(invalid="ignore"):
@@ -170,7 +170,7 @@ class Recorded:
         for k in range(FREED, len(offsets)):
             goals[:, k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
         q, miss = self._at(goals, near[:, None] + offsets)
-        return np.where((miss < HOPELESS**2)[..., None], q, np.nan).reshape(len(target), -1, n)
+        return _each_once(np.where((miss < HOPELESS**2)[..., None], q, np.nan))
 
     def _at(self, goals: Array, values: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) of targets (N, S, ...) with values (N, S, n) for free joints; squared residuals."""
@@ -178,6 +178,14 @@ class Recorded:
         rows = self.with_values(goals.reshape(-1, *goals.shape[2:]), values.reshape(-1, self.arm.n))
         rows = rows.reshape(N, S, *rows.shape[1:])
         return rows[..., :-1], rows[..., -1]
+
+
+def _each_once(q: Array) -> Array:
+    """Candidates (N, S, B, n) as (N, S B, n), those that repeat their branch's first one nan: where no joint is free,
+    other values for it change nothing."""
+    q = q.copy()
+    q[:, 1:][(q[:, 1:] == q[:, :1]).all(axis=3)] = np.nan
+    return q.reshape(len(q), -1, q.shape[3])
 
 
 def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:

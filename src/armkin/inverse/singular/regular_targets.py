@@ -62,6 +62,7 @@ class Regular(NamedTuple):
     q: Array
     changed: Bool
     firm: Bool
+    beyond: Bool
 
 
 class Folds(NamedTuple):
@@ -164,7 +165,7 @@ class _Weak(NamedTuple):
 
     open: (K,) one may lie on a self-motion that others share, or may yet become a branch. moving, edge: (K, B) it lies
     on a self-motion manifold, or is a boundary. joints: (K, B, n) those that the manifold moves.
-    same: (K, B, B) candidates on one's component.
+    same: (K, B, B) candidates on one's component. beyond: (K,) one lies beyond a fold.
     """
 
     open: Bool
@@ -172,6 +173,7 @@ class _Weak(NamedTuple):
     edge: Bool
     joints: Bool
     same: Bool
+    beyond: Bool
 
 
 def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
@@ -216,7 +218,7 @@ def settle(goals: Goals, q: Array, valid: Bool) -> Regular:
         known[row] = self_motions.distinct(arm, task, q[row], weak.joints[row], target[row])
     branch = valid & ~one.any(axis=1)  # the first of two stays
     double, free = either.any(axis=(1, 2)) | (branch & weak.edge).any(axis=1), weak.joints.any(axis=1)
-    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed, sigma >= FOLDED)
+    return Regular(known, branch, np.asarray(double), np.asarray(free), q, changed, sigma >= FOLDED, weak.beyond)
 
 
 def _corrected(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Array) -> tuple[Array, Bool, Bool]:
@@ -266,6 +268,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
         np.zeros((K, B), bool),
         np.zeros((K, B, n), bool),
         np.zeros((K, B, B), bool),
+        np.zeros(K, bool),
     )
     if not len(k):
         return sigma, found
@@ -282,6 +285,7 @@ def _weak(arm: Arm, task: Task, q: Array, valid: Bool, at: _Slopes, target: Arra
     beyond &= (fold.lost * fold.bend > 0) & (np.abs(fold.lost) > 10 * SOLUTION)
     beyond &= (fold.rest < NEARBY_STEP) & (100 * fold.rest**2 < np.abs(fold.lost))
     found.open[k[~own & ~beyond]] = True
+    found.beyond[k[~own & beyond]] = True
     own &= ~found.open[k]
     several = own & (S[:, -2] < WEAK)
     two = np.flatnonzero(several)
