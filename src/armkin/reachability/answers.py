@@ -2,8 +2,9 @@
 
 One solve stands for many poses. Turning a target about joint 1's axis adds to joint 1 alone, and turning it about the
 tool's z axis adds to the last joint alone where that joint's axis is the tool's z: within real limits each branch of
-one solve is legal on an arc of azimuths and on an arc of rolls. An arc is kept as its first index and its length, and
-as a word of bits, one a roll; the union of the branches' arcs is a few operations on words. Where the axes do not allow
+one solve is legal on an arc of azimuths and on an arc of rolls. An arc is kept as its first index and its length; one
+of rolls as a word of bits, too, a bit a roll, and the union of the branches' rolls is a few operations on words. It
+changes only at azimuths where some branch's arc begins or ends, and is asked there alone. Where the axes do not allow
 it, and for targets on an edge, poses are solved one by one, and the same words are filled in from them. Of an arm with
 one joint more than its task a branch is a legal interval of a family, and measures are those of its listed posture.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,11 +76,14 @@ class Question:
         return (1 if self.arcs else g.azimuths) * g.directions_count * (1 if self.roll_arcs else g.rolls_count)
 
     @cached_property
-    def arc_words(self) -> tuple[Words, Words]:
-        """Bits of an arc by length and first index: rolls (L + 1, L, W), azimuths as whole words (M + 1, M, M)."""
-        L = self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1
-        M = self.grid.azimuths if self.arcs and not self.round_azimuths else 1
-        return _packed(_arcs(L)), np.where(_arcs(M), ~np.uint64(0), np.uint64(0))
+    def roll_words(self) -> Words:
+        """Bits of an arc of rolls by length and first index: (L + 1, L, W)."""
+        return _packed(_arcs(self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1))
+
+    @property
+    def turns(self) -> int:
+        """Azimuths that are told apart: M of them where joint 1's turn is an arc."""
+        return self.grid.azimuths if self.arcs and not self.round_azimuths else 1
 
 
 def answered(question: Question, rings: Array) -> dict[str, Array]:
@@ -101,6 +105,13 @@ def answered(question: Question, rings: Array) -> dict[str, Array]:
     return {name: values.reshape(cells) for name, values in found.items()}
 
 
+class _Edges(NamedTuple):
+    """Solves (K,) on an edge and what is counted of them, azimuth by azimuth, by name: (K, M)."""
+
+    rows: NDArray[np.intp]
+    counts: dict[str, Array]
+
+
 class _Answers:
     """The answers of S solves, each for M azimuths and W words of rolls (both 1 where they are no arcs)."""
 
@@ -111,72 +122,92 @@ class _Answers:
         self.s, self.valid = s, s.valid
         self.count = self.grid.rolls_count if question.roll_arcs else 1
         legal = s.within_limits & s.clear if self.arm.keep_out else s.within_limits
-        rolls, turns = question.arc_words
-        S, B = s.valid.shape
+        self.rolls: Words = np.full((*s.valid.shape, 1), np.uint64(1))
+        self.first: NDArray[Any] = np.zeros(s.valid.shape, np.intp)  # (S, B) of azimuths
+        self.length: NDArray[Any] = legal.astype(np.intp)
         if question.arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
             inner = s.valid & inside(self.arm, s.q, range(1, last))
-            first, length = arc(self.arm, s.q[:, :, 0], 0, turns.shape[1], 1)
-            self.azimuths = turns[np.where(inner, length, 0), first]  # (S, B, M)
-            self.rolls = np.full((S, B, 1), np.uint64(1))
+            self.first, length = arc(self.arm, s.q[:, :, 0], 0, question.turns, 1)
+            self.length = np.where(inner, length, 0)
             if question.roll_arcs:
+                rolls = question.roll_words
                 sense = 1 if self.arm.link[-1][2, 2] > 0 else -1
                 first, length = arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
                 self.rolls = rolls[length, first]
-        else:
-            self.azimuths = np.where(legal, ~np.uint64(0), np.uint64(0))[:, :, None]
-            self.rolls = np.full((S, B, 1), np.uint64(1))
 
     def columns(self, orientations: int) -> dict[str, Array]:
         """Columns (R * M,), so many solves a ring (or a cell)."""
-        once, twice, branches = self._united()
-        weight = self.count if self.question.round_rolls else 1
-        anywhere = np.broadcast_to(np.any(self.valid, axis=1, keepdims=True) * self.count, branches.shape)
-        each = [weight * _bits(once), weight * _bits(once & ~twice), weight * branches, anywhere]
-        each = self._edges([values.astype(float) for values in each])
         M = self.grid.azimuths if self.question.arcs else 1
-        reached, single, legal, there = (self._summed(values, orientations, M) for values in each)
-        total = orientations * self.count
+        counts, edges = self._counts(), self._edges(M)
+        for values in counts.values():
+            values[edges.rows] = 0.0
+        sums = {name: self._summed(values, orientations, M) for name, values in counts.items()}
+        ring = edges.rows // orientations
+        for name, values in edges.counts.items():
+            np.add.at(sums[name], ring, values)
+        reached, total = sums["reached"], orientations * self.count
         with np.errstate(divide="ignore", invalid="ignore"):
-            mean = legal / reached  # nan where none is reached: a mean of nothing
-        columns = {"share": reached / total, "share_any": there / total, "branches": mean, "single": single / total}
+            mean = sums["legal"] / reached  # nan where none is reached: a mean of nothing
+        shares = {"share": reached, "share_any": sums["anywhere"], "branches": mean, "single": sums["single"]}
+        columns = {name: values if name == "branches" else values / total for name, values in shares.items()}
         if self.question.measures:
             columns |= self._measures(orientations, M)
         return columns
 
-    @staticmethod
-    def _summed(values: Array, orientations: int, M: int) -> Array:
-        """Sums over the solves of a cell: (S, M or 1) -> (R, M)."""
-        sums = values.reshape(-1, orientations, values.shape[1]).sum(axis=1)
-        return np.asarray(np.broadcast_to(sums, (len(sums), M)))
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Azimuths (S, P), in order, at which a branch's arc begins or ends: what is legal changes nowhere else."""
+        if self.question.turns == 1:
+            return np.zeros((len(self.first), 1), np.intp)
+        ends = (self.first + self.length) % self.question.turns
+        return np.sort(np.concatenate([self.first, ends], axis=1), axis=1)
 
-    def _united(self) -> tuple[Words, Words, Array]:
-        """Rolls that at least one and at least two branches reach (S, M, W), and how many (branch, roll) there are."""
-        S, B, M = self.azimuths.shape
-        W = self.rolls.shape[2]
-        once, twice = np.zeros((S, M, W), np.uint64), np.zeros((S, M, W), np.uint64)
-        for b in range(B):
-            one = self.azimuths[:, b, :, None] & self.rolls[:, b, None, :]
+    def _counts(self) -> dict[str, Array]:
+        """(S, P): rolls that at least one branch reaches and that exactly one does, and (branch, roll) there are, at
+        `places`; (S, 1): rolls of solves that have a branch at all."""
+        weight = float(self.count if self.question.round_rolls else 1)
+        S, P = self.places.shape
+        once: Words = np.zeros((S, P, self.rolls.shape[-1]), np.uint64)
+        twice: Words = np.zeros_like(once)
+        legal = np.zeros((S, P))
+        each = _bits(self.rolls)
+        for b in range(self.first.shape[1]):
+            after = self.places - self.first[:, b, None]
+            after += (after < 0) * self.question.turns
+            on = after < self.length[:, b, None]
+            legal += on * each[:, b, None]
+            one = -on.astype(np.int64).view(np.uint64)[:, :, None] & self.rolls[:, b, None, :]
             twice |= once & one
             once |= one
-        counts = _bits(self.rolls).astype(float)
-        branches = ((self.azimuths != 0) * counts[:, :, None]).sum(axis=1)
-        return once, twice, branches
+        anywhere = np.any(self.valid, axis=1, keepdims=True) * float(self.count)
+        found = {"reached": weight * _bits(once), "single": weight * _bits(once & ~twice), "legal": weight * legal}
+        return found | {"anywhere": anywhere}
 
-    def _edges(self, each: list[Array]) -> list[Array]:
+    def _summed(self, values: Array, orientations: int, M: int) -> Array:
+        """Sums over the solves of a cell: (S, P), each from its place to the next one, or (S, 1) -> (R, M)."""
+        R = len(values) // orientations
+        if values.shape[1] == 1:
+            sums = values.reshape(R, orientations).sum(axis=1, keepdims=True)
+            return np.broadcast_to(sums, (R, M)).copy()
+        step = values - np.roll(values, 1, axis=1)
+        ring = np.arange(len(values)) // orientations * M
+        steps = np.bincount((ring[:, None] + self.places).ravel(), step.ravel(), R * M).reshape(R, M)
+        steps[:, 0] += values[:, -1].reshape(R, orientations).sum(axis=1)  # the last place's goes on through 0
+        return np.asarray(steps.cumsum(axis=1))
+
+    def _edges(self, M: int) -> _Edges:
         """Targets on an edge by arcs: merging branches, free joints. All their poses are asked."""
-        if not self.question.arcs:
-            return each
-        M, L = self.grid.azimuths, self.count
-        rows = np.flatnonzero((self.s.status == Status.BOUNDARY) | (self.s.status == Status.SINGULAR))
-        if len(rows):
-            each = [np.broadcast_to(values, (len(values), M)).copy() for values in each]
-        for row in rows.tolist():
+        rows = np.zeros(0, np.intp)
+        if self.question.arcs:
+            rows = np.flatnonzero((self.s.status == Status.BOUNDARY) | (self.s.status == Status.SINGULAR))
+        counts = {name: np.zeros((len(rows), M)) for name in ("reached", "single", "legal", "anywhere")}
+        for k, row in enumerate(rows.tolist()):
             s = self._asked(row)
             legal = s.within_limits.sum(axis=1)
-            for values, found in zip(each, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
-                values[row] = found.reshape(M, L).sum(axis=1)
-        return each
+            for name, found in zip(counts, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
+                counts[name][k] = found.reshape(M, self.count).sum(axis=1)
+        return _Edges(rows, counts)
 
     def _asked(self, row: int) -> Solutions:
         """All poses of one solve, azimuth by azimuth."""
@@ -192,7 +223,9 @@ class _Answers:
 
     def _measures(self, orientations: int, M: int) -> dict[str, Array]:
         """Best manipulability and limit margin, least step error over legal answers; nan where there is none."""
-        legal = (self.azimuths != 0) & np.asarray(np.any(self.rolls != 0, axis=2, keepdims=True))  # (S, B, M or 1)
+        after = (np.arange(self.question.turns) - self.first[:, :, None]) % self.question.turns
+        rolls = np.asarray(np.any(self.rolls != 0, axis=2, keepdims=True))
+        legal = (after < self.length[:, :, None]) & rolls  # (S, B, M or 1)
         some: Bool = np.asarray(legal.any(axis=2))
         q = self.s.q[some]
         found = {

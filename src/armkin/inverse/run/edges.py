@@ -55,7 +55,8 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
             continue
         rows = doubts.rows[part]
         found = regular_targets.settle(goals.of(rows), doubts.q[part], doubts.valid[part])
-        found.known[...] &= (found.branch.any(axis=1) | found.beyond) & (newton.missing(arm, task, near[rows], target[rows]) > SOLUTION)
+        found.known[...] &= found.branch.any(axis=1) | found.beyond
+        found.known[...] &= newton.missing(arm, task, near[rows], target[rows]) > SOLUTION
         left[part] = ~found.known
         moving = np.asarray(found.free.any(axis=1))
         new = np.flatnonzero(found.known & (found.double | found.changed | moving))
