@@ -12,6 +12,7 @@ singular/     what a solution is: isolated, boundary or self-motion manifold
 solvers/      which class an arm belongs to
 run/          how targets go through: one alone, chunks of a batch, threads
 held.py        joints that are held: the arm of the others, and its targets
+followed.py    answers of the other joints along the redundant one
 families.py    one joint more than the target asks for: intervals of the redundant joint
 position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes
 solve.py      `ik`

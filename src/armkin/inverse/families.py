@@ -9,7 +9,6 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,12 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.tracking import follow
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.followed import Follower, Ik, Postures
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
-from armkin.inverse.tasks.task import read_near, read_targets
+from armkin.inverse.tasks.task import distance, read_near, read_targets
 from armkin.keep_out.clearance import clear
 from armkin.model import units
 from armkin.model.arm import actual
@@ -32,97 +30,12 @@ if TYPE_CHECKING:
 
 AT_ONCE = 24_000  # targets of the other joints solved together
 FINER = 24  # times as many values where none had an answer
-HALVINGS = 34  # of half a degree: 3e-11 degrees
-GOLDEN = 44  # steps to the posture nearest to `near`
+HALVINGS = 24  # of half a degree: 3e-8 degrees
+GOLDEN = 34  # steps to the posture nearest to `near`
 FREE = np.deg2rad(0.1)  # [rad] and reaches / 573: step between postures that are asked whether they are free
-Ik = Callable[..., Solutions]
 
 
-class _Postures(NamedTuple):
-    """Answers at values of the redundant joint: q (..., B, n), whether they are there and within limits (..., B)."""
-
-    q: Array
-    valid: Bool
-    legal: Bool
-
-
-class _Follower(NamedTuple):
-    """Answers of some targets (N, ...) at any value of the redundant joint; near: (N, n)."""
-
-    ik: Ik
-    arm: Arm
-    free: Redundancy
-    target: Array
-    near: Array
-
-    @property
-    def labelled(self) -> bool:
-        """Whether a branch keeps its index along the turn, as that of a closed form does."""
-        return self.free.geometry.ordered and self.free.geometry.pairs is not None
-
-    def at(self, rows: NDArray[np.intp], t: Array) -> _Postures:
-        """All branches of targets (M,) at values t (M,), each in the column of its index."""
-        return self._legal(rows, self._found(rows, t))
-
-    def _found(self, rows: NDArray[np.intp], t: Array) -> Array:
-        """Branches (M, B, n), nan where there is none."""
-        goal = moved(self.arm, self.free, self.target[rows], t)
-        s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
-        M, B, r = len(t), s.q.shape[1], self.free.joint
-        number = s.branch if self.labelled else np.where(s.valid, np.arange(B), -1)
-        out = np.full((M, B + 1, self.arm.n), np.nan)
-        place = np.arange(M)[:, None], np.where(number < 0, B, number)
-        out[*place, :r], out[*place, r], out[*place, r + 1 :] = s.q[:, :, :r], t[:, None], s.q[:, :, r:]
-        return out[:, :B]
-
-    def _legal(self, rows: NDArray[np.intp], q: Array) -> _Postures:
-        """Postures (M, B, n) at their nearest legal copies."""
-        valid = ~np.isnan(q[:, :, 0])
-        q, legal = nearest_row(self.arm, np.where(valid[:, :, None], q, 0.0), self.near[rows][:, None])
-        q[~valid] = np.nan
-        return _Postures(q, valid, legal & valid)
-
-    def along(self, t: Array) -> _Postures:
-        """Of every target at all of t (K,), linked along it: q (N, K, B, n)."""
-        N, K = len(self.target), len(t)
-        found = self.at(np.repeat(np.arange(N), K), np.tile(t, N))
-        B = found.valid.shape[1]
-        q, valid, legal = found.q.reshape(N, K, B, -1), found.valid.reshape(N, K, B), found.legal.reshape(N, K, B)
-        if self.labelled:
-            return _Postures(q, valid, legal)
-        kept = [i for i in range(self.arm.n) if i != self.free.joint]
-        for k in range(N):
-            goal = moved(self.arm, self.free, np.repeat(self.target[k : k + 1], K, axis=0), t)
-            number = follow(self.free.rest, self.free.task, q[k][:, :, kept], goal)
-            q[k] = _in_columns(q[k], number)
-            legal[k] = _in_columns(legal[k][:, :, None].astype(float), number)[:, :, 0] == 1.0
-        return _Postures(q, ~np.isnan(q[..., 0]), legal)
-
-    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array, like: Array) -> _Postures:
-        """One branch each (M,): that of its index, or, of an elimination, the one nearest to postures like (M, n)."""
-        q, each = self._found(rows, t), np.arange(len(rows))
-        if not self.labelled:
-            apart = np.abs(np.remainder(q - like[:, None] + np.pi, 2 * np.pi) - np.pi).max(axis=2)
-            apart = np.where(apart < 0.5, apart, np.inf)
-            branch = apart.argmin(axis=1)
-            q[np.isinf(apart)] = np.nan
-        one = self._legal(rows, q[each, branch][:, None])
-        return _Postures(one.q[:, 0], one.valid[:, 0], one.legal[:, 0])
-
-    def motion(self, rows: NDArray[np.intp], q: Array) -> Array:
-        """Sum of |change| from near [deg | mm]: q (M, ..., n) -> (M, ...); inf where there is no posture."""
-        unit = np.where(self.arm.prismatic, 1.0, 180 / np.pi)
-        near = self.near[rows].reshape(len(rows), *[1] * (q.ndim - 2), -1)
-        total = (np.abs(q - near) * unit).sum(axis=-1)
-        return np.where(np.isnan(total), np.inf, total)
-
-
-def _in_columns(q: Array, number: NDArray[np.integer]) -> Array:
-    """Rows (M, B, n) in the columns of their numbers (M, B), nan where there is none; -1: left away."""
-    M, B, n = q.shape
-    out = np.full((M, B + 1, n), np.nan)
-    out[np.arange(M)[:, None], np.where(number < 0, B, number)] = q
-    return out[:, :B]
+_Place = tuple[bool, int, int, int]  # legal, target, branch, sample
 
 
 class _Pieces(NamedTuple):
@@ -136,48 +49,57 @@ class _Pieces(NamedTuple):
     start: Array  # (P, n) the posture of some sample inside, the nearest to near
     at: Array  # (P,) its value of the redundant joint
 
+    def of(self, some: Bool) -> _Pieces:
+        """Some of them."""
+        row, branch, a, b, legal, start, at = self
+        return _Pieces(row[some], branch[some], a[some], b[some], legal[some], start[some], at[some])
 
-def _ends(find: _Follower, t: Array, found: _Postures, good: Bool, legal: bool) -> dict[tuple[int, int, int], float]:
-    """Where good (N, K, B) changes between samples k and k + 1: (target, branch, k) -> value of the joint."""
+
+def _ends(
+    find: Follower, t: Array, found: Postures, kinds: dict[bool, Bool]
+) -> dict[tuple[bool, int, int, int], float]:
+    """Where good (N, K, B) changes between samples k and k + 1: where -> value of the joint.
+
+    kinds: for legal postures and for those that are there which samples are good.
+    """
     h = t[1] - t[0]
-    after = np.roll(good, -1, axis=1)
-    row, k, branch = np.nonzero(good != after)
-    inside, low = good[row, k, branch], t[k]
+    places = [(legal, good, np.nonzero(good != np.roll(good, -1, axis=1))) for legal, good in kinds.items()]
+    row, k, branch = (np.concatenate([place[i] for *_, place in places]) for i in range(3))
+    inside = np.concatenate([good[place] for _, good, place in places])
+    of_legal = np.concatenate([np.full(len(place[0]), legal) for legal, _, place in places])
+    low = t[k]
     lo, hi = np.where(inside, low, low + h), np.where(inside, low + h, low)  # good at lo
     like = np.where(inside[:, None], found.q[row, k, branch], found.q[row, (k + 1) % len(t), branch])
-    for _ in range(HALVINGS):
-        if not len(row):
-            break
+    for _ in range(HALVINGS if len(row) else 0):
         middle = 0.5 * (lo + hi)
         there = find.one(row, branch, middle, like)
-        keep = there.legal if legal else there.valid
+        keep = np.where(of_legal, there.legal, there.valid)
         lo, hi = np.where(keep, middle, lo), np.where(keep, hi, middle)
         like = np.where(keep[:, None], there.q, like)
-    return dict(zip(zip(row.tolist(), branch.tolist(), k.tolist(), strict=True), lo.tolist(), strict=True))
+    keys = zip(of_legal.tolist(), row.tolist(), branch.tolist(), k.tolist(), strict=True)
+    return dict(zip(keys, lo.tolist(), strict=True))
 
 
-def _pieces(find: _Follower, t: Array, found: _Postures) -> _Pieces:
+def _pieces(find: Follower, t: Array, found: Postures) -> _Pieces:
     """All pieces of the curves of some targets."""
     K, h = len(t), float(t[1] - t[0])
     motion = find.motion(np.arange(len(find.target)), found.q)
-    rows = []
-    for legal, good in ((True, found.legal), (False, _families_without(found))):
-        ends = _ends(find, t, found, good, legal)
+    kinds = {True: found.legal, False: _families_without(found)}
+    ends, rows = _ends(find, t, found, kinds), []
+    costs = np.concatenate([motion, motion], axis=1).transpose(0, 2, 1).copy()  # a piece may pass the end of the turn
+    for legal, good in kinds.items():
         first = good & ~np.roll(good, 1, axis=1)
         first[:, 0] |= good.all(axis=1)
-        for row, k, branch in np.argwhere(first).tolist():
-            column = np.roll(good[row, :, branch], -k)
-            count = K if column.all() else int(column.argmin())
-            whole = count == K
-            place = (k + np.arange(count)) % K
-            at = int(motion[row, place, branch].argmin())
-            a, b = (
-                (-np.pi, np.pi) if whole else (ends[row, branch, (k - 1) % K], ends[row, branch, (k + count - 1) % K])
-            )
+        places = np.argwhere(first)
+        counts = _lengths(good)[tuple(places.T)].tolist()
+        for (row, k, branch), count in zip(places.tolist(), counts, strict=True):
+            at = int(costs[row, branch, k : k + count].argmin())
             inside = t[k] + at * h
-            a, b = inside - (inside - a) % (2 * np.pi), inside + (b - inside) % (2 * np.pi)
-            if whole:
+            if count == K:
                 a, b = -np.pi, np.pi
+            else:
+                a, b = ends[legal, row, branch, (k - 1) % K], ends[legal, row, branch, (k + count - 1) % K]
+                a, b = inside - (inside - a) % (2 * np.pi), inside + (b - inside) % (2 * np.pi)
             rows.append((row, branch, a, b, legal, found.q[row, (k + at) % K, branch], inside))
     if not rows:
         none = np.zeros(0)
@@ -185,7 +107,16 @@ def _pieces(find: _Follower, t: Array, found: _Postures) -> _Pieces:
     return _Pieces(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _families_without(found: _Postures) -> Bool:
+def _lengths(good: Bool) -> NDArray[np.intp]:
+    """How many samples of good (N, K, B) follow one another from each on, itself included, K at most."""
+    K = good.shape[1]
+    index = np.arange(2 * K)[:, None]
+    bad = np.where(np.concatenate([good, good], axis=1), 2 * K, index)
+    next_bad = np.minimum.accumulate(bad[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(np.minimum(next_bad - index, K)[:, :K])
+
+
+def _families_without(found: Postures) -> Bool:
     """Samples (N, K, B) of families that have no legal posture: pieces between places where a branch is not real."""
     valid = found.valid
     first = valid & ~np.roll(valid, 1, axis=1)
@@ -198,8 +129,15 @@ def _families_without(found: _Postures) -> Bool:
     return np.asarray(valid & ~legal[row, number, branch])
 
 
-def _nearest(find: _Follower, pieces: _Pieces, h: float) -> Array:
-    """The postures (P, n) of intervals that move the joints least: golden section around the best sample."""
+def _nearest(find: Follower, pieces: _Pieces, h: float) -> Array:
+    """The postures (P, n) of intervals that move the joints least: golden section around the best sample.
+
+    Of families without a legal posture it is that sample.
+    """
+    if not pieces.legal.all():
+        out, some = pieces.start.copy(), pieces.legal
+        out[some] = _nearest(find, pieces.of(some), h)
+        return out
     row, branch, like = pieces.row, pieces.branch, pieces.start
     whole = pieces.b - pieces.a >= 2 * np.pi
     low = np.where(whole, pieces.at - h, np.maximum(pieces.a, pieces.at - h))
@@ -208,7 +146,7 @@ def _nearest(find: _Follower, pieces: _Pieces, h: float) -> Array:
 
     def motion(t: Array) -> Array:
         there = find.one(row, branch, t, like)
-        cost = np.where(there.legal | ~pieces.legal & there.valid, find.motion(row, there.q), np.inf)
+        cost = np.where(there.legal, find.motion(row, there.q), np.inf)
         better = cost < least
         best[better], least[better] = there.q[better], cost[better]
         return cost
@@ -247,7 +185,7 @@ def families(
     assert turned is not None
     some = max(AT_ONCE // free.samples, 1)
     parts = [
-        _of_chunk(_Follower(ik, true, turned, goal[k : k + some], each[k : k + some] * arm.ratio))
+        _of_chunk(Follower(ik, true, turned, goal[k : k + some], each[k : k + some] * arm.ratio))
         for k in range(0, len(goal), some)
     ]
     B = max((part.q.shape[1] for part in parts), default=0)
@@ -308,20 +246,20 @@ def _wider(values: Array, B: int, none: float) -> Array:
     return out
 
 
-def _of_chunk(find: _Follower, finer: int = 1) -> _Rows:
+def _of_chunk(find: Follower, finer: int = 1) -> _Rows:
     """Of some targets; what has no answer is asked again alone: all of a nearly stretched arm's lie within a degree."""
     N, K = len(find.target), find.free.samples * finer
     t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
     found = find.along(t)
-    none = np.flatnonzero(~found.valid.any(axis=(1, 2)))
-    if finer == 1 and find.labelled and len(none) and N > 1:
-        parts = [_of_chunk(find._replace(target=find.target[[k]], near=find.near[[k]])) for k in none]
-        rest = np.setdiff1d(np.arange(N), none)
-        if len(rest):
-            parts.append(_of_chunk(find._replace(target=find.target[rest], near=find.near[rest])))
-        return _joined(parts, np.concatenate([none, rest]))
-    if finer == 1 and find.labelled and len(none):
-        return _of_chunk(find, FINER)
+    if finer == 1 and find.labelled:
+        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1 + 1e-9)
+        none = np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough)
+        if len(none):
+            parts = [_of_chunk(find._replace(target=find.target[[k]], near=find.near[[k]]), FINER) for k in none]
+            rest = np.setdiff1d(np.arange(N), none)
+            if len(rest):
+                parts.append(_of_chunk(find._replace(target=find.target[rest], near=find.near[rest])))
+            return _joined(parts, np.concatenate([none, rest]))
     pieces = _pieces(find, t, found)
     q = _nearest(find, pieces, float(t[1] - t[0])) if len(pieces.row) else pieces.start
     if not find.labelled and len(q):  # an elimination's answers near singular postures are less exact
@@ -347,7 +285,7 @@ def _of_chunk(find: _Follower, finer: int = 1) -> _Rows:
     return out
 
 
-def _all_short(find: _Follower, found: _Postures) -> Bool:
+def _all_short(find: Follower, found: Postures) -> Bool:
     """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
     if not find.labelled:  # the pieces of a linked branch say nothing of the whole curve
         return np.zeros(len(found.valid), bool)
@@ -363,7 +301,7 @@ def _all_short(find: _Follower, found: _Postures) -> Bool:
     return short
 
 
-def _free(find: _Follower, pieces: _Pieces, q: Array) -> Array:
+def _free(find: Follower, pieces: _Pieces, q: Array) -> Array:
     """The nearest postures of legal intervals that hit nothing, to `FREE`; where there is none, q as it is."""
     out = q.copy()
     for p in np.flatnonzero(pieces.legal & ~clear(find.arm, q)):

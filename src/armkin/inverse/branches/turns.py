@@ -131,8 +131,8 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     if (turned := actual(arm)) is not arm:
         rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)
         return rows / arm.ratio, legal
-    out = q.copy()
-    inside = np.ones(q.shape[:-1], bool)
+    out = q.copy(order="K")  # joint after joint, where q is
+    inside = np.ones_like(q[..., 0], bool)
     if not q.size:
         return out, inside
     for i in range(arm.n):
