@@ -44,7 +44,7 @@ def run(*command: str | Path, folder: Path) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("robot", [*CLOSED, *GENERAL])
+@pytest.mark.parametrize("robot", [*CLOSED, *GENERAL, "panda"])
 def test_the_test_program_passes_under_the_sanitizers(robot: str, tmp_path: Path) -> None:
     source = written(tmp_path, robot)
     run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
@@ -56,6 +56,24 @@ def test_single_precision_passes_its_test_program_too(robot: str, tmp_path: Path
     source = written(tmp_path, robot, single=True)
     run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
     assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+
+
+def test_of_seven_joints_the_redundant_one_is_held_where_near_has_it(tmp_path: Path) -> None:
+    arm = armkin.load("iiwa7")
+    exported = Exported(arm, tmp_path)
+    low, high = arm.lower, arm.upper
+    rng = np.random.default_rng(4)
+    for q, near in zip(rng.uniform(low, high, (60, 7)), rng.uniform(low, high, (60, 7)), strict=True):
+        near[6] = q[6] if near[0] > 0 else near[6]
+        target = armkin.fk(arm, q)
+        count, edge, found, _ = exported.ik(target, near)
+        held = {"J7": float(near[6])}
+        s = armkin.ik(armkin.lock(arm, held), target, near=near[:6])
+        own = armkin.unlock(arm, held, s.q[s.valid])
+        if not edge:
+            assert count == len(own)
+        if not edge and count:
+            assert np.abs(found[:, None] - own[None]).max(axis=2).min(axis=1).max(initial=0.0) < 1e-7
 
 
 def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 import armkin
 from armkin import Status
+from armkin.inverse.followed import Follower
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model.arm import from_links
 from command_line import run
@@ -145,3 +146,15 @@ def test_a_nearly_stretched_arm_has_its_short_families() -> None:
     assert s.interval is not None
     assert (s.best >= 0).all()
     assert covers(arm, s.interval[1][s.within_limits[1]], q[6]).any()
+
+
+def test_where_no_branch_is_real_the_linking_of_an_elimination_goes_on() -> None:
+    """kinova_gen3 alone, at values of J7 that have no answer, ended in a traceback."""
+    arm = armkin.load("kinova_gen3")
+    free = redundancy(arm, None)
+    assert free is not None
+    far = np.eye(4)[None] + np.array([0, 0, 0, 3000.0])[:, None] * np.eye(4)[3]
+    find = Follower(armkin.ik, arm, free, far, arm.home[None])
+    there = find.one(np.zeros(2, int), np.zeros(2, int), np.array([0.1, 0.2]), np.zeros((2, 7)))
+    assert not there.valid.any()
+    assert there.q.shape == (2, 7)

@@ -62,7 +62,7 @@ class Follower(NamedTuple):
         out = np.full((M, B + 1, self.arm.n), np.nan)
         place = np.arange(M)[:, None], np.where(number < 0, B, number)
         out[*place, :r], out[*place, r], out[*place, r + 1 :] = s.q[:, :, :r], t[:, None], s.q[:, :, r:]
-        return out[:, :B]
+        return out[:, : max(B, 1)]  # a column, where no target of them has an answer
 
     def _by_formula(self, goal: Array, t: Array) -> Array:
         """The same of a closed form, by its recorded formula alone; one joint after another in memory."""

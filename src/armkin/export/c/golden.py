@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.c_and_js_code import number
 from armkin.forward import fk
 from armkin.inverse.solve import ik
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.task import targets_of
+from armkin.model.arm import actual
+from armkin.model.lock import lock, unlock
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
@@ -28,14 +32,14 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
     q = _postures(arm, task, POSTURES)
     T = fk(arm, q)
     target = targets_of(task, T, q * arm.ratio)
-    found = ik(arm, target, task.name)
-    rows = [(found.q[i, b], found.branch[i, b]) for i, b in np.argwhere(found.valid)]
+    values, valid, branch = _answers(arm, task, target)
+    rows = [(values[i, b], branch[i, b]) for i, b in np.argwhere(valid)]
     fields = {
         "postures": str(len(q)),
         "golden_joints": _table(q, single),
         "golden_poses": _table(T.reshape(len(q), 16), single),
         "golden_targets": _table(target.reshape(len(q), -1), single),
-        "golden_counts": ", ".join(map(str, found.valid.sum(axis=1))),
+        "golden_counts": ", ".join(map(str, valid.sum(axis=1))),
         "golden_branches": _table(np.array([values for values, _ in rows]), single),
         "golden_indices": ", ".join(str(index if named else -1) for _, index in rows),
         "rows": str(len(rows)),
@@ -51,6 +55,14 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
     return text
 
 
+def _answers(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
+    """Branches (N, B, n), which are there and their indices (N, B), a redundant joint held at home."""
+    spare = redundancy(actual(arm), task.name)
+    held = {} if spare is None else {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
+    found = ik(lock(arm, held) if held else arm, target, task.name)
+    return unlock(arm, held, found.q), found.valid, found.branch
+
+
 def _lengths(task: Task) -> tuple[int, ...]:
     """Which numbers of a target are millimetres."""
     return (3, 7, 11) if task.orientation == "full" else tuple(range(task.position))
@@ -63,8 +75,10 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
     low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
     high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
     q = rng.uniform(low, high, (50 * count, arm.n))
-    found = ik(arm, targets_of(task, fk(arm, q), q), task.name)
-    sigma = _weakest(arm, task, found.q, found.valid)
+    if spare := redundancy(actual(arm), task.name):
+        q[:, spare.joint] = arm.home[spare.joint]
+    found, valid, _ = _answers(arm, task, targets_of(task, fk(arm, q), q))
+    sigma = _weakest(arm, task, found, valid)
     order = np.argsort(-np.minimum(sigma, _CLEAR), kind="stable")  # clear ones as they come, then the next best
     return q[order[sigma[order] > 0.0]][:count]
 

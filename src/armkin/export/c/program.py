@@ -17,6 +17,7 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.numeric.tolerances import CLOSE_BY
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import held_by_near, redundancy
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.arm import actual
 
@@ -45,7 +46,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
-    task, named = solver(turned, task_name)
+    task, named = _class_of(turned, task_name)
     geometry = plain_form(turned, task, named)
     solve, branches = candidates(turned, task, geometry, single)
     names = branch_names(turned, task, geometry, branches)
@@ -96,6 +97,14 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, geometry is named))
     return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
+
+
+def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
+    """The task and the class; of an arm with a redundant joint that of the others, that joint where near has it."""
+    spare = redundancy(arm, task_name)
+    if spare is None or spare.geometry.pairs is None:
+        return solver(arm, task_name)
+    return spare.task, held_by_near(arm, spare)
 
 
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula import arrays, pose
+from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task
@@ -76,6 +79,43 @@ def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
     if free.task.orientation == "axis":
         out[:, 3:] = np.einsum("mij,mj->mi", G[:, :3, :3], target[:, 3:])
     return out
+
+
+def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
+    """The closed form of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
+    r, rest = free.joint, free.geometry.pairs
+    assert rest is not None
+
+    def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
+        own = prefer[r]
+        assert own is not None
+        found = rest(_moved_entries(arm, free, goal, own), [*prefer[:r], *prefer[r + 1 :]])
+        angles = [*(found.angles or [None] * len(found.pairs))]
+        angles.insert(r, None)
+        return found._replace(pairs=[*found.pairs[:r], own, *found.pairs[r:]], angles=angles)
+
+    name = arm.joint_names[r]
+    why = f"{free.geometry.why}; {name} is redundant and held where near has it"
+    return replace(free.geometry, pairs=pairs, why=why, doubts=None)
+
+
+def _moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> list[Entry]:
+    """`moved` of one target's entries, for the cosine and sine of the redundant joint."""
+    c, s = own
+    if free.joint:
+        L = arm.link[-1]
+        back = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))
+        return pose.times(pose.times(goal, back), pose.constant(L))
+    L = arm.link[0]
+    G = pose.times(pose.rotate(pose.constant(L), c, arrays.sub(0.0, s)), pose.constant(inverse(L)))
+    if free.task.orientation == "full":
+        return pose.times(G, goal)
+    p = free.task.position
+    out = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
+    angle = np.arctan2(s, c)
+    for k, by in enumerate(free.task.sums[:, 0].tolist(), p):
+        out.append(arrays.sub(goal[k], arrays.mul(by, angle)))
+    return [*out, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]
 
 
 def redundant_joint(arm: Arm, task_name: str | None) -> str:

@@ -1,0 +1,81 @@
+"""Seven joints: random reachable targets, whether one is lost, and intervals against brute force along the joint.
+
+python tests/bench/bench_families.py [targets] [targets by brute force]
+
+lost: no row. missed: the generating posture lies in no listed interval. ends off: places 1e-6 degrees inside and
+outside of an interval's end, and between ends, where the arm with that joint held has another number of legal postures.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import armkin
+
+sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
+from test_families import covers, held_answers, postures  # noqa: E402
+
+from armkin.inverse.solvers.redundant import redundancy  # noqa: E402
+
+ARMS = ("panda", "iiwa7", "kinova_gen3")
+AT_ONCE = 250
+
+
+def main() -> None:
+    count, brute = (int(word) for word in (sys.argv[1:] + ["10000", "20"][len(sys.argv) - 1 :]))
+    print("arm          targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
+    for name in ARMS:
+        print(row(name, count if name != ARMS[-1] else count // 20, brute), flush=True)
+
+
+def row(name: str, count: int, brute: int) -> str:
+    arm = armkin.load(name)
+    free = redundancy(arm, None)
+    assert free is not None
+    q, target = postures(arm, None, count, 11)
+    armkin.ik(arm, target[:1])
+    lost = missed = rows = 0
+    spent = 0.0
+    for begin in range(0, count, AT_ONCE):
+        start = time.process_time()
+        s = armkin.ik(arm, target[begin : begin + AT_ONCE])
+        spent += time.process_time() - start
+        assert s.interval is not None
+        rows += int(s.within_limits.sum())
+        lost += int((s.best < 0).sum())
+        for k in range(len(s.valid)):
+            missed += not covers(arm, s.interval[k][s.within_limits[k]], q[begin + k, free.joint], 1e-8).any()
+    alone = []
+    for k in range(20):
+        start = time.process_time()
+        armkin.ik(arm, target[k])
+        alone.append(time.process_time() - start)
+    places, off = by_brute_force(arm, free.joint, target[:brute])
+    return (
+        f"{name:12s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
+        f" {lost:5d} {missed:7d} {places:13d} {off:9d}"
+    )
+
+
+def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int, int]:
+    """How many places were asked, and at how many the listed intervals and the arm with the joint held disagree."""
+    s, places, off = armkin.ik(arm, target), 0, 0
+    assert s.interval is not None
+    for k in range(len(target)):
+        legal = s.interval[k][s.within_limits[k]]
+        ends = np.unique(legal.ravel())
+        beside = np.deg2rad(1e-6) * np.array([[-1.0], [1.0]]) + ends
+        for value in [*beside.ravel(), *(0.5 * (ends[1:] + ends[:-1]))]:
+            if arm.lower[joint] < value < arm.upper[joint]:
+                places += 1
+                own = held_answers(arm, joint, float(value), target[k], None)
+                off += int(covers(arm, legal, float(value), 0.0).sum()) != len(own)
+    return places, off
+
+
+if __name__ == "__main__":
+    main()
