@@ -12,6 +12,8 @@ import numpy as np
 
 import armkin
 from armkin.export.js.program import module
+from armkin.inverse.numeric.newton import difference
+from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import targets_of
@@ -84,14 +86,22 @@ def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int)
         return f"target {k}: a row misses by {worst:.1e}" if worst > 2e-9 else ""
     if sorted(row["name"] for row in told["branches"]) != sorted(names) and status == "exact":
         return f"target {k}: names"
+    if status == "boundary":
+        return "" if _one_each(arm, s, k, own, theirs) else f"target {k} (boundary): other solutions"
     unit = np.where(arm.prismatic, arm.reach, 1.0)
-    between = theirs[:, None] - own[None]
-    if status == "boundary":  # a double root moves by the root of what rounding moves it
-        between -= np.where(arm.prismatic, 0.0, 2 * np.pi) * np.round(between / (2 * np.pi))
-    apart = np.abs(between / unit).max(axis=2)
-    if (worst := float(apart.min(axis=0).max(initial=0.0))) > (2e-11 if status == "exact" else 1e-4):
-        return f"target {k} ({status}): joint values {worst:.1e} apart"
-    if status == "exact" and s.within_limits[k][order].tolist() != [row["within_limits"] for row in told["branches"]]:
+    apart = np.abs((theirs[:, None] - own[None]) / unit).max(axis=2)
+    if (worst := float(apart.min(axis=0).max(initial=0.0))) > 1.7e-11:  # 1e-9 degrees
+        return f"target {k}: joint values {worst:.1e} apart"
+    if s.within_limits[k][order].tolist() != [row["within_limits"] for row in told["branches"]]:
         return f"target {k}: limits"
     best = None if s.best[k] < 0 else 0
-    return "" if told["best"] == best or status != "exact" else f"target {k}: best {told['best']}, Python {best}"
+    return "" if told["best"] == best else f"target {k}: best {told['best']}, Python {best}"
+
+
+def _one_each(arm: armkin.Arm, s: armkin.Solutions, k: int, own: np.ndarray, theirs: np.ndarray) -> bool:
+    """Whether each posture (B, n) is of the component of one of Python's, modulo whole turns; a posture at which the
+    Jacobian loses several directions, whose component is not known, is at the same place but for the root of rounding."""
+    at = local_structure(arm, s.task, own * arm.ratio, np.repeat(s.target[k][None], len(own), axis=0))
+    way = difference(arm, theirs[None] * arm.ratio, own[:, None] * arm.ratio)
+    same = members(at, np.arange(len(own)), way) | (np.abs(way).max(axis=2) < np.where(at.known, 1e-7, 1e-4)[:, None])
+    return bool((same.sum(axis=0) >= 1).all() and (same.sum(axis=1) >= 1).all())

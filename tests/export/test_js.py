@@ -87,9 +87,11 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
         ("fanuc_crx10ia", [135, -135, -90, 0, -45, 0]),  # four self-motions, two of which cross at a corner
         ("fanuc_crx10ia", [-90, 90, -90, 90, -180, -45]),  # two self-motions of double roots that never meet
         ("wx250s", [-90, 90, 90, -90, -90, 0]),  # rings of four self-motions, each of which crosses two others
+        ("xarm6", [90, 135, 45, 0, -180, 180]),  # a root of third order, whose second difference is zero
+        ("niryo_ned2", [-180, 180, -90, 0, 0, -180]),  # a root known to 4e-4 rad, and nowhere along it a better one
     ],
 )
-def test_self_motions_that_meet_are_those_of_python(name: str, degrees: list[float], tmp_path: Path) -> None:
+def test_singular_postures_are_those_of_python(name: str, degrees: list[float], tmp_path: Path) -> None:
     arm = armkin.load(name)
     q = np.deg2rad([degrees])
     assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))

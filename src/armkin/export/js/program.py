@@ -39,7 +39,7 @@ _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: 
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
 _KEEP_OUT_IS = """/** @type {{thick: number[], solid: number, moving: number[][], shapes: {kind: number,
  *   numbers: number[]}[], crossings: number[][], pairs: string[][], clearance: number}} of segments [mm] */"""
-_SOLVER = ("numbers", "linear_algebra", "residual", "singular", "ik", "closest")
+_SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "ik", "closest")
 
 
 def module(arm: Arm, task_name: str | None = None) -> str:
@@ -215,7 +215,7 @@ def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, 
 def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
     """What the arm must not touch, and how far it is from that; a robot file may have none."""
     if not arm.keep_out:
-        return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => {}} */", "const hitsOf = () => ({});"]
+        return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => any} */", "const hitsOf = () => ({});"]
     held = tables(turned)
     values = {
         **held._asdict(),

@@ -69,6 +69,7 @@ const allMisses = new Float64Array(ARM.branches);
 /**
  * @typedef {object} Row
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
+ * @property {Component} [at] what lies around it
  */
 
 /** Joint values of a candidate. @param {number} b @returns {number[]} */
@@ -157,10 +158,13 @@ function components(seeds, goal) {
   /** @type {Row[]} */
   const met = []; // where self-motions cross
   for (const { seed } of ranked) {
-    const known = (/** @type {Row} */ row) => (row.path ? onPath(seed.q, row.path, goal) : joined(row.q, seed.q, goal));
+    const known = (/** @type {Row} */ row) => {
+      if (row.path) return onPath(seed.q, row.path, goal);
+      return row.at ? apart(row.q, seed.q) < 1e-7 || onComponent(row.at, row.q, seed.q) : joined(row.q, seed.q, goal);
+    };
     const crosses = met.includes(seed);
     if (!crosses && rows.some(known)) continue;
-    const { kind, paths, crossings, moves: along } = structure(seed.q, goal, rows.flatMap((row) => (row.path ? [row.path] : [])));
+    const { kind, paths, crossings, moves: along, at } = structure(seed.q, goal, rows.flatMap((row) => (row.path ? [row.path] : [])));
     for (const q of crossings) {
       if (met.some((other) => apart(other.q, q) < SPLIT)) continue;
       const found = { ...seed, q };
@@ -173,7 +177,7 @@ function components(seeds, goal) {
     if (kind === 'curve' || kind === 'surface') status = 'singular';
     complete = complete && !crossings.length;
     if (kind === 'exact' || kind === 'boundary') {
-      rows.push(seed);
+      rows.push({ ...seed, at });
       continue;
     }
     if (!crosses && rows.some((row) => straight(row.q, seed.q, goal))) continue;
@@ -187,6 +191,7 @@ function components(seeds, goal) {
   // beside a crossing of self-motions the residual hardly grows: what solves the target there is one with them
   const paths = rows.flatMap((row) => row.path ?? []);
   const kept = rows.filter((one) => one.path || !paths.some((p) => apart(p, one.q) < STRIDE) || lost(one.q, SPLIT).V.length < 2);
+  if (!CLOSED_FORM) [...kept].sort((a, b) => a.branch - b.branch).forEach((row, k) => (row.branch = k)); // roots in one leave no gap
   return { rows: kept, status, complete, free: moves.flatMap((yes, j) => (yes ? [j] : [])) };
 }
 

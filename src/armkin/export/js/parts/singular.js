@@ -97,17 +97,6 @@ function spread(path) {
   return high.map((x, j) => x - low[j]);
 }
 
-/** Whether two roots, or one and its turning point, lie so close that rounding could part or join them.
- * @param {number[]} q @param {number[]} v @param {Numbers} goal */
-function folds(q, v, goal) {
-  const h = 1e-3; // beside the posture, corrected in the directions that are not lost: what is left of the residual
-  const [ahead, behind] = [h, -h].map((t) => residual(newton(stepped(q, v, t), goal, 3, SPLIT).q, goal));
-  const here = residual(q, goal);
-  const bend = Math.hypot(...here.map((x, i) => (ahead[i] + behind[i] - 2 * x) / (2 * h * h)));
-  const rise = Math.hypot(...here.map((_, i) => (ahead[i] - behind[i]) / (2 * h)));
-  return rise * rise <= 4 * bend * SOLUTION;
-}
-
 /**
  * Ways (of length one) within lost directions: spread evenly, and those that hold joints, along which self-motions cross.
  * @param {number[][]} V
@@ -135,16 +124,17 @@ function ways(V) {
 /**
  * What the solution set is around a posture that solves the target.
  * @param {number[]} q @param {Numbers} goal @param {number[][][]} known self-motions that need not be followed again
- * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossings: number[][], moves?: number[]}} paths of the
+ * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossings: number[][], moves?: number[], at?: Component}} paths of the
  *   self-motions through it, and where others meet them; of a surface, how far each joint moves along it
  */
 function structure(q, goal, known) {
   const { V } = lost(q, SPLIT);
   if (!V.length) return { kind: 'exact', paths: [], crossings: [] };
   if (V.length === 1) {
+    const at = component(q, goal);
+    if (at && Math.max(...at.moves) < REACH) return { kind: at.boundary ? 'boundary' : 'exact', paths: [], crossings: [], at };
     const { path, extent, crossings } = follow(q, V[0], goal);
-    if (extent >= REACH) return { kind: 'curve', paths: [path], crossings };
-    return { kind: folds(q, V[0], goal) ? 'boundary' : 'exact', paths: [], crossings: [] };
+    return extent >= REACH ? { kind: 'curve', paths: [path], crossings } : { kind: 'exact', paths: [], crossings: [] };
   }
   // several directions: self-motions that cross here are met again beside it
   /** @type {number[][][]} */
