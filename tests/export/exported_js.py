@@ -83,7 +83,10 @@ def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int)
         off = residual(s.task, armkin.fk(arm, theirs), theirs * arm.ratio, target)
         off[:, : s.task.position] /= arm.reach
         worst = float(np.abs(off).max(initial=0.0))
-        return f"target {k}: a row misses by {worst:.1e}" if worst > 2e-9 else ""
+        legal = [any(row["within_limits"] for row in told["branches"]), bool(s.within_limits[k].any())]
+        if worst > 2e-9 or legal[0] != legal[1]:
+            return f"target {k}: a row misses by {worst:.1e}; legal ones here and in Python: {legal}"
+        return ""
     if sorted(row["name"] for row in told["branches"]) != sorted(names) and status == "exact":
         return f"target {k}: names"
     if status == "boundary":
@@ -99,8 +102,11 @@ def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int)
 
 
 def _one_each(arm: armkin.Arm, s: armkin.Solutions, k: int, own: np.ndarray, theirs: np.ndarray) -> bool:
-    """Whether each posture (B, n) is of the component of one of Python's, modulo whole turns; a posture at which the
-    Jacobian loses several directions, whose component is not known, is at the same place but for the root of rounding."""
+    """Whether each posture (B, n) is of the component of one of Python's, modulo whole turns.
+
+    A posture at which the Jacobian loses several directions, so that its component is not known, is at the same place
+    but for the root of rounding.
+    """
     at = local_structure(arm, s.task, own * arm.ratio, np.repeat(s.target[k][None], len(own), axis=0))
     way = difference(arm, theirs[None] * arm.ratio, own[:, None] * arm.ratio)
     same = members(at, np.arange(len(own)), way) | (np.abs(way).max(axis=2) < np.where(at.known, 1e-7, 1e-4)[:, None])

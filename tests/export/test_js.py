@@ -87,6 +87,8 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
         ("fanuc_crx10ia", [135, -135, -90, 0, -45, 0]),  # four self-motions, two of which cross at a corner
         ("fanuc_crx10ia", [-90, 90, -90, 90, -180, -45]),  # two self-motions of double roots that never meet
         ("wx250s", [-90, 90, 90, -90, -90, 0]),  # rings of four self-motions, each of which crosses two others
+        ("thor", [-90, 0, 0, 0, 0, -90]),  # home is half a turn off, which has no sine: it is no solution
+        ("puma560", [0, 0, 0, 0, -180, 90]),
         ("xarm6", [90, 135, 45, 0, -180, 180]),  # a root of third order, whose second difference is zero
         ("niryo_ned2", [-180, 180, -90, 0, 0, -180]),  # a root known to 4e-4 rad, and nowhere along it a better one
     ],

@@ -69,7 +69,7 @@ const allMisses = new Float64Array(ARM.branches);
 /**
  * @typedef {object} Row
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
- * @property {Component} [at] what lies around it
+ * @property {Component} [at] what lies around it @property {boolean} [wide] whether it is one of a surface
  */
 
 /** Joint values of a candidate. @param {number} b @returns {number[]} */
@@ -181,7 +181,7 @@ function components(seeds, goal) {
       continue;
     }
     if (!crosses && rows.some((row) => straight(row.q, seed.q, goal))) continue;
-    if (kind === 'surface') rows.push(seed);
+    if (kind === 'surface') rows.push({ ...seed, wide: true });
     for (const path of paths) {
       if (rows.some((row) => row.path && oneCurve(path, row.path, goal))) continue;
       rows.push({ ...seed, path });
@@ -263,6 +263,14 @@ function nearest(row, near, goal) {
       if (one.missed <= SOLUTION) take(one.q);
     }
   }
+  // of more than a curve there may be legal ones off the path: onto the limits and onto the target in turn
+  for (let round = 0, q = best.q; round < 30 && best.rank < 2; round++) {
+    const inside = q.map((x, j) => Math.max(Math.min(x, ARM.upper[j] - 1e-3 * ARM.unit[j]), ARM.lower[j] + 1e-3 * ARM.unit[j]));
+    const one = newton(inside, goal, 6, SPLIT / 10);
+    if (!(one.missed <= SOLUTION)) break;
+    take(one.q);
+    q = one.q;
+  }
   return legal(best.q, near);
 }
 
@@ -290,7 +298,7 @@ function stay(found, near, goal, rounding) {
 
 /** @param {Row} solution @param {Numbers} near @param {Float64Array} goal @returns {Found} */
 function placed(solution, near, goal) {
-  const q = solution.path ? nearest(solution, near, goal) : legal(solution.q, near);
+  const q = solution.path || solution.wide ? nearest(solution, near, goal) : legal(solution.q, near);
   misses(q, goal);
   let joints = q;
   let motion = 0;

@@ -69,7 +69,10 @@ function misses(q, goal) {
   const b = T[8] * goal[0] - T[0] * goal[2] + T[9] * goal[3] - T[1] * goal[5] + T[10] * goal[6] - T[2] * goal[8];
   const c = T[0] * goal[1] - T[4] * goal[0] + T[1] * goal[4] - T[5] * goal[3] + T[2] * goal[7] - T[6] * goal[6];
   missedLength = Math.sqrt(x * x + y * y + z * z) / ARM.reach;
-  missedAngle = Math.sqrt(a * a + b * b + c * c) / 2;
+  const sine = Math.sqrt(a * a + b * b + c * c) / 2;
+  const trace =
+    T[0] * goal[0] + T[1] * goal[3] + T[2] * goal[6] + T[4] * goal[1] + T[5] * goal[4] + T[6] * goal[7] + T[8] * goal[2] + T[9] * goal[5] + T[10] * goal[8];
+  missedAngle = trace > 2 ? sine : Math.atan2(sine, (trace - 1) / 2); // half a turn has no sine
 }
 
 /** The rows of the residual's Jacobian, joints in rad and reaches. @param {Numbers} q @returns {number[][]} */
