@@ -1,6 +1,8 @@
 """`armkin robots`, and what `armkin info` says is missing."""
 
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,9 +26,14 @@ def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
     assert [line.split()[0] for line in lines[1:]] == list(found)
 
 
+@cache
+def listed() -> dict[str, Any]:
+    return {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
+
+
 @pytest.mark.parametrize("name", catalogue.names())
 def test_what_a_robot_can_do_is_what_the_commands_do(name: str) -> None:
-    [entry] = [entry for entry in run("robots", "--json").json["robots"] if entry["robot_file"] == name]
+    entry = listed()[name]
     can = entry["can"]
     target = run("fk", name, "home", "--json").json["position_mm"] + [0] * 3
     assert (run("ik", name, *target[: len(entry["target_labels"])]).code in (0, 3)) == can["ik"] or name == "moveo"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import cast
 
 import pytest
 
+from armkin.board.ports import Port
 from armkin.errors import LinkError, MissingExtraError
 from armkin.flash import boot_drive, images, intel_hex
 from armkin.flash.images import Image
+from armkin.flash.stk500v1 import Stk500v1
 from armkin.flash.uploading import upload
 from command_line import run
 
@@ -103,3 +106,29 @@ def test_an_installed_image_is_what_its_checksum_says(tmp_path: Path) -> None:
     (tmp_path / "pico6.uf2").write_bytes(UF2)
     (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
     assert images.image("pico6", tmp_path).data == UF2
+
+
+class BootLoader:
+    """A port that has one answer to whatever is written."""
+
+    def __init__(self, answer: bytes) -> None:
+        self.answer, self.left, self.heard = answer, b"", b""
+
+    def write(self, data: bytes) -> None:
+        self.heard, self.left = data, self.answer
+
+    def read(self, timeout: float) -> bytes:
+        taken, self.left = self.left, b""
+        return taken
+
+
+def test_an_answer_of_the_boot_loader_is_framed() -> None:
+    port = BootLoader(b"\x14\x1e\x95\x0f\x10")
+    assert Stk500v1(cast(Port, port)).signature().hex() == "1e950f"
+    assert port.heard.hex() == "7520"
+
+
+@pytest.mark.parametrize("answer", ["151e950f10", "141e950f11", "141e950f00"])
+def test_an_answer_of_the_boot_loader_that_is_damaged_is_refused(answer: str) -> None:
+    with pytest.raises(LinkError, match=f"the boot loader answered {bytes.fromhex(answer).hex(' ')}"):
+        Stk500v1(cast(Port, BootLoader(bytes.fromhex(answer)))).signature()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import oracle
 import pytest
@@ -45,15 +47,15 @@ def leads_to(screw: Screws, goals: Goal, q: Array, to: Array) -> Bool:
 @pytest.mark.parametrize(
     ("name", "surface"), [("ur5e", "J5 = 0"), ("mycobot_280", "J5 = 90"), ("wx250s", "elbow moved")]
 )
-def test_each_circuit_is_listed_once(name: str, surface: str) -> None:
+def test_each_circuit_is_listed_once(name: str, surface: str, sample: Callable[[int, int], int]) -> None:
     """Of these up to a quarter lay on a circuit that was not listed."""
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
-    q = truth.singular_postures(arm, screw, None, 40, seed=3)[surface]
+    q = truth.singular_postures(arm, screw, None, 40, seed=3)[surface][: sample(40, 20)]
     goals = oracle.goal(task, screw, q)
     s = armkin.ik(arm, goals.array())
     k = np.flatnonzero((s.status == Status.SINGULAR) & (s.free.sum(axis=1) > 2))
-    assert len(k) > 15
+    assert len(k) > sample(15, 7)
     here = oracle.distance(screw, s.q[k], q[k][:, None]).min(axis=1) < 1e-3
     held = np.where(s.free[k, None], 0.0, np.abs(truth._way(screw, q[k][:, None], s.q[k]))).max(axis=2)
     on = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)

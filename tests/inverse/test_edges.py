@@ -207,7 +207,7 @@ def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
 @pytest.mark.parametrize("name", [name for name in CLASSES if "P" in name])
 def test_slides_far_longer_than_the_links(name: str, sample: Callable[[int, int], int]) -> None:
     """Right-angled and random postures, slides of up to 20 reaches; what is farther does not claim to be complete."""
-    for seed in range(3):
+    for seed in range(sample(3, 1)):
         c = random_case(name, seed)
         rng = np.random.default_rng(seed)
         shape = (sample(200, 200 if c.arm.n < 5 else 24), c.arm.n)

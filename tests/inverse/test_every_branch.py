@@ -87,12 +87,12 @@ def test_shipped_robots_against_the_oracle(name: str) -> None:
 
 # arms of these classes have a whole preparation to go through, or need the elimination
 COSTLY = {name for name in CLASSES if CLASSES[name][1] in ("pose", "xyz_axis")}
-SEEDS = 5  # `tests/bench/check_ik.py --classes` has fifty
+SEEDS = 5, 2  # with --long, in the gate; `tests/bench/check_ik.py --classes` has fifty
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - COSTLY))
-def test_random_arms(name: str) -> None:
-    for seed in range(SEEDS):
+def test_random_arms(name: str, sample: Callable[[int, int], int]) -> None:
+    for seed in range(sample(*SEEDS)):
         case = random_case(name, seed)
         check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 40, seed)))
 
@@ -102,9 +102,9 @@ def is_special(name: str) -> bool:
 
 
 @pytest.mark.parametrize("name", sorted(name for name in COSTLY if is_special(name)))
-def test_random_arms_with_six_joints(name: str) -> None:
+def test_random_arms_with_six_joints(name: str, sample: Callable[[int, int], int]) -> None:
     others = 0
-    for seed in range(SEEDS):
+    for seed in range(sample(*SEEDS)):
         case = random_case(name, seed)
         report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
         check(report)
@@ -121,8 +121,8 @@ def test_random_arms_for_the_elimination(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - COSTLY))
-def test_random_arms_against_the_oracle(name: str) -> None:
-    for seed in range(3):
+def test_random_arms_against_the_oracle(name: str, sample: Callable[[int, int], int]) -> None:
+    for seed in range(sample(3, 1)):
         case = random_case(name, 200 + seed)
         report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 10, seed))
         assert not not_found(report, np.arange(10), 60, seed)

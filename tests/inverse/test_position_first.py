@@ -1,6 +1,7 @@
 """Position first: arms of four and five joints asked for a pose, against a search by brute force."""
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, grid: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_no_posture_of_a_grid_is_nearer(name: str) -> None:
+def test_no_posture_of_a_grid_is_nearer(name: str, sample: Callable[[int, int], int]) -> None:
     arm = armkin.load(name)
     T = targets(arm, 24, 4)
     s = armkin.ik(arm, T, "pose", position_first=True)
@@ -56,7 +57,7 @@ def test_no_posture_of_a_grid_is_nearer(name: str) -> None:
     assert (s.status != Status.UNREACHABLE).all()
     assert np.abs(armkin.fk(arm, best)[:, :3, 3] - T[:, :3, 3]).max() <= 1e-9 * arm.reach
     assert ((best >= arm.lower - 1e-9) & (best <= arm.upper + 1e-9)).all()
-    assert (s.angle[:, 0] <= by_brute_force(arm, T, 8) + 1e-8).all()
+    assert (s.angle[:, 0] <= by_brute_force(arm, T, sample(8, 5)) + 1e-8).all()
     own = np.arange(24) % 3 == 2
     assert (s.status[own] == Status.EXACT).all()
     assert (s.status[~own] == Status.POSITION).sum() >= 14  # a turn about an axis may be one that the arm can make

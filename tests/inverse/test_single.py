@@ -61,11 +61,11 @@ def test_one_is_as_in_a_batch(name: str, limits: str) -> None:
     q = rng.uniform(-np.pi, np.pi, (30, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
     targets = goal(task, screw, q).array()
     short = 0
-    for k, target in enumerate(targets):
+    for k, target in enumerate(targets[:12]):
         near = None if k % 3 == 0 else rng.uniform(-1.5, 1.5, arm.n) * turn
         alone = ask(arm, target, near)
         short += alone is not None and bool(alone.valid.any())
-    assert short > 25
+    assert short > 9
     beyond = targets[0].copy()
     beyond[(..., 3) if beyond.ndim == 2 else slice(0, 2)] *= 1.0 if beyond.ndim == 2 else 50.0
     if beyond.ndim == 2:

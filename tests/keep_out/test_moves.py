@@ -50,6 +50,25 @@ def test_a_jog_stands_before_the_hit(robot: str, table: str) -> None:
     assert free.json["joints"][1] < 70.0  # it went until the table was near
 
 
+def test_a_jog_ends_so_early_that_it_stands_at_the_hit(table: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = armkin.load("three_dof", scene=table)
+    way: list[float] = []
+
+    def half(arm: armkin.Arm, q: Array, goal: Array) -> tuple[float, Any]:
+        way.append(float(goal[0] - q[0]) / 2)
+        return 0.5, SimpleNamespace(message="hit", fields={})
+
+    monkeypatch.setattr(jogging, "free_way", half)
+    axes = ("X", "Y", "Z")
+    machine: Any = SimpleNamespace(
+        arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=SimpleNamespace(axes=axes)
+    )
+    rates = jogging.rates(machine, 0, 30.0)  # deg/s
+    rate = float((np.linalg.pinv(arm.motor_gain) @ [rates[axis] for axis in axes])[0])
+    seconds = jogging.free_seconds(machine, 0, rates) + jogging.HANDLE
+    assert seconds * rate + rate**2 / (2 * float(arm.max_accel[0])) == pytest.approx(way[0])
+
+
 def test_a_jog_of_coupled_motors_is_looked_at_as_whole_counts_make_it(
     table: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,8 @@ def csv_line(record: Iterable[Any]) -> str:
 
     >>> csv_line([1.5, "left, elbow up", True, None])
     '1.5,"left, elbow up",true,'
+    >>> csv_line(['is "home" now', -0.0])
+    '"is ""home"" now",-0.0'
     """
     return ",".join([repr(value) if type(value) is float else cell(value) for value in record])
 
