@@ -142,6 +142,14 @@ def test_processes_change_no_byte(rows: Path, tmp_path: Path, end: str) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
+def test_processes_without_rows_leave_nothing(tmp_path: Path) -> None:
+    nothing = tmp_path / "nothing.csv"
+    nothing.write_text("x,y,z\n")
+    for name in (nothing, tmp_path / "missing.csv"):
+        assert ik(name, tmp_path / "out.csv", "--workers", 2).code in (1, 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["nothing.csv"]
+
+
 def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseException) -> list[int]:
     """Let a run end when so many pieces are kept; returns the numbers of the pieces that are answered."""
     answered: list[int] = []

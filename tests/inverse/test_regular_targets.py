@@ -14,6 +14,7 @@ from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import components, regular_targets
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.tasks.task import moved
 from armkin.model.arm import Arm
 
 NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma560", "ur5e", "irb2400", "stanford"]
@@ -103,3 +104,24 @@ def test_a_linkage_that_cannot_move_is_one_posture() -> None:
     assert s.valid.sum() == 1
     assert s.complete
     assert newton.wrapped_distance(arm, s.q[s.valid], q).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["three_dof", "ra02", "labvolt_5150"])
+def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two branches end where the elbow is straight: both are on one side, on the other none; nothing is searched."""
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    monkeypatch.setattr(components, "examine", lambda *_: pytest.fail("searched from many starts"))
+    for posture in np.random.default_rng(5).uniform(0.3, 0.7, (4, arm.n)):
+        posture[2] = 0.0
+        target = goal(task, screw, posture[None]).array()
+        _, J = newton.scaled(arm, task, posture[None], target)
+        U, S, _ = np.linalg.svd(J[0])
+        assert S[-1] < 1e-9 < 1e-3 < S[-2]
+        for size in (1e-6, 1e-5, 1e-4):
+            by = np.resize(U[:, -1], 6) * (np.arange(6) < len(U)) * size
+            both = [armkin.ik(arm, moved(arm, task, target, sign * by)) for sign in (1.0, -1.0)]
+            assert sorted(bool(found.valid.any()) for found in both) == [False, True]
+            out = next(found for found in both if not found.valid.any())
+            assert out.status[0] == Status.UNREACHABLE
+            assert out.complete[0]

@@ -75,6 +75,7 @@ class Job(NamedTuple):
     as_json: bool
     format: str  # the ending of what is written
     compiled: bool = False  # machine code prints the rows
+    parts: Parts | None = None  # where a process of the pool keeps what it has finished, instead of handing it back
 
 
 class Done(NamedTuple):
@@ -87,6 +88,7 @@ class Done(NamedTuple):
     tally: Tally
     problem: ArmkinError | None = None  # a malformed row behind those that were answered
     near: list[float] | None = None  # where the next piece goes on, for questions that follow each other
+    kept: bool = False  # the bytes stand in a part already
 
     def about(self) -> dict[str, Any]:
         """What is kept beside the bytes."""
@@ -123,7 +125,11 @@ def work(job: Job, piece: Piece) -> Done:
     elif piece.values is not None and problem is None:
         tally.skipped = len(piece.values) - tally.rows
     near = getattr(job.questions, "near", None)
-    return Done(piece.number, piece.digest(), b"".join(data), heading, tally, problem, near)
+    done = Done(piece.number, piece.digest(), b"".join(data), heading, tally, problem, near)
+    if job.parts is None or problem is not None:
+        return done
+    job.parts.keep(done.number, done.about(), done.data)
+    return done._replace(data=b"", kept=True)
 
 
 def _lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
@@ -245,20 +251,23 @@ class _ToFile:
 
     def run(self, pieces: Rows) -> None:
         """Answer what is missing, and make the file."""
-        if self.batch.resume and self.parts.begun:
-            self.parts.begin()
-        else:
+        if not self.batch.resume:
             self.parts.refuse_begun()
+        pool = self.batch.engine.pool
+        if pool or self.parts.begun:
+            self.parts.begin()
+        job = self.job._replace(parts=self.parts) if pool else self.job
         try:
             with output.progress("rows", pieces.count) as tick:
-                for done in in_order(self.batch.engine, work, self.job, self._missing(pieces)):
+                for done in in_order(self.batch.engine, work, job, self._missing(pieces)):
                     self._keep(done)
                     tick(self.tally.rows)
             if not self.tally.rows:
                 raise pieces.empty(self.tally.skipped)
             self._write()
-        except UsageError:
-            if not self.batch.resume and self.parts.held:
+        except BaseException as error:
+            of_no_use = isinstance(error, UsageError) or not self.parts.some
+            if of_no_use and not self.batch.resume and self.parts.held:
                 self.parts.remove()
             raise
         finally:
@@ -287,7 +296,7 @@ class _ToFile:
             raise done.problem
         if self.first is None and done.number == 0 and not self.parts.held:
             self.first = done
-        else:
+        elif not done.kept:
             if not self.parts.held:
                 self.parts.begin()
                 assert self.first is not None

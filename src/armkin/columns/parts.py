@@ -19,6 +19,7 @@ from typing import IO, Any
 
 from armkin.errors import FileError, UnfinishedError, UsageError
 
+HANDED_ON = 2.0  # [s] until the processes of a run that was killed have ended, too
 _ASIDE = ".writing"  # ends the name of what is not whole yet
 
 
@@ -36,6 +37,11 @@ class Parts:
     def begun(self) -> bool:
         """Whether there is such a folder."""
         return self.folder.is_dir()
+
+    @property
+    def some(self) -> bool:
+        """Whether a part is finished."""
+        return any(self.folder.glob("[0-9]*[0-9]"))
 
     @property
     def held(self) -> bool:
@@ -60,7 +66,7 @@ class Parts:
             self.folder.mkdir(exist_ok=True)
             lock = FileLock(self.folder / "lock")
             try:
-                lock.acquire(timeout=0)
+                lock.acquire(timeout=HANDED_ON)
             except Timeout:
                 raise FileError(f"{self.path}.parts: another run works on it", file=self.path) from None
             self._lock = lock
@@ -100,9 +106,12 @@ class Parts:
             return None
 
     def keep(self, number: int, about: Mapping[str, Any], data: bytes) -> None:
-        """Keep a finished part. Raises UnfinishedError for a full disk: the parts so far stay."""
+        """Keep a finished part. Raises UnfinishedError for a full disk: the parts so far stay.
+
+        The run that holds the folder may let other processes of this machine keep what they have finished.
+        """
         with self._errors():
-            self._write(self._place(number), json.dumps(about).encode() + b"\n" + data)
+            self._write(self._place(number), json.dumps(about).encode() + b"\n", data)
 
     def opened(self, count: int) -> Iterator[IO[bytes]]:
         """The bytes of the first parts, one file after the other: each is closed when the next is opened."""
@@ -118,6 +127,9 @@ class Parts:
             file.readline()
             return file.read()
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_lock": None}  # another process may keep parts, and does not hold the folder
+
     def leave(self) -> None:
         """Let go of the folder; its parts stay."""
         if self._lock is not None:
@@ -132,11 +144,11 @@ class Parts:
     def _place(self, number: int) -> Path:
         return self.folder / f"{number:08d}"
 
-    def _write(self, place: Path, data: bytes) -> None:
+    def _write(self, place: Path, *data: bytes) -> None:
         aside = Path(f"{place}{_ASIDE}")
         try:
             with open(aside, "wb") as file:
-                file.write(data)
+                file.writelines(data)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(aside, place)

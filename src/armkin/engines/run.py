@@ -20,6 +20,11 @@ class Engine(NamedTuple):
         """Whether all is done in this process."""
         return self.workers == 1 and self.cluster is None
 
+    @property
+    def pool(self) -> bool:
+        """Whether it is done in other processes of this machine."""
+        return self.workers > 1 and self.cluster is None
+
 
 def in_order(
     engine: Engine, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]
