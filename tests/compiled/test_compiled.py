@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.compiled import arm as compiled_arm
 from armkin.compiled import toolchain
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
@@ -318,3 +319,26 @@ def test_workers_are_a_whole_number_for_one_target_too(workers: object) -> None:
         for goal in (target, np.tile(target, (40_000, 1))):
             with pytest.raises(armkin.UsageError, match="thread"):
                 solve(arm, goal, workers=workers)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("robot", ["xarm6", "jaco_j2n6s300"])
+def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tool straight down: C left four of five of an xArm6's targets to Python, 464 to 853 us each."""
+    arm = armkin.load(robot)
+    rng, asked = np.random.default_rng(6), []
+    T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (40, 1, 1))
+    yaw = rng.uniform(-np.pi, np.pi, 40)
+    T[:, 0, 0], T[:, 0, 1], T[:, 1, 0], T[:, 1, 1] = np.cos(yaw), np.sin(yaw), np.sin(yaw), -np.cos(yaw)
+    T[:, :3, 3] = arm.reach * rng.uniform(-0.4, 0.4, (40, 3)) + [0, 0, 0.2 * arm.reach]
+    own = armkin.ik(arm, T)
+    solve = compiled_arm.solve.ik
+
+    def counted(one: armkin.Arm, targets: np.ndarray, *words: object, **more: object) -> armkin.Solutions:
+        asked.append(len(targets))
+        return solve(one, targets, *words, **more)
+
+    monkeypatch.setattr(compiled_arm.solve, "ik", counted)
+    found = armkin.compile(arm).ik(T)
+    assert sum(asked) <= 1
+    assert own.valid.sum() > 100
+    found_by_elimination(found, own)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-_METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "polish", "elimination")  # each needs those before
+# each needs those before
+_METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
 BRANCHES = MOST
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
 OWN = 2  # of a kind of poses

@@ -16,12 +16,15 @@ static double arm_apart(const double *a, const double *b)
     return most;
 }
 
-/* Whether a root whose vector is no product stands for nothing: it is simple, and far from the pose. */
-static int arm_stands_for_nothing(const double *q, const double *goal, const double *re, const double *im, int size, int i)
+/* Whether a candidate whose vector is no product stands for nothing: its root is simple, or all solutions of it are known, and
+   it is far from the pose. */
+static int arm_stands_for_nothing(const arm_seed *seed, const double *goal, const double *re, const double *im, int size)
 {
+    const double *q = seed->q;
     double frame[12], joints[72], error[6];
+    const int i = seed->root;
     int j;
-    for (j = 0; j < size; j++) {
+    for (j = 0; j < size && i >= 0; j++) {
         const double a = 1 + re[i] * re[i] + im[i] * im[i], b = 1 + re[j] * re[j] + im[j] * im[j];
         const double x = re[i] - re[j], y = im[i] - im[j];
         if (j != i && !(4 * (x * x + y * y) > 1e-6 * a * b))
@@ -45,7 +48,8 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
     double re[ARM_MOST], im[ARM_MOST], most = 0, weakest = 0, hidden[ARM_MOST];
     unsigned char own[ARM_MOST], stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
     arm_ends ends;
-    int i, j, k, open = 0;
+    arm_seed seed[ARM_MOST];
+    int i, j, k, seeds, open = 0;
     arm_times(arm_shaking + 12 * pass, goal, moved);
     arm_invert(moved, back); /* the pose link closes the loop */
     if (pencil->backward)
@@ -77,17 +81,16 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
     }
     if (!(row == 16 ? arm_roots_of(C, size, 16, re, im) : arm_roots_of(C, size, ARM_MOST, re, im)))
         return 1;
-    for (i = 0; i < size; i++) {
-        const double tilt = 2 * fabs(im[i]) / (1 + re[i] * re[i] + im[i] * im[i]);
+    seeds = arm_seeds(pencil, E, back, &ends, re, im, careful ? 0.3 : 0.02,
+        (careful || pencil->wide) && !(pencil->slides[2] || pencil->slides[3] || pencil->slides[4]), seed);
+    for (i = 0; i < seeds && *count < ARM_ANSWERS; i++) {
+        const double tilt = seed[i].tilt;
         arm_answer *one = &found[*count];
-        double defect;
         int good;
-        if (!(im[i] >= 0) || !(tilt < (careful ? 0.3 : 0.02)) || *count >= ARM_ANSWERS)
+        if (seed[i].defect > 1e-5 && !(shake > 0) && most < 1e5 && arm_stands_for_nothing(seed + i, goal, re, im, size))
             continue;
-        if (!arm_joints_of(pencil, E, back, &ends, re[i], one->q, &defect))
-            continue;
-        if (defect > 1e-5 && !(shake > 0) && most < 1e5 && arm_stands_for_nothing(one->q, goal, re, im, size, i))
-            continue;
+        for (k = 0; k < 6; k++)
+            one->q[k] = seed[i].q[k];
         hidden[*count - begin] = one->q[joint];
         arm_refine(goal, careful ? 12 : 4, careful, one);
         good = one->residual < (careful ? 3e-9 : 1e-10);

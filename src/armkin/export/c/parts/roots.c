@@ -63,20 +63,13 @@ static void arm_half_powers(double q, double *out)
     out[3] = sine[1];
 }
 
-/* The joint values for a root x of the pencil; 0 if it is a slide at infinity. *defect: the squared sine between its vector
-   and the product that a solution's is; 0 where slides move. */
-static int arm_joints_of(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, double x,
-    double *q, double *defect)
+/* The equations at x, p x p, divided by x^2 if x is large. */
+static void arm_system_at(const arm_pencil *pencil, const double *E, double x, double *A)
 {
     const int r = pencil->r, w = pencil->w, p = pencil->wide ? 16 : 12, c = p + pencil->size, far = fabs(x) > 1;
-    const int three = p / 4;
-    const int of_hidden = 2 + pencil->hidden, of_dialytic = 2 + pencil->dialytic;
-    const int third = 3 - pencil->hidden - pencil->dialytic;
-    const double y = far ? 1 / x : x, scale = (far ? x : 1) / (1 + x * x);
-    double A[256], u[16], v[16], middle[3], a[12], b[12], f[16], m[5], part[8], cosine[8], sine[8];
-    double most = 0, whole = 0;
-    int i, j, k, row = 0, column = 0;
-    for (i = 0; i < p; i++) { /* the equations at x, divided by x^2 if x is large */
+    const double y = far ? 1 / x : x;
+    int i, j;
+    for (i = 0; i < p; i++) {
         const double *e = E + i * c;
         for (j = 0; j < 2 * r; j++)
             A[p * i + j] = far ? e[j] + e[p + j] * y : e[j] * y + e[p + j];
@@ -85,10 +78,14 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
             A[p * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
         }
     }
-    if (pencil->wide)
-        arm_null_vector(A, u, 16);
-    else
-        arm_null_vector(A, u, 12);
+}
+
+/* The products v, p numbers, of a root x and what the equations there take to zero. */
+static void arm_vector(const arm_pencil *pencil, const double *u, double x, double *v)
+{
+    const int r = pencil->r, w = pencil->w, p = pencil->wide ? 16 : 12;
+    const double scale = (fabs(x) > 1 ? x : 1) / (1 + x * x);
+    int i, j;
     for (i = 0; i < p; i++) {
         v[i] = 0;
         for (j = 0; j < r; j++) {
@@ -98,6 +95,19 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
         for (j = 0; j < w; j++)
             v[i] += pencil->W[i * w + j] * u[2 * r + j];
     }
+}
+
+/* The joint values for a root x of the pencil and its products v; 0 if it is a slide at infinity. *defect: the squared sine
+   between v and the product that a solution's is; 0 where slides move. */
+static int arm_joints_from(const arm_pencil *pencil, const double *v, const double *Y, const arm_ends *ends, double x,
+    double *q, double *defect)
+{
+    const int p = pencil->wide ? 16 : 12, three = p / 4;
+    const int of_hidden = 2 + pencil->hidden, of_dialytic = 2 + pencil->dialytic;
+    const int third = 3 - pencil->hidden - pencil->dialytic;
+    double middle[3], a[12], b[12], f[16], m[5], part[8], cosine[8], sine[8];
+    double most = 0, whole = 0;
+    int i, j, k, row = 0, column = 0;
     for (i = 0; i < 4; i++) { /* v is 4 x 3, 4 x 4 of a wide role: its longest row and column are the safest */
         double size = 0;
         for (j = 0; j < three; j++)
@@ -188,3 +198,16 @@ static int arm_joints_of(const arm_pencil *pencil, const double *E, const double
     return 1;
 }
 
+/* The same of a root's own vector. */
+static int arm_joints_of(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, double x,
+    double *q, double *defect)
+{
+    double A[256], u[16], v[16];
+    arm_system_at(pencil, E, x, A);
+    if (pencil->wide)
+        arm_null_vector(A, u, 16);
+    else
+        arm_null_vector(A, u, 12);
+    arm_vector(pencil, u, x, v);
+    return arm_joints_from(pencil, v, Y, ends, x, q, defect);
+}
