@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from browsing import chromium, opened, repainted, settled
 from playwright.sync_api import Browser, expect
 
@@ -112,6 +113,61 @@ def test_it_is_printed_on_one_page_with_its_picture(browser: Browser, tmp_path: 
             assert page.locator(shown).first.is_visible(), shown
         for gone in ("#canvas", "#sliders input[type=range]", "#views", "#share", "#poses"):
             assert not page.locator(gone).first.is_visible(), gone
+
+
+def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, tmp_path: Path) -> None:
+    for name, colours in (("panda", "light"), ("three_dof", "dark")):
+        arm = armkin.load(name)
+        ends = {"moves": [{"joint": arm.home.tolist()}, {"joint": (arm.home + 0.1).tolist()}]}
+        plan = path(arm, path_file.validated(ends)) if name == "three_dof" else None
+        with opened(browser, written(tmp_path, name, plan), color_scheme=colours) as page:
+            page.get_by_role("button", name="Copy as Python").click()
+            found = Axe().run(page).response["violations"]
+            bad = [(one["id"], one["nodes"][0]["html"]) for one in found if one["impact"] in ("serious", "critical")]
+            assert bad == []
+
+
+def test_hostile_words_are_shown_and_run_nothing(browser: Browser, tmp_path: Path) -> None:
+    """Names of the arm, its file and its joints, and what stands behind the address's #."""
+    words = (
+        "</script><script>bad=1</script>",
+        "<svg/onload=bad=2>",
+        "'\"><img src=x onerror=bad=3>",
+        "</style><script>bad=4//",
+        "</title><iframe srcdoc='<script>parent.bad=5</script>'>",
+        "\u2028bad=6//",
+        "${bad=7}`+(bad=8)+`",
+        "-->]]><script>bad=9",
+        "&lt;img src=x onerror=bad=10&gt;",
+        "\\u003cimg src=x onerror=bad=11\\u003e",
+        "javascript:bad=12",
+        "{{nonce}}*/bad=13/*",
+        "%3Cscript%3Ebad=14%3C/script%3E#'+bad+'",
+        "<a href=javascript:bad=15 autofocus onfocus=bad=16>",
+        "__proto__",
+        "\x00\x07\\",
+    )
+    for some in (words[:8], words[8:]):
+        arm = armkin.load("ur5e")
+        for field, value in (("name", some[6]), ("path", f"/tmp/{some[7]}.yaml"), ("joint_names", some[:6])):
+            object.__setattr__(arm, field, value)
+        file = tmp_path / "arm.html"
+        file.write_text(html(arm), encoding="utf-8")
+        with opened(browser, file.as_uri()) as page:
+            assert page.locator("#robot").inner_text() == some[6]
+            for fragment in (
+                *words,
+                "q=" + ",".join(words[:6]),
+                "q=1;2;3;4;5;6",
+                "q=0x10,1,1,1,1,1e400",
+                "q=" + "9," * 9999,
+            ):
+                page.evaluate("text => { location.hash = text; }", fragment)
+            for button in ("Copy link", "Copy as command", "Copy as Python"):
+                page.get_by_role("button", name=button).click()
+            assert page.evaluate("window.bad") is None
+            assert page.locator("img:not(#printed), iframe, svg, a").count() == 0
+            assert page.locator("#sliders input[type=number]").count() == 6
 
 
 @pytest.mark.parametrize("fragment", ["#q=<img src=x onerror=alert(1)>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00"])

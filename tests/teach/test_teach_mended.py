@@ -66,6 +66,22 @@ def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
         until(page, f"document.querySelector('#planned').textContent.startsWith('{said}')")
 
 
+def test_hostile_words_of_a_path_file_are_shown_and_run_nothing(browser: Browser, tmp_path: Path) -> None:
+    words = ("<img src=x onerror=bad=1>", "</li><script>bad=2</script>", '"><svg/onload=bad=3>', "${bad=4}`'+(bad=5)+'")
+    file = tmp_path / "path.yaml"
+    file.write_text("moves:\n" + "".join(f"  - joint: [{k}, 60, -60]  # {word}\n" for k, word in enumerate(words)))
+    bad = tmp_path / f"{words[0].replace('/', '')}.yaml"
+    bad.write_text(f"{words[3]}: {words[0]}\nmoves: {words[2]}\n")
+    with served() as server, opened(browser, server.address) as page:
+        page.set_input_files("#load", str(file))
+        until(page, "document.querySelectorAll('#moves li').length === 4")
+        assert [page.input_value(f"#name-{k}") for k in range(4)] == list(words)
+        page.set_input_files("#load", str(bad))
+        until(page, "document.querySelector('#trouble').textContent !== ''")
+        assert page.evaluate("window.bad") is None
+        assert page.locator("img:not(#printed), svg[onload], li script").count() == 0
+
+
 def test_a_long_list_keeps_the_rows_that_stay(browser: Browser, tmp_path: Path) -> None:
     with served() as server, opened(browser, server.address) as page:
         file = tmp_path / "long.yaml"

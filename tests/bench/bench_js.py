@@ -1,0 +1,127 @@
+"""`export --js` in node beside `export --c` at -O2, one target at a time, and beside `armkin.ik`, list by list.
+
+    python tests/bench/bench_js.py [ROBOT...]                  # microseconds a target, of the processor
+    python tests/bench/bench_js.py --agree SEED [ROBOT...]     # 200 random and 100 typed poses: lists that differ
+
+Random postures within limits (for others the module looks for the nearest legal pose, which C does not); both programs
+answer the same targets in the same order, several times over, the best round counts. The bars: 3 times C's time for
+closed forms, 3 ms for the general arms; no list that differs.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
+
+from exported_js import ask, differences, goals_of
+
+import armkin
+from armkin.errors import UsageError
+from armkin.export.c.program import identifier, program
+from armkin.export.js.program import module
+from armkin.robot_file import catalogue
+
+ROUNDS = 40
+_C = """
+#include <stdio.h>
+#include <time.h>
+#include "arm.h"
+static double goals[{count} * {size}];
+int main(void) {{
+  static {name}_solution found[64];
+  double near[] = {{ {near} }}, best = 1e9;
+  int edge, total = 0;
+  FILE *file = fopen("goals.bin", "rb");
+  if (!file || fread(goals, sizeof(double), {count} * {size}, file) != {count} * {size}) return 1;
+  for (int round = 0; round < {rounds}; round++) {{
+    clock_t began = clock();
+    for (int k = 0; k < {count}; k++) total += {name}_ik(goals + k * {size}, near, found, &edge);
+    double used = (double)(clock() - began) / CLOCKS_PER_SEC;
+    if (used < best) best = used;
+  }}
+  printf("%.9f %d\\n", best, total);
+}}
+"""
+_JS = """
+import * as arm from './arm.mjs';
+import {{ readFileSync }} from 'node:fs';
+const raw = readFileSync('goals.bin');
+const flat = new Float64Array(raw.buffer, raw.byteOffset, raw.length / 8);
+const goals = Array.from({{ length: {count} }}, (_, k) => {{
+  const one = Array.from(flat.subarray(k * {size}, (k + 1) * {size}));
+  return one.length === 16 ? [0, 4, 8, 12].map((i) => one.slice(i, i + 4)) : one;
+}});
+let [best, total] = [1e9, 0];
+for (let round = 0; round < {rounds}; round++) {{
+  const began = process.cpuUsage();
+  for (const goal of goals) total += arm.ik(goal).branches.length;
+  const used = process.cpuUsage(began);
+  best = Math.min(best, (used.user + used.system) / 1e6);
+}}
+console.log(best.toFixed(9), total);
+"""
+
+
+def postures(arm: armkin.Arm, random: int, typed: int, seed: int) -> np.ndarray:
+    """Joint values (random + typed, n): random ones, and multiples of 15, 30, 45 or 90 degrees."""
+    rng = np.random.default_rng(seed)
+    turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
+    step = rng.choice([15.0, 30.0, 45.0, 90.0], (typed, 1))
+    values = np.round(rng.uniform(-180, 180, (typed, arm.n)) / step) * step
+    whole = np.where(arm.prismatic, 120.0 + values / 4, np.deg2rad(values))
+    return np.concatenate([rng.uniform(-turn, turn, (random, arm.n)), whole])
+
+
+def speed(arm: armkin.Arm, folder: Path) -> str:
+    """Microseconds a target in node and in C."""
+    javascript = module(arm)
+    general = "general elimination" in javascript.split("export", 1)[0]
+    turn = np.where(arm.prismatic, arm.reach, np.pi)
+    low, high = np.maximum(arm.lower, -turn), np.minimum(arm.upper, turn)
+    q = np.random.default_rng(1).uniform(low, high, (200 if general else 2000, arm.n))
+    goals = goals_of(arm, q)
+    goals.tofile(folder / "goals.bin")
+    fills = {"count": len(goals), "size": goals[0].size, "rounds": ROUNDS}
+    (folder / "arm.mjs").write_text(javascript, encoding="utf-8")
+    (folder / "ask.mjs").write_text(_JS.format(**fills))
+    told = subprocess.run(["node", "ask.mjs"], cwd=folder, check=True, capture_output=True, text=True).stdout.split()
+    own = float(told[0]) / len(goals) * 1e6
+    texts = program(arm, "arm.c")
+    (folder / "arm.c").write_text(texts.source)
+    (folder / "arm.h").write_text(texts.header)
+    near = ", ".join(map(repr, arm.home.tolist()))
+    (folder / "main.c").write_text(_C.format(name=identifier(arm.name), near=near, **fills))
+    subprocess.run(["gcc", "-std=c99", "-O2", "arm.c", "main.c", "-o", "ask", "-lm"], cwd=folder, check=True)
+    told = subprocess.run(["./ask"], cwd=folder, check=True, capture_output=True, text=True).stdout.split()
+    theirs = float(told[0]) / len(goals) * 1e6
+    return f"JS {own:.2f} us, C {theirs:.2f} us, {own / theirs:.2f} times"
+
+
+def agree(arm: armkin.Arm, folder: Path, seed: int) -> str:
+    """How many answers differ from Python's, and which."""
+    q = postures(arm, 200, 100, seed)
+    different = differences(arm, ask(arm, folder, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+    return "\n".join([f"{len(different)} of {len(q)} differ", *(f"    {line}" for line in different)])
+
+
+def main(words: list[str]) -> None:
+    seed = int(words[1]) if words[:1] == ["--agree"] else None
+    names = words[2:] if seed is not None else words
+    for name in names or catalogue.names():
+        arm = armkin.load(name)
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                told = speed(arm, Path(folder)) if seed is None else agree(arm, Path(folder), seed)
+            except UsageError as error:
+                told = str(error).splitlines()[0]
+        print(f"{name:14} {told}", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,92 @@
+"""Measure the page in one file beside the served one: `python tests/bench/bench_page.py [ROBOT...]`.
+
+Every shipped arm, or those named: bytes and zipped bytes of its file, CPU to write it; in one headless Chromium that
+draws in software the time from a slider's event to all numbers of the tip and of every branch, in the file and in the
+served page, and until the server has confirmed them. The bars: 1.5 MB, 450 kB, 2 s; 16 ms in the median, 40 ms for
+general arms of six joints.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
+
+from browsing import chromium  # noqa: E402
+from playwright.sync_api import Browser  # noqa: E402
+from served import teaching  # noqa: E402
+
+import armkin  # noqa: E402
+from armkin.errors import UsageError  # noqa: E402
+from armkin.robot_file import catalogue  # noqa: E402
+from armkin.teach.one_file import html  # noqa: E402
+
+EVENTS = 40
+SLIDE = """async (count) => {
+  const page = document.documentElement.dataset;
+  const numbers = () => [...document.querySelectorAll('#target input')].map((box) => box.value).join();
+  const tick = () => new Promise((done) => {
+    const line = new MessageChannel();
+    line.port1.onmessage = done;
+    line.port2.postMessage(0);
+  });
+  const bar = document.querySelectorAll('#sliders input[type=range]')[1];
+  const [low, high] = [+bar.min, +bar.max];
+  const seen = [], confirmed = [];
+  for (let k = 0; k < count; k++) {
+    await new Promise((done) => setTimeout(done, 120));
+    const before = numbers(), began = performance.now();
+    bar.value = low + (high - low) * (0.3 + 0.4 * ((k * 0.618) % 1));
+    bar.dispatchEvent(new Event('input'));
+    while (numbers() === before && performance.now() - began < 3000) await tick();
+    seen.push(performance.now() - began);
+    while (page.asking === 'yes' && performance.now() - began < 5000) await tick();
+    confirmed.push(performance.now() - began);
+  }
+  return [seen, confirmed];
+}"""
+
+
+def slid(browser: Browser, address: str) -> tuple[float, float]:
+    """Milliseconds from a slider's event to the numbers, and until they are confirmed: medians."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(address)
+    page.wait_for_selector("html[data-ready]", timeout=120_000)
+    page.wait_for_timeout(300)
+    seen, confirmed = page.evaluate(SLIDE, EVENTS)
+    page.close()
+    return statistics.median(seen), statistics.median(confirmed)
+
+
+def measure(browser: Browser, name: str, folder: Path) -> None:
+    """One arm's row."""
+    arm = armkin.load(name)
+    try:
+        html(arm)  # what is prepared once and kept, modules that are imported: a process writes one file
+    except UsageError as error:
+        print(f"{name:14} {str(error).splitlines()[0]}", flush=True)
+        return
+    began = time.process_time()
+    text = html(armkin.load(name)).encode()
+    wrote = time.process_time() - began
+    file = folder / f"{name}.html"
+    file.write_bytes(text)
+    own, _ = slid(browser, file.as_uri())
+    with teaching(name) as address:
+        served, confirmed = slid(browser, address)
+    size = f"{len(text) / 1e6:.2f} MB {len(gzip.compress(text)) / 1e3:.0f} kB {wrote:.2f} s"
+    print(f"{name:14} {size}; file {own:.1f} ms, served {served:.1f}, confirmed {confirmed:.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    with chromium() as one, tempfile.TemporaryDirectory() as place:
+        for each in sys.argv[1:] or catalogue.names():
+            measure(one, each, Path(place))
