@@ -266,3 +266,13 @@ def test_blends_that_share_a_side_s_middle_are_planned(three_dof: Arm) -> None:
     assert np.isfinite(plan.duration)
     assert (plan.limits["accel"] <= 1.002).all()
     assert worst_miss(points, tips(plan), 0.05)[0] <= 0.05
+
+
+def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_dof: Arm, tmp_path: Path) -> None:
+    file = tmp_path / "corners.csv"
+    file.write_text("x,y,z,blend,tool_speed\n390,80,300,,\n390,100,300,2,\n370,100,300,,50\n370,80,300,,\n")
+    assert len(armkin.path(three_dof, file).on_path) == 2
+    assert len(armkin.path(three_dof, file, blend=1.0).on_path) == 1
+    file.write_text("x,y,z,blend\n390,80,,\n390,100,300,2\n")
+    with pytest.raises(UsageError, match=r"corners\.csv:2: '' is no number"):
+        armkin.path(three_dof, file)

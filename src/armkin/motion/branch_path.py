@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 _GRID = 1000  # points of a route's grid, at least
 _STEP = 1.0  # [mm] between the first samples, at most
 _SAMPLES = (200, 20_000)
-_MANY = 8  # rests: all that lies between them is planned at once
+_MANY = 8  # rests: what lies between more of them is planned together, so many samples at once
+_AT_ONCE = 8192
 _FARTHEST = 2.0  # [mm] between those of a path that has more
 
 
@@ -164,22 +165,26 @@ def stretches(
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
     kept = None if grid < _GRID else pace.tolerance
-    if len(edges) > _MANY:  # what lies between two rests is independent: one grid and one law for all
-        number, inner = max(grid, len(s) * grid // (2 * _GRID)), np.array(edges[1:-1])
-        path, _, off = fine_enough(arm, route, s, q, edges[0], edges[-1], number, kept, run.chain.windows, inner)
-        _check_kept(path, off, pace)
-        return _timed(arm, route, path, pace)
     made: list[Curve | Smoothed] = []
-    for a, b in pairwise(edges):
+    for part in _groups(edges, s):
+        a, b, inner = part[0], part[-1], np.array(part[1:-1])
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows)
+        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows, inner)
         _check_kept(path, off, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
-        made += _timed(arm, route, finer(knots(path.s, path.q, breaks)), pace)
+        made += _timed(arm, route, path if len(inner) else finer(knots(path.s, path.q, breaks)), pace)
     return made
+
+
+def _groups(edges: list[float], s: Array) -> list[list[float]]:
+    """Places of rest, from one to the next; where there are many, some together: between them all is independent."""
+    if len(edges) <= _MANY:
+        return [list(pair) for pair in pairwise(edges)]
+    first = np.flatnonzero(np.diff(np.searchsorted(s, edges[:-1]) // _AT_ONCE, prepend=-1)).tolist()
+    return [edges[a : b + 1] for a, b in pairwise([*first, len(edges) - 1])]
 
 
 def _check_kept(path: Knots, off: Array, pace: Pace) -> None:

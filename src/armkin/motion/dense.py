@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
 
 FIT = 0.94  # share of the tolerance: points to curve (chords to curve: less, see `fitting`)
-PLAN = (0.2, 0.05, 0.02)  # curve to motion, whatever the points; the first with which all points are within it
+PLAN = (0.1, 0.05, 0.02)  # curve to motion, whatever the points; the first with which all points are within it
+_AT_ONCE = 8192  # points that are fitted together, about
 _FARTHEST_TURN = 5.0  # [rad] that rotation vectors tell from less
 _NAN = float("nan")
 
@@ -54,19 +56,21 @@ class Polyline:
         """Smooth curves through all, one between each two places where the way turns back."""
         spots = _Spots.of(self.task, self.first, self.rows)
         speeds = np.array(self.speeds)
-        scale = weights(self.task)
         y = spots.relative(0, len(spots.p) - 1)
         if y is None:  # the tool turns so far that it is laid line by line
             return self._lines(spots, speeds)
-        kept = distinct(y * scale)
-        back = 1 + np.flatnonzero(turns(y[kept] * scale) > REVERSAL) if len(kept) > 2 else np.zeros(0, int)
-        made = []
-        for a, b in pairwise([0, *back.tolist(), len(kept) - 1]):
-            numbers = kept[a : b + 1]
-            values = spots.relative(int(numbers[0]), int(numbers[-1]))
+        y = y * weights(self.task)
+        kept = distinct(y)
+        back = 1 + np.flatnonzero(turns(y[kept]) > REVERSAL) if len(kept) > 2 else np.zeros(0, int)
+        ends = np.concatenate([[0], back, [len(kept) - 1]])
+        turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
+        made: list[Piece] = []
+        for part in _blocks(ends, 1 if turning else _AT_ONCE):
+            numbers, first = kept[part[0] : part[-1] + 1], int(kept[part[0]])
+            values = spots.relative(first, int(numbers[-1])) if turning else y[first : numbers[-1] + 1]
             assert values is not None
-            own = speeds[numbers[1:] - 1]
-            made.append(_piece(self.task, spots, numbers, values[numbers - numbers[0]] * scale, own, tolerance))
+            values = (values * weights(self.task) if turning else values)[numbers - first]
+            made += _block(self.task, spots, numbers, part - part[0], values, speeds[numbers[1:] - 1], tolerance)
         return made
 
     def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
@@ -129,27 +133,66 @@ class _Spots:
         return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
 
 
-def _piece(task: Task, spots: _Spots, numbers: Int, y: Array, speeds: Array, tolerance: float) -> Piece:
-    """The smooth curve through some of the spots; y: (N, d) [mm]; speeds: (N - 1, 2) of the lines between them."""
+def _blocks(ends: Int, points: int) -> list[Int]:
+    """Ends of stretches (k,) in groups of about so many points, the last end of each the first of the next one."""
+    first = np.flatnonzero(np.diff((ends[:-1] - ends[0]) // points, prepend=-1))
+    return [ends[a : b + 1] for a, b in pairwise([*first.tolist(), len(ends) - 1])]
+
+
+def _block(
+    task: Task, spots: _Spots, numbers: Int, ends: Int, y: Array, speeds: Array, tolerance: float
+) -> list[Piece]:
+    """Smooth curves through some of the spots, one from each of the ends to the next.
+
+    y: (N, d) the spots, in millimetres; speeds: (N - 1, 2) of the lines between them.
+    """
     if len(numbers) == 2:
-        speed, tool = speeds[0].tolist()
-        made = line(task, spots.at(numbers[0]), spots.at(numbers[1]))
-        return replace(made, speed=_or_none(speed), tool_speed=_or_none(tool))
-    curve: Fitted = fitted(y, FIT * tolerance)
-    scale = weights(task)
+        return [_line(task, spots, numbers, speeds)]
+    moving = (y != y[0]).any(axis=0)  # the others stay
+    scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
+    curve: Fitted = fitted(y[:, moving], FIT * tolerance, stop)
+    still = np.where(moving, 0.0, y[0] / weights(task))
 
     def at(v: Array) -> tuple[Array, Array]:
-        values, slopes = curve.values(v)
-        return values / scale, slopes / scale
+        values, slopes = np.repeat(still[None], len(v), axis=0), np.zeros((len(v), len(still)))
+        values[:, moving], slopes[:, moving] = (each / scale for each in curve.values(v))
+        return values, slopes
 
-    made, length = unit_speed(task, spots.at(numbers[0]), at, curve.begin)
-    given = length(curve.at)
+    whole, length = unit_speed(task, spots.at(numbers[0]), at, curve.begin)
+    given, bends, spans = length(curve.at), length(curve.bends), length(curve.begin)
     same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
-    new = np.flatnonzero(np.append(True, ~same.all(axis=1)))
-    dense = Dense(
-        given, spots.p[numbers], length(curve.bends), length(curve.begin), given[new], speeds[new, 0], speeds[new, 1]
-    )
-    return replace(made, dense=dense)
+    new = np.append(True, ~same.all(axis=1))
+    made = []
+    for a, b in pairwise(ends.tolist()):
+        if b == a + 1:
+            made.append(_line(task, spots, numbers[a : b + 1], speeds[a:b]))
+            continue
+        begins = a + np.flatnonzero(np.append(True, new[a + 1 : b]))
+        low, high = given[a], given[b]
+        (i, j), (k, m) = (np.searchsorted(x, [low - 1e-12, high + 1e-12]).tolist() for x in (bends, spans))
+        dense = Dense(
+            given[a : b + 1] - low,
+            spots.p[numbers[a : b + 1]],
+            bends[i:j] - low,
+            spans[k:m] - low,
+            given[begins] - low,
+            speeds[begins, 0],
+            speeds[begins, 1],
+        )
+        first = replace(whole.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
+        made.append(Piece(task, first, partial(_shifted, whole.along, low), high - low, dense=dense))
+    return made
+
+
+def _shifted(along: Callable[[Array], Array], begin: float, s: Array) -> Array:
+    return along(s + begin)
+
+
+def _line(task: Task, spots: _Spots, numbers: Int, speeds: Array) -> Piece:
+    """The line between two spots."""
+    speed, tool = speeds[0].tolist()
+    made = line(task, spots.at(numbers[0]), spots.at(numbers[1]))
+    return replace(made, speed=_or_none(speed), tool_speed=_or_none(tool))
 
 
 def _or_none(value: float) -> float | None:

@@ -14,24 +14,15 @@ from functools import cached_property
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.motion.b_spline import Int, Layout, least_squares
+from armkin.motion.b_spline import Int, Layout
+from armkin.motion.least_knots import SHORT, Rows, least_knots
 
 CORNER = np.deg2rad(20.0)  # a larger turn is rounded
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
 _SAME = 1e-6  # [mm] nearer points are one
 _SCALE = 16.0  # tolerances: from so far off a corner is still one
-_SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
-_CHORD = 0.85  # share of the tolerance, beside chords
 _BETWEEN = 6  # places of each cubic that are held to its chords in the end
-_EVEN = 8  # parts of a chord that is long beside a neighbour
-_SPARE = 0.98  # of what is allowed
-_POINTS, _LONGEST = 32, 20.0  # of a first interval: points, or [mm]
-_ROUNDS = 80
 _TRIES = 5  # after which a curve that leaves its chords is given up
-_TELLING, _CLOSE = 5, 0.05  # points that tell misfit from noise; of what is allowed: such a misfit is none
-_PATIENCE = 4  # rounds of weighing before an interval is divided
-_HEAVIEST = 1e6  # a point's weight
-_HOPELESS = 2.5  # times what is allowed: dividing helps, weights do not
 
 
 @dataclass(frozen=True)
@@ -48,7 +39,7 @@ class Fitted:
         i = np.clip(np.searchsorted(self.begin, v, side="right") - 1, 0, len(self.begin) - 2)
         h = (self.begin[i + 1] - self.begin[i])[:, None]
         f = (v - self.begin[i])[:, None] / h
-        c0, c1, c2, c3 = (self.powers[:, k][i] for k in range(4))
+        c0, c1, c2, c3 = self.powers[i].transpose(1, 0, 2)
         return c0 + f * (c1 + f * (c2 + f * c3)), (c1 + f * (2 * c2 + 3 * f * c3)) / h
 
 
@@ -90,7 +81,7 @@ class Chords:
         for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             half = np.minimum(0.5 * L[chord] * bend, 1.0)
             rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
-            tells = (turned <= CORNER) & (L[neighbour] >= _SHORT * L[chord])
+            tells = (turned <= CORNER) & (L[neighbour] >= SHORT * L[chord])
             out[chord] = np.maximum(out[chord], np.where(tells, rise, 0.0))
         return out
 
@@ -109,27 +100,35 @@ def distinct(y: Array) -> Int:
     return np.flatnonzero(np.append(True, apart))
 
 
-def corners(y: Array, tolerance: float) -> Bool:
-    """Which points (N, d) are corners: the direction turns by more than 20 degrees, from near and from afar."""
+def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
+    """Which points (N, d) are corners: the direction turns by more than 20 degrees, from near and from afar.
+
+    stop: (N,) points that nothing is seen beyond, and which are corners in any case, but for the ends.
+    """
     found = np.zeros(len(y), bool)
     sharp = np.flatnonzero(turns(y) > CORNER) + 1
     length = np.linalg.norm(np.diff(y, axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(length)])
-    off = np.maximum(_SCALE * tolerance, 0.0)
-    sides = [np.maximum(off, length[sharp - 1]), np.maximum(off, length[sharp])]
-    before, after = (
-        np.stack([np.interp(u[sharp] + way, u, y[:, k]) for k in range(y.shape[1])], axis=1)
-        for way in (-sides[0], sides[1])
-    )
+    off = _SCALE * tolerance
+    ends = np.array([0, len(y) - 1]) if stop is None else np.flatnonzero(stop)
+    next_ = np.searchsorted(ends, sharp, side="right")
+    before = np.maximum(u[sharp] - np.maximum(off, length[sharp - 1]), u[ends[next_ - 1]])
+    after = np.minimum(u[sharp] + np.maximum(off, length[sharp]), u[ends[next_]])
+    sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
     if len(sharp):
-        far = turns(np.stack([before, y[sharp], after], axis=1).reshape(-1, y.shape[1]))[::3]
+        far = turns(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
         found[sharp[far > CORNER]] = True
+    found[ends[1:-1]] = True
     return found
 
 
-def fitted(y: Array, tolerance: float) -> Fitted:
-    """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order."""
-    chords = Chords(y, corners(y, tolerance))
+def fitted(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
+    """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order.
+
+    stop: (N,) where the way rests, the ends among them: there it stays a corner.
+    """
+    chords = Chords(y, corners(y, tolerance, stop))
+    stop = np.zeros(len(y), bool) if stop is None else stop
     used, parts = np.ones(len(y) - 1, bool), []
     for round_ in range(_TRIES + 1):
         begin, end, powers, missed = _curves(chords, used, tolerance)
@@ -145,7 +144,7 @@ def fitted(y: Array, tolerance: float) -> Fitted:
     order = np.argsort(begin, kind="stable")
     begin, end, powers = begin[order], end[order], powers[order]
     curve = chords.curve[np.searchsorted(chords.u, (begin + end) / 2) - 1]
-    return _rounded(chords, begin, end, powers, curve, tolerance)
+    return _rounded(chords, stop, begin, end, powers, curve, tolerance)
 
 
 def _of_curves(chords: Chords, some: Bool) -> Bool:
@@ -165,8 +164,8 @@ def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array,
     begin, end, powers = u[:-1][alone], u[1:][alone], flat
     bent = used & ~alone
     if bent.any():
-        rows = _Rows.of(chords, bent, tolerance)
-        layout, control, off = _least_knots(rows)
+        rows = Rows.of(chords, bent, tolerance)
+        layout, control, off = least_knots(rows)
         bad = off > 1.0
         missed[rows.point[bad & (rows.point >= 0)]] = True
         cubics = layout.powers(control)
@@ -211,153 +210,16 @@ def _astray_chords(chords: Chords, layout: Layout, cubics: Array, tolerance: flo
     return np.unique(k[away > tolerance + chords.sagitta[k]])
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """What the curves are held to: given points, and places on chords between them."""
-
-    u: Array  # (R,)
-    y: Array  # (R, d)
-    curve: Int  # (R,) from 0 without gaps
-    curves: Int  # their numbers
-    allowed: Array  # (R,) [mm]
-    weight: Array  # (R,)
-    along: Array  # (R, d) direction of the chord of a place on one; 0 for a given point
-    point: Int  # (R,) number of the given point, -1: a place on a chord
-    chord: Int  # (R,)
-    before: Array  # (R,) [mm] of its chord, from its begin to a place on it
-    beyond: Array  # (R,) from there to its end
-    ends: Bool  # (R,) ends of curves
-
-    @staticmethod
-    def of(chords: Chords, used: Bool, tolerance: float) -> _Rows:
-        """Rows of the chords that are used: (N - 1,)."""
-        chord, f, weight = [np.flatnonzero(used)] * 2, [0.0, 0.5], [1.0, 0.0]
-        last = used & np.append(chords.curve[1:] != chords.curve[:-1], True)
-        chord.append(np.flatnonzero(last))
-        f.append(1.0)
-        weight.append(1.0)
-        numbers = np.concatenate(chord)
-        share = np.repeat(f, [len(each) for each in chord])
-        heavy = np.repeat(weight, [len(each) for each in chord])
-        more, places = _graded(chords, used)
-        numbers, share = np.append(numbers, more), np.append(share, places)
-        heavy = np.append(heavy, np.ones(len(more)))
-        u = chords.u[numbers] + share * chords.length[numbers]
-        order = np.lexsort((u, chords.curve[numbers]))
-        apart = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
-        order = order[apart]
-        u, numbers, share, heavy = u[order], numbers[order], share[order], heavy[order]
-        given = (share == 0) | (share == 1)
-        names, curve = np.unique(chords.curve[numbers], return_inverse=True)
-        edge = np.append(True, curve[1:] != curve[:-1])
-        return _Rows(
-            u,
-            chords.y[numbers] + share[:, None] * chords.step[numbers],
-            curve,
-            names,
-            _SPARE * np.where(given, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
-            heavy,
-            np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None]),
-            np.where(given, numbers + (share == 1), -1),
-            numbers,
-            share * chords.length[numbers],
-            (1 - share) * chords.length[numbers],
-            edge | np.append(edge[1:], True),
-        )
-
-    def miss(self, values: Array) -> Array:
-        """How curves that pass `values` (R, d) leave the rows: points across their own direction, chords: (R, d)."""
-        miss = values - self.y
-        along = np.empty_like(values)
-        along[1:-1] = values[2:] - values[:-2]
-        along[0], along[-1] = along[1], along[-2]
-        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-        along = np.where(self.point[:, None] >= 0, along, self.along)
-        along[self.ends] = 0.0
-        far = (miss * along).sum(axis=1)
-        past = np.maximum(far - self.beyond, 0.0) + np.minimum(far + self.before, 0.0)  # a chord's end, or its begin
-        far -= np.where(self.point >= 0, 0.0, past)
-        return np.asarray(miss - far[:, None] * along)
-
-
-def _graded(chords: Chords, used: Bool) -> tuple[Int, Array]:
-    """Places on chords that are long beside their neighbours, closer together towards these: chords, fractions."""
-    L = chords.length
-    same = np.append(False, (chords.curve[1:] == chords.curve[:-1])) & used
-    other = np.append(same[1:], False)
-    left = np.where(same, np.append(np.inf, L[:-1]), np.inf)
-    right = np.where(other, np.append(L[1:], np.inf), np.inf)
-    alone = np.flatnonzero(np.minimum(left, right) < _SHORT * L)
-    even = np.arange(1, _EVEN) / _EVEN
-    numbers, places = [np.repeat(alone, len(even))], [np.tile(even, len(alone))]
-    for neighbour, side in ((left, 0), (right, 1)):
-        at = neighbour
-        while (long := np.flatnonzero((neighbour < _SHORT * L) & (at < 0.45 * L))).size:
-            numbers.append(long)
-            f = at[long] / L[long]
-            places.append(f if side == 0 else 1 - f)
-            at = np.where(at < 0.45 * L, 2 * at + neighbour, at)
-    return np.concatenate(numbers), np.concatenate(places)
-
-
-def _least_knots(rows: _Rows) -> tuple[Layout, Array, Array]:
-    """Splines of few knots through rows: layout, control points, and how far they leave the rows (R,)."""
-    first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
-    inside = np.arange(len(rows.u)) - first[rows.curve]
-    many = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _LONGEST))
-    knot = rows.ends | np.append(False, np.diff(many) > 0)
-    weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
-    for round_ in range(_ROUNDS):
-        layout = Layout.of(rows.u, rows.curve, knot)
-        control = least_squares(layout, rows.y, weight, rows.ends)
-        miss = rows.miss(layout.values(control))
-        off = np.linalg.norm(miss, axis=1) / rows.allowed
-        bad, astray = off > 1.0, _astray(rows, layout, miss, weight)
-        if not (bad.any() or astray.any()) or round_ == _ROUNDS - 1:
-            break
-        worst = np.zeros(len(layout.begin))
-        np.maximum.at(worst, layout.interval[bad], off[bad])
-        begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
-        at = np.flatnonzero(knot)
-        mine = at[np.searchsorted(at, begins[:-1])]
-        divide = astray | (worst > _HOPELESS) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
-        age[mine[worst > 1.0]] += 1
-        middle = (begins[:-1] + begins[1:]) // 2
-        can = divide & (middle > begins[:-1]) & ~knot[middle]
-        knot[middle[can]] = True
-        age[mine[can]] = age[middle[can]] = 0
-        fresh = can[layout.interval]
-        weight[fresh] = rows.weight[fresh]
-        heavier = bad & ~fresh
-        weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * off[heavier]) ** 2, _HEAVIEST)
-    return layout, control, off
-
-
-def _astray(rows: _Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
-    """Which intervals miss their points in a way that is no noise: neighbours lie on the same side (M,)."""
-    given = np.flatnonzero(rows.point >= 0)
-    a, b = given[:-1], given[1:]
-    where = layout.interval[a]
-    inside = where == layout.interval[b]
-    a, b, where = a[inside], b[inside], where[inside]
-    M = len(layout.begin)
-    like = np.bincount(where, (miss[a] * miss[b]).sum(axis=1), M)
-    size = np.bincount(where, (miss[a] ** 2).sum(axis=1), M)
-    many = np.bincount(where, minlength=M)
-    weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
-    return np.asarray(
-        ~weighed & (many >= _TELLING) & (like > 0.5 * size) & (size > many * (_CLOSE * rows.allowed[0]) ** 2)
-    )
-
-
-def _rounded(chords: Chords, begin: Array, end: Array, powers: Array, curve: Int, tolerance: float) -> Fitted:
-    """Curves with their corners rounded by cubics, within the tolerance and half of the sides."""
+def _rounded(
+    chords: Chords, stop: Bool, begin: Array, end: Array, powers: Array, curve: Int, tolerance: float
+) -> Fitted:
+    """Curves with their corners, but for stops, rounded by cubics, within the tolerance and half of the sides."""
     corner = np.flatnonzero(chords.corner)
     at, u = chords.u.copy(), chords.u
     if not len(corner):
         return Fitted(np.append(begin, end[-1]), powers, at, np.zeros(0))
     whole = Fitted(np.append(begin, end[-1]), powers, at, np.zeros(0))
-    most = 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner])
+    most = np.where(stop[corner], 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
     tiny = 1e-9 * most
     before, after = (whole.values(u[corner] + way)[1] for way in (-tiny, tiny))
     bend = np.linalg.norm(before - after, axis=1)
@@ -370,7 +232,6 @@ def _rounded(chords: Chords, begin: Array, end: Array, powers: Array, curve: Int
         if (off <= tolerance).all():
             break
         r = np.where(off > tolerance, 0.9 * r * tolerance / np.maximum(off, 1e-12), r)
-    low, high = (np.concatenate([[x], u[corner] + way, [y]]) for x, way, y in ((u[0], r, np.nan), (np.nan, -r, u[-1])))
     # a curve's number is the number of corners before it: it keeps what lies between low and high
     low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
     x, y = np.maximum(begin, low[curve]), np.minimum(end, high[curve])
@@ -378,10 +239,12 @@ def _rounded(chords: Chords, begin: Array, end: Array, powers: Array, curve: Int
     x, y, begin, end, powers = x[keep], y[keep], begin[keep], end[keep], powers[keep]
     cut = _part(powers, (x - begin) / (end - begin), (y - begin) / (end - begin))
     blends = np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
-    order = np.argsort(np.append(x, u[corner] - r), kind="stable")
-    starts = np.append(x, u[corner] - r)[order]
-    bends = np.concatenate([u[corner] - r, u[corner] + r])
-    return Fitted(np.append(starts, u[-1]), np.concatenate([cut, blends])[order], at, np.sort(bends))
+    round_ = ~stop[corner]
+    corner, r = corner[round_], r[round_]
+    starts = np.append(x, u[corner] - r)
+    order = np.argsort(starts, kind="stable")
+    bends = np.sort(np.concatenate([u[corner] - r, u[corner] + r]))
+    return Fitted(np.append(starts[order], u[-1]), np.concatenate([cut, blends[round_]])[order], at, bends)
 
 
 def _part(c: Array, a: Array, b: Array) -> Array:

@@ -274,9 +274,11 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
     if piece.rate:
         return inner + math.copysign(radius / piece.rate, outer - inner)
-    for _ in range(60):
-        middle = (inner + outer) / 2
-        inner, outer = (middle, outer) if _away(piece, corner, middle) < radius else (inner, middle)
+    for _ in range(9):  # each time a part of 1/100 of what is left
+        s = np.linspace(inner, outer, 101)
+        away = np.linalg.norm(piece.along(s)[:, : piece.task.position] - corner, axis=1)
+        k = min(int(np.argmax(away[1:] >= radius)), 99) if (away[1:] >= radius).any() else 99
+        inner, outer = float(s[k]), float(s[k + 1])
     return outer
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.forward import fk, jacobian, position
+from armkin.forward import jacobian, position, tip_and_jacobian
+from armkin.inverse.numeric.linalg import damped_steps
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.model.units import radian_or_reach
 from armkin.motion.linked_branches import chord_bound, levers
@@ -22,10 +23,12 @@ if TYPE_CHECKING:
 _TIMES = 16.0  # as many points, at most, where the tolerance needs them
 _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
+_COARSE = 0.05  # [mm] steps are no coarser, if the tolerance is not
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
 _DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _REST = 32  # intervals from rest to rest, at least, where there are many rests
 _SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
+_SHORT, _QUADRATIC = 1e-5, 1e-3  # so is it after a short step, by so much shorter than the one before
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
@@ -52,17 +55,19 @@ def fine_enough(
     resting = _nearest(where[breaks], stops)
     most = _TIMES * len(where)
     for damping in _DAMPING:
-        known = None
+        known, before = None, None
         for _ in range(_ROUNDS):
             values = _solved(arm, route, s, q, where, damping, known, windows)
             path = known = knots(where, values, breaks.tolist(), breaks[resting].tolist())
             if tolerance is None:
                 return path, breaks.tolist(), np.zeros(len(path.h))
-            every = interval_deviations(arm, route, path)
-            off = np.delete(every, path.rests)
-            if off.max() <= tolerance or len(where) > most:
+            every, steps = interval_deviations(arm, route, path, before), _steps(arm, path)
+            before = path, every
+            off, steps = (np.delete(each, path.rests) for each in (every, steps / max(tolerance, _COARSE)))
+            if max(off.max() / tolerance, steps.max()) <= 1.0 or len(where) > most:
                 break
-            parts = np.ceil(np.clip(1.1 * np.sqrt(off / tolerance), 1.0, 4.0)).astype(int)
+            needed = np.maximum(np.cbrt(off / tolerance), np.sqrt(steps))  # of third and of second order in h
+            parts = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
             beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
             where, breaks = _divided(where, breaks, np.maximum(parts, 1 + beside))
         if off.max() <= tolerance:
@@ -159,19 +164,25 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
     k, p = len(task.sums), task.position
     scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
     scale[:p] = 1 / arm.reach
+    unit = radian_or_reach(arm)
+    each = unit[:, None, None] * scale[:, None]  # (n, k, 1)
+    each[:, p : p + k] *= arm.ratio[:, None, None]
+    out, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
     for _ in range(steps):
-        T = fk(arm, q)
-        r = residual(task, T, q * arm.ratio, target) * scale
-        J = axis_projected(task, task_jacobian(task, jacobian(arm, q)), T) * scale[:, None]
-        J[:, p : p + k] *= arm.ratio
-        J = J * radian_or_reach(arm)
-        H = np.swapaxes(J, 1, 2) @ J + (damping / arm.reach) ** 2 * np.eye(arm.n)
-        step = np.linalg.solve(H, (np.swapaxes(J, 1, 2) @ r[:, :, None]))[..., 0]
-        size = np.abs(step).max(axis=1, keepdims=True)
-        q = q + np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0) * step * radian_or_reach(arm)
-        if size.max(initial=0.0) < _SETTLED:
+        q, wanted = out[open_], target[open_]
+        T, J = tip_and_jacobian(arm, q)
+        r = np.multiply(residual(task, T, q * arm.ratio, wanted).T, scale[:, None], order="C")
+        J = axis_projected(task, task_jacobian(task, J), T)
+        step = damped_steps(np.multiply(J.transpose(2, 1, 0), each, order="C"), r, (damping / arm.reach) ** 2)
+        size = np.abs(step).max(axis=0)
+        step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
+        out[open_] = q + step.T * unit
+        # where a step is so much shorter than the one before, the next one would be nothing
+        going = (size >= _SETTLED) & ((size > _SHORT) | (size > _QUADRATIC * before))
+        open_, before = open_[going], size[going]
+        if not len(open_):
             break
-    return np.asarray(q)
+    return out
 
 
 def deviation(arm: Arm, route: Route, path: Knots) -> float:
@@ -179,17 +190,36 @@ def deviation(arm: Arm, route: Route, path: Knots) -> float:
     return float(interval_deviations(arm, route, path).max(initial=0.0))
 
 
-def interval_deviations(arm: Arm, route: Route, path: Knots) -> Array:
+def interval_deviations(arm: Arm, route: Route, path: Knots, before: tuple[Knots, Array] | None = None) -> Array:
     """An upper bound of the distance between the tip and the route in every interval of a grid: (N - 1,) [mm].
 
-    Chord against tip: `chord_bound`; cubic against chord: h^2 / 8 |q''| times the levers; chord against route:
-    its sagitta in the middle of each interval, a third more for what is not symmetrical.
+    The distance e is none at both ends and looked at in both quarters; up to the middle a quadratic through an end,
+    the near quarter and the other end is at most 4/3 of what is seen there, and e leaves it by h^3 / 96 |e'''|: the
+    tip's is bounded by levers. before: a coarser grid and its distances; where a cubic is the same, so are they.
     """
-    lever = levers(arm)
-    parts = [slice(i, i + _BLOCK + 1) for i in range(0, len(path.s) - 1, _BLOCK)]
-    off = np.concatenate([_deviations(arm, route, Knots(path.s[p], path.q[p], path.d[p]), lever) for p in parts])
-    off[path.rests] = 0.0
+    lever, off = levers(arm), np.zeros(len(path.h))
+    open_ = path.s[1:] > path.s[:-1]
+    if before is not None:
+        known, distances = before
+        at = np.searchsorted(path.s, known.s)
+        at += (np.diff(known.s, prepend=-1.0) == 0) & (path.s[np.minimum(at + 1, len(path.s) - 1)] == known.s)
+        same = (at[1:] == at[:-1] + 1) & (path.d[at[1:]] == known.d[1:]).all(axis=1)
+        same = np.flatnonzero(same & (path.d[at[:-1]] == known.d[:-1]).all(axis=1))
+        off[at[same]], open_[at[same]] = distances[same], False
+    some = np.flatnonzero(open_)
+    for part in (some[i : i + _BLOCK] for i in range(0, len(some), _BLOCK)):
+        off[part] = _deviations(arm, route, path, part, lever)
     return off
+
+
+def _steps(arm: Arm, path: Knots) -> Array:
+    """Bounds of how far the tip leaves its chord in every interval: the law of time needs them small (N - 1,) [mm]."""
+    lever, h = levers(arm), path.h[:, None]
+    left, right = path.second()
+    bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
+    off = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
+    off[path.rests] = 0.0
+    return np.asarray(off)
 
 
 def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:
@@ -214,14 +244,21 @@ def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:
     return worst
 
 
-def _deviations(arm: Arm, route: Route, path: Knots, lever: Array) -> Array:
-    left, right = path.second()
-    h = path.h[:, None]
-    bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
-    tip = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
-    p = position(arm, path.q)
-    middle = route.targets((path.s[:-1] + path.s[1:]) / 2)
-    full = route.task.orientation == "full"
-    m = middle[:, :3, 3] if full else middle[:, : route.task.position]
-    sagitta = np.linalg.norm(m - ((p[:-1] + p[1:]) / 2)[:, : m.shape[1]], axis=1)
-    return np.asarray(tip + 4 / 3 * sagitta)
+def _deviations(arm: Arm, route: Route, path: Knots, some: Int, lever: Array) -> Array:
+    h, seen = path.h[some, None], np.zeros(len(some))
+    start, d0, d1 = path.q[some], path.d[some] * h, path.d[some + 1] * h
+    chord = path.q[some + 1] - start
+    for f in (0.25, 0.75):
+        q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
+        wanted = route.targets(path.s[some] + f * h[:, 0])
+        wanted = wanted[:, :3, 3] if route.task.orientation == "full" else wanted[:, : route.task.position]
+        off = position(arm, q)[:, : wanted.shape[1]] - wanted
+        seen = np.maximum(seen, np.sqrt((off**2).sum(axis=1)))
+    # h, h^2 and h^3 times the greatest q', q'' and q''' of each joint
+    first = np.maximum(np.maximum(np.abs(d0), np.abs(d1)), np.abs(3 * chord - d0 - d1))
+    second = np.maximum(np.abs(6 * chord - 4 * d0 - 2 * d1), np.abs(6 * chord - 2 * d0 - 4 * d1))
+    third = np.abs(6 * (d0 + d1 - 2 * chord))
+    turned = first @ np.where(arm.prismatic, 0.0, np.abs(arm.ratio)) * (2.0 if arm.prismatic.any() else 1.0)
+    levered = first @ lever
+    tip = turned * (levered * first).sum(axis=1) + 3 * (levered * second).sum(axis=1)
+    return np.asarray(4 / 3 * seen + (tip + third @ np.where(arm.prismatic, 1.0, np.diag(lever))) / 96)

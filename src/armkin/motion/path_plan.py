@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
-from armkin.forward import condition
+from armkin.forward import condition, jacobian
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.route import Reduced
 from armkin.motion.trajectory import Stretch, Trajectory, grouped
@@ -105,10 +105,13 @@ class PathPlan:
 
     def nearer_singularity(self, q: Array, s: Array) -> None:
         """Note where joint values (N, n) at lengths s (N,) behind the present end come nearest to a singularity."""
-        worst = np.concatenate([condition(self.arm, q[k : k + _BLOCK]) for k in range(0, len(q), _BLOCK)])
-        k = int(np.argmax(worst))
-        if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
-            self.nearest_singularity = (self.length + float(s[k]), float(worst[k]), q[k].copy())
+        for i in range(0, len(q), _BLOCK):
+            some = _worst(self.arm, q[i : i + _BLOCK])
+            worst = condition(self.arm, q[i + some])
+            k = int(np.argmax(worst))
+            if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
+                at = i + some[k]
+                self.nearest_singularity = (self.length + float(s[at]), float(worst[k]), q[at].copy())
 
     def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """The same with its motion from a posture on."""
@@ -181,3 +184,23 @@ class PathPlan:
         if np.isfinite(self.arm.max_jerk).all() and jerk.any():
             shares["jerk"] = jerk / self.arm.max_jerk
         return shares
+
+
+def _worst(arm: Arm, q: Array) -> NDArray[np.intp]:
+    """Which of the joint values (N, n) may have the greatest condition number: of three joints few of them.
+
+    The squares of three singular values are the eigenvalues of J J', in closed form (Smith, Eigenvalues of a symmetric
+    3 x 3 matrix, 1961), to half of the digits: what is near the greatest, or too great to tell, is looked at again.
+    """
+    if arm.n != 3:
+        return np.arange(len(q))
+    J = jacobian(arm, q)[:, :3]
+    a, b, c = np.ascontiguousarray(J.transpose(1, 2, 0)) / arm.reach  # rows, (3, N) each
+    aa, bb, cc, ab, ac, bc = ((x * y).sum(axis=0) for x, y in ((a, a), (b, b), (c, c), (a, b), (a, c), (b, c)))
+    mean = (aa + bb + cc) / 3
+    aa, bb, cc = aa - mean, bb - mean, cc - mean
+    size = np.sqrt((aa**2 + bb**2 + cc**2 + 2 * (ab**2 + ac**2 + bc**2)) / 6)
+    det = aa * (bb * cc - bc**2) - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac)
+    angle = np.arccos(np.clip(det / np.maximum(2 * size**3, 1e-300), -1.0, 1.0)) / 3
+    share = (mean + 2 * size * np.cos(angle + 2 * np.pi / 3)) / (mean + 2 * size * np.cos(angle))
+    return np.flatnonzero(share <= max(float(share.min()) * (1 + 1e-3), 1e-9))

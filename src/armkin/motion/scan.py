@@ -2,35 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 
+Int = NDArray[np.intp]
 _FEWEST, _MOST = 8, 4096  # intervals that are followed one by one before it is asked whether that can end
+_TOGETHER = 32  # runs: more of them go side by side
+_LONGEST = 64  # steps of runs side by side, while there are no more of them
+_TIMES = 8  # after which they go one by one in any case
 
 
 class Least(NamedTuple):
-    """The least of affine functions a y + b for y from 0 to `top`, in every interval.
+    """The least of affine functions a y + b for y from 0 to some greatest, in every interval.
 
-    Of the many rows of an interval only a few are the least anywhere: that at y = 0, that at y = top, and of the
-    others at most those (`more`) that are lower where these two cross.
+    Of the many rows of an interval only a few are the least anywhere: that at y = 0, that at the greatest y, and of
+    the others at most those that are lower where these two cross.
     """
 
-    reach: Array  # (M,) its value at y = top
-    a0: Array
+    a0: Array  # (M,)
     b0: Array
     a1: Array
     b1: Array
-    more: dict[int, list[tuple[float, float]]]
+    at: Int  # (E,) intervals of the others, ascending
+    slope: Array  # (E,)
+    level: Array
+
+    def values(self, y: Array) -> Array:
+        """What every interval says of y: (M,) -> (M,)."""
+        out = np.minimum(self.a0 * y + self.b0, self.a1 * y + self.b1)
+        np.minimum.at(out, self.at, self.slope * y[self.at] + self.level)
+        return out
 
     def part(self, lo: int, hi: int) -> Least:
         """The same of intervals lo to hi."""
-        more = {i - lo: rows for i, rows in self.more.items() if lo <= i < hi}
-        reach, a0, b0, a1, b1 = (each[lo:hi] for each in (self.reach, self.a0, self.b0, self.a1, self.b1))
-        return Least(reach, a0, b0, a1, b1, more)
+        first, last = np.searchsorted(self.at, [lo, hi])
+        others = (each[first:last] for each in (self.at - lo, self.slope, self.level))
+        return Least(*(each[lo:hi] for each in self[:4]), *others)
+
+    def put(self, some: Int, new: Least) -> Least:
+        """The same with other functions in some intervals (k,), ascending."""
+        for mine, one in zip(self[:4], new[:4], strict=True):
+            mine[some] = one
+        fresh = np.zeros(len(self.a0), bool)
+        fresh[some] = True
+        kept = ~fresh[self.at]
+        at = np.concatenate([self.at[kept], some[new.at]])
+        order = np.argsort(at, kind="stable")
+        slope, level = (np.concatenate([a[kept], b])[order] for a, b in zip(self[5:], new[5:], strict=True))
+        return self._replace(at=at[order], slope=slope, level=level)
 
 
 def least_of(a: Array, b: Array, top: Array) -> Least:
@@ -41,11 +64,18 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
     y = np.minimum(np.maximum((b1 - b0) / (a0 - a1), 0.0), top)
     two = ((first != last) & (y >= 0.0)).nonzero()[0]
     a, b, y = a.take(two, axis=1), b.take(two, axis=1), y[two]
-    j, k = np.nonzero(a * y + b < (a0[two] * y + b0[two]) * (1 - 1e-12))
-    more: dict[int, list[tuple[float, float]]] = {}
-    for at, slope, level in zip(two[k].tolist(), a[j, k].tolist(), b[j, k].tolist(), strict=True):
-        more.setdefault(at, []).append((slope, level))
-    return Least(a1 * top + b1, a0, b0, a1, b1, more)
+    k, j = np.nonzero((a * y + b < (a0[two] * y + b0[two]) * (1 - 1e-12)).T)
+    return Least(a0, b0, a1, b1, two[k], a[j, k], b[j, k])
+
+
+def joined(parts: list[Least]) -> Least:
+    """The same of intervals one part after another."""
+    if len(parts) == 1:
+        return parts[0]
+    begin = np.cumsum([0, *(len(part.a0) for part in parts)])
+    at = np.concatenate([part.at + k for part, k in zip(parts, begin, strict=False)])
+    *rest, _, slope, level = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Least(*rest, at, slope, level)
 
 
 def ahead(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
@@ -59,26 +89,71 @@ def back(keep: Array, gain: Array) -> tuple[Array, Array]:
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 
 
-def scan(most: Array, functions: Iterable[Least]) -> Array:
-    """y[0] = most[0], y[i+1] = min(most[i+1], least_i(y[i])), not below 0.
+def scan(y: Array, least: Least) -> Array:
+    """y'[0] = y[0], y'[i+1] = min(y[i+1], least_i(y'[i])), not below 0.
 
-    Where y is at `most` and from there reaches the next of it, nothing has to be done: in most intervals.
+    Where y is reached from the y before it, nothing has to be done: in most intervals. Runs that begin where it is
+    not are followed side by side, as long as there are many.
     """
-    out, at = most.copy(), 0
-    for least in functions:
-        part = out[at : at + len(least.reach) + 1]
-        below = (~(least.reach >= part[1:])).nonzero()[0].tolist()
-        done = _follow(part, least, 0) if part[0] < most[at] else 0
-        for k in below:
-            if k >= done:
-                done = _follow(part, least, k)
-        at += len(least.reach)
+    out = y.copy()
+    for _ in range(_TIMES):
+        k = (~(least.values(out[:-1]) >= out[1:])).nonzero()[0]
+        heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
+        if len(heads) <= _TOGETHER:
+            break
+        _side_by_side(out, least, heads)
+    done, more = 0, _lists(least) if len(k) else {}
+    for begin in k.tolist():
+        if begin >= done:
+            done = _follow(out, least, more, begin)
     return out
 
 
-def _follow(y: Array, least: Least, k: int) -> int:
-    """Write y[k+1], ... where `most` stands, up to some place where y is at `most` again, and return that."""
-    now, more, size = float(y[k]), least.more, _FEWEST
+def _side_by_side(y: Array, least: Least, heads: Int) -> None:
+    """Follow runs from places (r,), each up to where y is reached again, and write those that no other one passes."""
+    k, now, run, top, end = heads, y[heads], np.arange(len(heads)), y, len(y) - 1
+    ends = np.full(len(heads), end)
+    first = np.searchsorted(least.at, np.arange(end + 1))  # of each interval's other functions
+    found: list[tuple[Int, Int, Array]] = []
+    while len(k):
+        value = np.minimum(least.a0[k] * now + least.b0[k], least.a1[k] * now + least.b1[k])
+        begin = first[k]
+        count = first[k + 1] - begin
+        for i in range(int(count.max())):
+            some = (count > i).nonzero()[0]
+            row = begin[some] + i
+            value[some] = np.minimum(value[some], least.slope[row] * now[some] + least.level[row])
+        now = np.where(value > 0.0, value, 0.0)
+        k = k + 1
+        lower = now < top[k]
+        ends[run[~lower]] = k[~lower]
+        k, now, run = k[lower], now[lower], run[lower]
+        found.append((run, k, now))
+        inside = k < end
+        k, now, run = k[inside], now[inside], run[inside]
+        if len(found) > _LONGEST and len(k) <= _TOGETHER:  # these are followed one by one
+            ends[run] = k
+            break
+    done, kept = 0, np.zeros(len(heads), bool)
+    for i, (begin_, end_) in enumerate(zip(heads.tolist(), ends.tolist(), strict=True)):
+        if begin_ >= done:
+            kept[i], done = True, end_
+    for run, k, now in found:
+        some = kept[run]
+        y[k[some]] = now[some]
+
+
+def _lists(least: Least) -> dict[int, list[tuple[float, float]]]:
+    """The other functions of the intervals that have any."""
+    more: dict[int, list[tuple[float, float]]] = {}
+    for at, slope, level in zip(least.at.tolist(), least.slope.tolist(), least.level.tolist(), strict=True):
+        more.setdefault(at, []).append((slope, level))
+    return more
+
+
+def _follow(y: Array, least: Least, more: dict[int, list[tuple[float, float]]], k: int) -> int:
+    """Lower y[k+1], ... up to some place where what comes there is no lower, and return that."""
+    now, size = float(y[k]), _FEWEST
     while True:
         end = min(k + size, len(y) - 1)
         most, found = y[k + 1 : end + 1].tolist(), []

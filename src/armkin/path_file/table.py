@@ -24,8 +24,8 @@ def parse(raw: bytes, name: str) -> PathFile:
     Targets without a blend column are dense points: corners are passed by the tolerance.
 
     The header names the columns: x,y,z[,roll,pitch,yaw] or whatever the task's labels are, or joint names, plus
-    optional blend and tool_speed; what a batch of `armkin ik` says beside the joints is passed over. Without a
-    header the columns are a target's, in the task's order.
+    optional blend and tool_speed, where an empty cell leaves the corner to what is said of all; what a batch of
+    `armkin ik` says beside the joints is passed over. Without a header the columns are a target's, in the task's order.
     """
     try:
         text = raw.decode("utf-8-sig")
@@ -52,17 +52,21 @@ def parse(raw: bytes, name: str) -> PathFile:
             f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
         )
     moves: list[Move] = []
+    spared = {i for i, key in enumerate(header or ()) if key in _OPTIONS}
     for number, row in rows:
         values = [_value(cell) for cell in row]
-        if any(v is None for v in values) or len(values) != len(header or values):
-            wrong = next((cell for cell, v in zip(row, values, strict=True) if v is None), None)
+        empty = {i for i in spared if i < len(row) and not row[i].strip()}
+        bad = [i for i, v in enumerate(values) if v is None and i not in empty]
+        if bad or len(values) != len(header or values):
+            wrong = row[bad[0]] if bad else None
             what = (
                 f"'{wrong[:40]}' is no number"
                 if wrong is not None
                 else f"{len(values)} cells, {len(header or [])} columns"
             )
             raise PathFileError(f"{name}:{number}: {what}", file=name, line=number)
-        moves.append(_move(header, [float(v) for v in values if v is not None], first=not moves, where=(name, number)))
+        keys = None if header is None else [key for i, key in enumerate(header) if i not in empty]
+        moves.append(_move(keys, [v for v in values if v is not None], first=not moves, where=(name, number)))
     if not moves:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
     lines: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}

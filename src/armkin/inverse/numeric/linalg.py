@@ -32,3 +32,28 @@ def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Ar
             except np.linalg.LinAlgError:
                 size *= 3
         raise
+
+
+def damped_steps(J: Array, r: Array, damping: float) -> Array:
+    """Solutions x (n, M) of (J'J + damping 1) x = J'r: column by column J (n, k, M), and r (k, M), by Cholesky.
+
+    Over all members at once it takes a fraction of the time of `np.linalg.solve` on small matrices.
+    """
+    n = len(J)
+    x = (J * r).sum(axis=1)
+    L: list[list[Array]] = []
+    for i in range(n):
+        L.append([])
+        for j in range(i + 1):
+            entry = (J[i] * J[j]).sum(axis=0)
+            for above, below in zip(L[i], L[j], strict=False):
+                entry -= above * below
+            L[i].append(np.sqrt(np.maximum(entry + damping, 1e-300)) if i == j else entry / L[j][j])
+        for j in range(i):
+            x[i] -= L[i][j] * x[j]
+        x[i] /= L[i][i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= L[j][i] * x[j]
+        x[i] /= L[i][i]
+    return np.asarray(x)

@@ -1,0 +1,167 @@
+"""Where accelerations bound a law of time: rows of every interval, and the greatest x that both passes leave."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.motion.scan import Int, Least, ahead, back, joined, least_of, scan
+
+if TYPE_CHECKING:
+    from armkin.motion.time_optimal import Knots
+
+TINY = 1e-300
+_AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
+_PAIRS = 4096  # intervals whose rows are compared pair by pair at once
+
+Some = slice | Int  # of the intervals
+
+
+class Motion(NamedTuple):
+    """What is bounded along the M intervals: joints, and motors that turn several of them; k of them in all."""
+
+    first: Array  # (k, M) their slopes at the left end of every interval
+    left: Array  # (k, M) their second derivatives at its left end
+    bend: Array  # (k, M) how much greater these are at its right end
+    h: Array  # (M,)
+    accel: Array  # (k, M) greatest acceleration
+
+    def excess(self, x0: Array, x1: Array) -> Array:
+        """Greatest share of the acceleration inside every interval, with x (M,) at its ends: (k, M).
+
+        With q'' = l + f (r - l) and x(f) = x + 2 u h f at its fraction f it is u q'(f) + q''(f) x(f).
+        """
+        u = (x1 - x0) / (2 * self.h)
+        a = u * self.first + self.left * x0  # a + b f + c f^2
+        b = 3 * u * self.h * self.left + self.bend * x0
+        c = 2.5 * u * self.h * self.bend
+        f = np.fmin(np.fmax(-b / (2 * c), 0.0), 1.0)  # 0 where it does not bend
+        inside = np.abs(a + f * (b + f * c))
+        return np.asarray(np.maximum(np.maximum(inside, np.abs(a)), np.abs(a + b + c)) / self.accel)
+
+    def rush(self, x0: Array, x1: Array, speed: Array) -> Array:
+        """Greatest share of the joints' speeds (n, M) inside every interval, squared: (M,).
+
+        (q'(f))^2 x(f) is greatest at an end, which its cap holds, or where its derivative, a quadratic, is zero.
+        """
+        n, h = len(speed), self.h
+        ends = np.maximum(np.abs(self.first[:n]), np.abs(self.first[:n] + h * (self.left[:n] + 0.5 * self.bend[:n])))
+        bound = ((ends + 0.125 * h * np.abs(self.bend[:n])) / speed).max(axis=0) ** 2 * np.maximum(x0, x1)
+        near = np.flatnonzero(bound > 1.0)
+        d, left, bend = self.first[:n, near], self.left[:n, near], self.bend[:n, near]
+        h, dx, x = h[near], (x1 - x0)[near], x0[near]
+        c = 2 * h * left * x + d * dx
+        b = 2 * h * bend * x + 3 * h * left * dx
+        a = 2.5 * h * bend * dx
+        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b))
+        most = np.zeros(len(bound))
+        for root in (q / a, c / q):
+            f = np.fmin(np.fmax(root, 0.0), 1.0)
+            slope = d + h * f * (left + 0.5 * f * bend)
+            share = np.nan_to_num((slope / speed[:, near]) ** 2 * (x + f * dx)).max(axis=0, initial=0.0)
+            most[near] = np.maximum(most[near], share)
+        return most
+
+
+class Bound:
+    """What is bounded along a path: made for some of its intervals, to work on a long path in bounded memory."""
+
+    def __init__(self, path: Knots, accel: Array, rows: tuple[Array, Array] | None) -> None:
+        self.path, self.accel, self.weights = path, accel, rows
+        self.count = path.q.shape[1] + (0 if rows is None else len(rows[0]))
+
+    def of(self, some: Some) -> Motion:
+        """What is bounded along some of the intervals."""
+        path = self.path
+        h, d0, d1 = path.h[some, None], path.d[:-1][some], path.d[1:][some]
+        chord = (path.q[1:][some] - path.q[:-1][some]) / h
+        left, right = (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h
+        low = np.minimum(self.accel[:-1][some], self.accel[1:][some])  # between two limits the lower one counts
+        if self.weights is not None:
+            weights, most = self.weights
+            d0, left, right = (np.concatenate([x, x @ weights.T], axis=1) for x in (d0, left, right))
+            low = np.concatenate([low, np.broadcast_to(most, (len(low), len(most)))], axis=1)
+        first, left, right, low = (np.ascontiguousarray(each.T) for each in (d0, left, right, low))
+        return Motion(first, left, right - left, path.h[some], low)
+
+
+class Fastest:
+    """The fastest x (N,) within a cap and accelerations; made again where either has sunk."""
+
+    def __init__(self, bound: Bound, cap: Array) -> None:
+        self.bound, self.cap = bound, cap
+        M = len(cap) - 1
+        self.share = np.ones((bound.count, M), np.float32)  # of the accelerations
+        parts = [self._functions(some) for some in in_parts(M)]
+        self.behind, self.ahead = joined([one for one, _ in reversed(parts)]), joined([one for _, one in parts])
+        self.beta = scan(cap[::-1], self.behind)[::-1]
+        self.x = scan(self.beta, self.ahead)
+
+    def again(self, some: Int) -> None:
+        """Lower x: cap or share has sunk in some intervals (k,), ascending, or at their ends."""
+        M = len(self.cap) - 1
+        for part in in_parts(len(some)):
+            at = some[part]
+            behind, forth = self._functions(at)
+            self.behind, self.ahead = self.behind.put(M - 1 - at[::-1], behind), self.ahead.put(at, forth)
+        self.beta = scan(np.minimum(self.beta, self.cap)[::-1], self.behind)[::-1]
+        self.x = scan(self.beta, self.ahead)
+
+    def _functions(self, some: Some) -> tuple[Least, Least]:
+        """What the next x, and the one before it, are at most, in some of the intervals; the cap sinks to suit."""
+        motion = self.bound.of(some)
+        P, R, C = _rows(motion._replace(accel=motion.accel * self.share[:, some]))
+        slope, level, h = R / P, C / P, motion.h
+        # x + 2 h u >= 0 must leave room below the upper bounds of u
+        steep = slope - 0.5 / h
+        room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
+        left = _meeting(np.minimum(self.cap[:-1][some], room), slope, level)
+        self.cap[:-1][some] = left
+        forth, m = ahead(h, slope, level), len(h)
+        a, b = (np.concatenate(each, axis=1) for each in zip(back(*forth), forth, strict=True))
+        both = least_of(a, b, np.concatenate([self.cap[1:][some][::-1], left]))
+        return both.part(0, m), both.part(m, 2 * m)
+
+
+def in_parts(intervals: int) -> list[slice]:
+    """The intervals in parts that are worked on at once: a long path in bounded memory."""
+    return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
+
+
+def _rows(motion: Motion) -> tuple[Array, Array, Array]:
+    """P > 0, R, C of |P u + R x| <= C, x at the left end, for both ends of the intervals: (k, M)."""
+    right = motion.left + motion.bend
+    p = np.concatenate([motion.first, motion.first + motion.h * (3 * motion.left + 2.5 * motion.bend)])
+    r = np.concatenate([motion.left, right])
+    size = np.abs(p)
+    P = np.maximum(size, 1e-12 * size.max(initial=0.0) + TINY)
+    return P, np.copysign(1.0, p) * r, np.concatenate([motion.accel, motion.accel])
+
+
+def _meeting(cap: Array, slope: Array, level: Array) -> Array:
+    """The largest x, up to cap, at which some u keeps to all rows: where the first two of them exclude each other.
+
+    u is at least -level_i - slope_i x and at most level_j - slope_j x, for all i and j.
+    """
+    out = cap.copy()
+    turned = slope * cap
+    lowest, highest = -(level + turned).min(axis=0), (level - turned).min(axis=0)
+    surely = lowest < highest - 1e-9 * np.abs(highest)  # cap itself leaves room for u
+    close = (~surely).nonzero()[0]
+    i, j = _pairs(len(slope))
+    for begin in range(0, len(close), _PAIRS):
+        some = close[begin : begin + _PAIRS]
+        sl, lv = slope.take(some, axis=1), level.take(some, axis=1)
+        met = (lv.take(i, axis=0) + lv.take(j, axis=0)) / np.abs(sl.take(i, axis=0) - sl.take(j, axis=0))
+        out[some] = np.fmin(out[some], np.fmin.reduce(met, axis=0, initial=np.inf))
+    return out
+
+
+@cache
+def _pairs(k: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Every two of k rows."""
+    return np.triu_indices(k, 1)

@@ -1,0 +1,185 @@
+"""Splines of few knots through points and places on the chords between them, by least squares, all curves at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.motion.b_spline import Int, Layout, least_squares
+
+if TYPE_CHECKING:
+    from armkin.motion.fitting import Chords
+
+SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
+_CHORD = 0.85  # share of the tolerance, beside chords
+_EVEN = 8  # parts of a chord that is long beside a neighbour
+_SPARE = 0.98  # of what is allowed
+_POINTS, _LONGEST = 32, 20.0  # of a first interval: points, or [mm]
+_ROUNDS = 80
+_TELLING, _CLOSE = 5, 0.05  # points that tell misfit from noise; of what is allowed: such a misfit is none
+_PATIENCE = 4  # rounds of weighing before an interval is divided
+_HEAVIEST = 1e6  # a point's weight
+_HOPELESS = 2.5  # times what is allowed: dividing helps, weights do not
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What the curves are held to: given points, and places on chords between them."""
+
+    u: Array  # (R,)
+    y: Array  # (R, d)
+    curve: Int  # (R,) from 0 without gaps
+    allowed: Array  # (R,) [mm]
+    weight: Array  # (R,)
+    along: Array  # (R, d) direction of the chord of a place on one; 0 for a given point
+    point: Int  # (R,) number of the given point, -1: a place on a chord
+    chord: Int  # (R,)
+    before: Array  # (R,) [mm] of its chord, from its begin to a place on it
+    beyond: Array  # (R,) from there to its end
+    ends: Bool  # (R,) ends of curves
+
+    @staticmethod
+    def of(chords: Chords, used: Bool, tolerance: float) -> Rows:
+        """Rows of the chords that are used: (N - 1,)."""
+        chord, f, weight = [np.flatnonzero(used)] * 2, [0.0, 0.5], [1.0, 0.0]
+        last = used & np.append(chords.curve[1:] != chords.curve[:-1], True)
+        chord.append(np.flatnonzero(last))
+        f.append(1.0)
+        weight.append(1.0)
+        numbers = np.concatenate(chord)
+        share = np.repeat(f, [len(each) for each in chord])
+        heavy = np.repeat(weight, [len(each) for each in chord])
+        more, places = _graded(chords, used)
+        numbers, share = np.append(numbers, more), np.append(share, places)
+        heavy = np.append(heavy, np.ones(len(more)))
+        u = chords.u[numbers] + share * chords.length[numbers]
+        order = np.lexsort((u, chords.curve[numbers]))
+        apart = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
+        order = order[apart]
+        u, numbers, share, heavy = u[order], numbers[order], share[order], heavy[order]
+        given = (share == 0) | (share == 1)
+        _, curve = np.unique(chords.curve[numbers], return_inverse=True)
+        edge = np.append(True, curve[1:] != curve[:-1])
+        return Rows(
+            u,
+            chords.y[numbers] + share[:, None] * chords.step[numbers],
+            curve,
+            _SPARE * np.where(given, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
+            heavy,
+            np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None]),
+            np.where(given, numbers + (share == 1), -1),
+            numbers,
+            share * chords.length[numbers],
+            (1 - share) * chords.length[numbers],
+            edge | np.append(edge[1:], True),
+        )
+
+    def part(self, some: Int) -> Rows:
+        """Those of some curves, all rows of each."""
+        taken = {field.name: getattr(self, field.name)[some] for field in fields(self)}
+        taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
+        return Rows(**taken)
+
+    def miss(self, values: Array) -> Array:
+        """How curves that pass `values` (R, d) leave the rows: points across their own direction, chords: (R, d)."""
+        miss = values - self.y
+        along = np.empty_like(values)
+        along[1:-1] = values[2:] - values[:-2]
+        along[0], along[-1] = along[1], along[-2]
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+        along = np.where(self.point[:, None] >= 0, along, self.along)
+        along[self.ends] = 0.0
+        far = (miss * along).sum(axis=1)
+        past = np.maximum(far - self.beyond, 0.0) + np.minimum(far + self.before, 0.0)  # a chord's end, or its begin
+        far -= np.where(self.point >= 0, 0.0, past)
+        return np.asarray(miss - far[:, None] * along)
+
+
+def _graded(chords: Chords, used: Bool) -> tuple[Int, Array]:
+    """Places on chords that are long beside their neighbours, closer together towards these: chords, fractions."""
+    L = chords.length
+    same = np.append(False, (chords.curve[1:] == chords.curve[:-1])) & used
+    other = np.append(same[1:], False)
+    left = np.where(same, np.append(np.inf, L[:-1]), np.inf)
+    right = np.where(other, np.append(L[1:], np.inf), np.inf)
+    alone = np.flatnonzero(np.minimum(left, right) < SHORT * L)
+    even = np.arange(1, _EVEN) / _EVEN
+    numbers, places = [np.repeat(alone, len(even))], [np.tile(even, len(alone))]
+    for neighbour, side in ((left, 0), (right, 1)):
+        at = neighbour
+        while (long := np.flatnonzero((neighbour < SHORT * L) & (at < 0.45 * L))).size:
+            numbers.append(long)
+            f = at[long] / L[long]
+            places.append(f if side == 0 else 1 - f)
+            at = np.where(at < 0.45 * L, 2 * at + neighbour, at)
+    return np.concatenate(numbers), np.concatenate(places)
+
+
+def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
+    """Splines of few knots through rows: layout, control points, and how far they leave the rows (R,)."""
+    first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
+    inside = np.arange(len(rows.u)) - first[rows.curve]
+    many = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _LONGEST))
+    knot = rows.ends | np.append(False, np.diff(many) > 0)
+    weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
+    at_work, index = rows, np.arange(len(knot))
+    for _ in range(_ROUNDS - 1):
+        layout = Layout.of(at_work.u, at_work.curve, knot[index])
+        control = least_squares(layout, at_work.y, weight[index], at_work.ends)
+        miss = at_work.miss(layout.values(control))
+        off = np.linalg.norm(miss, axis=1) / at_work.allowed
+        bad, astray = off > 1.0, _astray(at_work, layout, miss, weight[index])
+        wrong = np.zeros(at_work.curve[-1] + 1, bool)
+        wrong[at_work.curve[bad]] = wrong[layout.curve[astray]] = True
+        if not wrong.any():
+            break
+        part = knot[index], weight[index], age[index]
+        _refine(at_work, layout, off, bad, astray, *part)
+        knot[index], weight[index], age[index] = part
+        if not wrong.all():  # what is well stays as it is
+            index = index[wrong[at_work.curve]]
+            at_work = rows.part(index)
+    layout = Layout.of(rows.u, rows.curve, knot)
+    control = least_squares(layout, rows.y, weight, rows.ends)
+    return layout, control, np.linalg.norm(rows.miss(layout.values(control)), axis=1) / rows.allowed
+
+
+def _refine(
+    rows: Rows, layout: Layout, off: Array, bad: Bool, astray: Bool, knot: Bool, weight: Array, age: Int
+) -> None:
+    """Divide intervals that miss their rows, or give some of the rows more weight: in place."""
+    worst = np.zeros(len(layout.begin))
+    np.maximum.at(worst, layout.interval[bad], off[bad])
+    begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
+    at = np.flatnonzero(knot)
+    mine = at[np.searchsorted(at, begins[:-1])]
+    divide = astray | (worst > _HOPELESS) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
+    age[mine[worst > 1.0]] += 1
+    middle = (begins[:-1] + begins[1:]) // 2
+    can = divide & (middle > begins[:-1]) & ~knot[middle]
+    knot[middle[can]] = True
+    age[mine[can]] = age[middle[can]] = 0
+    fresh = can[layout.interval]
+    weight[fresh] = rows.weight[fresh]
+    heavier = bad & ~fresh
+    weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * off[heavier]) ** 2, _HEAVIEST)
+
+
+def _astray(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
+    """Which intervals miss their points in a way that is no noise: neighbours lie on the same side (M,)."""
+    given = np.flatnonzero(rows.point >= 0)
+    a, b = given[:-1], given[1:]
+    where = layout.interval[a]
+    inside = where == layout.interval[b]
+    a, b, where = a[inside], b[inside], where[inside]
+    M = len(layout.begin)
+    like = np.bincount(where, (miss[a] * miss[b]).sum(axis=1), M)
+    size = np.bincount(where, (miss[a] ** 2).sum(axis=1), M)
+    many = np.bincount(where, minlength=M)
+    weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
+    return np.asarray(
+        ~weighed & (many >= _TELLING) & (like > 0.5 * size) & (size > many * (_CLOSE * rows.allowed[0]) ** 2)
+    )
