@@ -6,7 +6,8 @@ The way of a path (`path.py`, `armkin.path`, which asks `planned.py`, of arms wi
 path_numbers.py     the moves of a path file, in degrees, as joint values and targets
 placing.py          where a drawing stands, and how the tool is held on it
 geometry.py         lines, arcs, helices, splines and blends of the tool, each at unit speed
-dense.py            targets on lines, gathered; fitting.py: one smooth curve of them, by b_spline.py
+dense.py            targets on lines, gathered; fitting.py: one smooth curve of them; chords.py: what lies between them
+least_knots.py      splines of few knots; b_spline.py: their least squares
 route.py            one after another, with rests at corners; outline.py: those of a path, before anything is planned
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
@@ -15,7 +16,8 @@ wrist_turn.py       past a wrist singularity with the tool turned a little; wind
 branch_path.py      the branch that is taken: joint values along the route
 grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
-scan.py             passes along it; hold_cap.py: how fast it may be for a hold on it
+fastest.py          what bounds it; cubics.py: on a way of cubics; scan.py: passes along it
+hold_cap.py         how fast it may be for a hold on it
 path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: joints held; shown.py: as drawn
 jog_line.py         the line of one axis that a held button moves the tip along
 

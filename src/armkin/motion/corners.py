@@ -12,10 +12,11 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.branch_path import coupled
+from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve
 from armkin.motion.hold_cap import hold_cap
 from armkin.motion.plan import check_rates
-from armkin.motion.time_optimal import Bounds, Knots, optimal
+from armkin.motion.time_optimal import Bounds, optimal
 from armkin.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:

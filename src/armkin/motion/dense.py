@@ -14,7 +14,8 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion import path_numbers
 from armkin.motion.b_spline import Int
-from armkin.motion.fitting import REVERSAL, Fitted, distinct, fitted, turns
+from armkin.motion.chords import distinct, turns
+from armkin.motion.fitting import REVERSAL, Fitted, fitted
 from armkin.motion.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
 
 if TYPE_CHECKING:

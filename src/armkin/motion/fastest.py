@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.motion.cubics import Knots
 from armkin.motion.scan import Int, Least, ahead, back, joined, least_of, scan
-
-if TYPE_CHECKING:
-    from armkin.motion.time_optimal import Knots
 
 TINY = 1e-300
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each

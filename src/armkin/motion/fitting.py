@@ -9,17 +9,15 @@ its middle. Between points the curve is held, too: to the chord, and its sagitta
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.motion.b_spline import Int, Layout
-from armkin.motion.least_knots import SHORT, Rows, least_knots
+from armkin.motion.chords import CORNER, Chords, turns
+from armkin.motion.least_knots import Rows, least_knots
 
-CORNER = np.deg2rad(20.0)  # a larger turn is rounded
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
-_SAME = 1e-6  # [mm] nearer points are one
 _SCALE = 16.0  # tolerances: from so far off a corner is still one
 _BETWEEN = 6  # places of each cubic that are held to its chords in the end
 _TRIES = 5  # after which a curve that leaves its chords is given up
@@ -41,63 +39,6 @@ class Fitted:
         f = (v - self.begin[i])[:, None] / h
         c0, c1, c2, c3 = self.powers[i].transpose(1, 0, 2)
         return c0 + f * (c1 + f * (c2 + f * c3)), (c1 + f * (2 * c2 + 3 * f * c3)) / h
-
-
-@dataclass(frozen=True)
-class Chords:
-    """Points (N, d), no two neighbours the same, and which of them are corners."""
-
-    y: Array
-    corner: Bool  # (N,) the ends are none
-
-    @cached_property
-    def step(self) -> Array:
-        """From each point to the next: (N - 1, d)."""
-        return np.asarray(np.diff(self.y, axis=0))
-
-    @cached_property
-    def length(self) -> Array:
-        """Of every chord: (N - 1,)."""
-        return np.asarray(np.linalg.norm(self.step, axis=1))
-
-    @cached_property
-    def u(self) -> Array:
-        """Sum of the chords before every point: (N,)."""
-        return np.concatenate([[0.0], np.cumsum(self.length)])
-
-    @cached_property
-    def curve(self) -> Int:
-        """Number of the curve that each chord belongs to: (N - 1,)."""
-        return np.asarray(np.cumsum(self.corner[:-1]))
-
-    @cached_property
-    def sagitta(self) -> Array:
-        """How far the circle through a chord's ends and either neighbour leaves the chord: (N - 1,)."""
-        L, out = self.length, np.zeros(len(self.length))
-        across = np.linalg.norm(self.y[2:] - self.y[:-2], axis=1)
-        turned = turns(self.y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            bend = 2 * np.sin(turned) / across  # 1 / radius
-        for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            half = np.minimum(0.5 * L[chord] * bend, 1.0)
-            rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
-            tells = (turned <= CORNER) & (L[neighbour] >= SHORT * L[chord])
-            out[chord] = np.maximum(out[chord], np.where(tells, rise, 0.0))
-        return out
-
-
-def turns(y: Array) -> Array:
-    """How far the direction turns at every point but the ends: (N, d) -> (N - 2,) [rad]."""
-    step = np.diff(y, axis=0)
-    unit = step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300)
-    a, b = unit[:-1], unit[1:]
-    return np.asarray(2 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)))
-
-
-def distinct(y: Array) -> Int:
-    """Numbers of the points (N, d) that are not the same as the one before; the last one stays."""
-    apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME
-    return np.flatnonzero(np.append(True, apart))
 
 
 def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:

@@ -13,12 +13,12 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
+from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.free import checked
 from armkin.motion.path_plan import PathPlan
 from armkin.motion.plan import approach, check_jerk, check_rates, straight
 from armkin.motion.planned import planned
-from armkin.motion.time_optimal import Knots
 from armkin.motion.trajectory import Straight, Stretch
 
 if TYPE_CHECKING:

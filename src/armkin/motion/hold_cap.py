@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.time_optimal import TINY, Knots, in_parts
+from armkin.motion.cubics import Knots
+from armkin.motion.fastest import TINY, in_parts
 from armkin.motion.trajectory import BRAKE
 from armkin.motors import motor_accel
 

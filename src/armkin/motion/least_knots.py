@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.motion.b_spline import Int, Layout, least_squares
+from armkin.motion.chords import SHORT, Chords
 
-if TYPE_CHECKING:
-    from armkin.motion.fitting import Chords
-
-SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
 _CHORD = 0.85  # share of the tolerance, beside chords
 _EVEN = 8  # parts of a chord that is long beside a neighbour
 _SPARE = 0.98  # of what is allowed

@@ -40,8 +40,8 @@ class Least(NamedTuple):
     def part(self, lo: int, hi: int) -> Least:
         """The same of intervals lo to hi."""
         first, last = np.searchsorted(self.at, [lo, hi])
-        others = (each[first:last] for each in (self.at - lo, self.slope, self.level))
-        return Least(*(each[lo:hi] for each in self[:4]), *others)
+        a0, b0, a1, b1 = (each[lo:hi] for each in (self.a0, self.b0, self.a1, self.b1))
+        return Least(a0, b0, a1, b1, self.at[first:last] - lo, self.slope[first:last], self.level[first:last])
 
     def put(self, some: Int, new: Least) -> Least:
         """The same with other functions in some intervals (k,), ascending."""
@@ -74,8 +74,8 @@ def joined(parts: list[Least]) -> Least:
         return parts[0]
     begin = np.cumsum([0, *(len(part.a0) for part in parts)])
     at = np.concatenate([part.at + k for part, k in zip(parts, begin, strict=False)])
-    *rest, _, slope, level = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Least(*rest, at, slope, level)
+    a0, b0, a1, b1, _, slope, level = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Least(a0, b0, a1, b1, at, slope, level)
 
 
 def ahead(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:

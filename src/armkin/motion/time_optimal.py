@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
+from armkin.motion.cubics import Knots
 from armkin.motion.fastest import TINY, Bound, Fastest, in_parts
 from armkin.motion.scan import Int
 
@@ -43,46 +43,6 @@ class Bounds:
     speed: Array  # (N, n) or (n,) [rad/s | mm/s]
     accel: Array  # (N, n) or (n,)
     cap: Array  # (N,) of x: tool speed and whatever else bounds ds/dt
-
-
-@dataclass(frozen=True)
-class Knots:
-    """A joint path as cubics between grid points: q, q' at the points, and q'' at both ends of every interval.
-
-    Where a path rests in a corner the point stands twice, with the slopes before and behind it: an interval of no way.
-    """
-
-    s: Array  # (N,)
-    q: Array  # (N, n)
-    d: Array  # (N, n) dq/ds
-
-    @cached_property
-    def h(self) -> Array:
-        """Lengths of the intervals: (N - 1,); 1 where the path rests, whatever is divided by it."""
-        h = self.s[1:] - self.s[:-1]
-        return np.asarray(np.where(h == 0.0, 1.0, h))
-
-    @cached_property
-    def rests(self) -> Int:
-        """Intervals in which the path rests: (k,)."""
-        return np.flatnonzero(self.s[1:] == self.s[:-1])
-
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """q and q' at lengths s: (M,) -> (M, n) twice."""
-        i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        h = self.h[i][:, None]
-        f = (s - self.s[i])[:, None] / h
-        d0, d1, chord = self.d[i] * h, self.d[i + 1] * h, self.q[i + 1] - self.q[i]
-        c2, c3 = 3 * chord - 2 * d0 - d1, d0 + d1 - 2 * chord
-        return self.q[i] + f * (d0 + f * (c2 + f * c3)), (d0 + f * (2 * c2 + 3 * f * c3)) / h
-
-    def second(self) -> tuple[Array, Array]:
-        """q'' at the left and the right end of every interval: (N - 1, n) twice."""
-        h = self.h[:, None]
-        chord = (self.q[1:] - self.q[:-1]) / h
-        left = (6 * chord - 4 * self.d[:-1] - 2 * self.d[1:]) / h
-        right = (-6 * chord + 2 * self.d[:-1] + 4 * self.d[1:]) / h
-        return left, right
 
 
 def knots(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] = ()) -> Knots:

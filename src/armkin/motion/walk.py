@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.motion.branch_chains import Run
+    from armkin.motion.cubics import Knots
     from armkin.motion.route import Route
-    from armkin.motion.time_optimal import Knots
     from armkin.path_file import Move, PathFile
 
 

@@ -1,0 +1,72 @@
+"""Points one after another, and the chords between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.motion.b_spline import Int
+
+CORNER = np.deg2rad(20.0)  # a larger turn is rounded
+SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
+_SAME = 1e-6  # [mm] nearer points are one
+
+
+@dataclass(frozen=True)
+class Chords:
+    """Points (N, d), no two neighbours the same, and which of them are corners."""
+
+    y: Array
+    corner: Bool  # (N,) the ends are none
+
+    @cached_property
+    def step(self) -> Array:
+        """From each point to the next: (N - 1, d)."""
+        return np.asarray(np.diff(self.y, axis=0))
+
+    @cached_property
+    def length(self) -> Array:
+        """Of every chord: (N - 1,)."""
+        return np.asarray(np.linalg.norm(self.step, axis=1))
+
+    @cached_property
+    def u(self) -> Array:
+        """Sum of the chords before every point: (N,)."""
+        return np.concatenate([[0.0], np.cumsum(self.length)])
+
+    @cached_property
+    def curve(self) -> Int:
+        """Number of the curve that each chord belongs to: (N - 1,)."""
+        return np.asarray(np.cumsum(self.corner[:-1]))
+
+    @cached_property
+    def sagitta(self) -> Array:
+        """How far the circle through a chord's ends and either neighbour leaves the chord: (N - 1,)."""
+        L, out = self.length, np.zeros(len(self.length))
+        across = np.linalg.norm(self.y[2:] - self.y[:-2], axis=1)
+        turned = turns(self.y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bend = 2 * np.sin(turned) / across  # 1 / radius
+        for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
+            half = np.minimum(0.5 * L[chord] * bend, 1.0)
+            rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
+            tells = (turned <= CORNER) & (L[neighbour] >= SHORT * L[chord])
+            out[chord] = np.maximum(out[chord], np.where(tells, rise, 0.0))
+        return out
+
+
+def turns(y: Array) -> Array:
+    """How far the direction turns at every point but the ends: (N, d) -> (N - 2,) [rad]."""
+    step = np.diff(y, axis=0)
+    unit = step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300)
+    a, b = unit[:-1], unit[1:]
+    return np.asarray(2 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)))
+
+
+def distinct(y: Array) -> Int:
+    """Numbers of the points (N, d) that are not the same as the one before; the last one stays."""
+    apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME
+    return np.flatnonzero(np.append(True, apart))
