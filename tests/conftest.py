@@ -19,6 +19,10 @@ from slow import SLOW
 # Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# What Python compiles is kept, whatever this computer says: else each of some thousand commands compiles armkin again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # The same examples in every run: what fails, fails for everybody. `--hypothesis-profile=explore` looks for new ones.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)

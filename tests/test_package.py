@@ -1,6 +1,7 @@
 """What people install: a wheel and an sdist, in a clean environment, on any operating system."""
 
 import ast
+import re
 import subprocess
 import sys
 import tarfile
@@ -14,6 +15,13 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "armkin"
 # Modules of the standard library that Windows does not have.
 POSIX_ONLY = {"fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"}
+# And what of its other modules Windows does not have.
+LACKS = re.compile(
+    r"\bos\.(?:getuid|geteuid|getgid|fork|killpg|setsid|getpgid|chown|fchmod|mkfifo|openpty|O_NOFOLLOW|O_NONBLOCK)\b"
+    r"|\bsignal\.(?:SIG(?:HUP|KILL|ALRM|USR1|USR2|TSTP|CONT|PIPE|WINCH|QUIT)|alarm|setitimer|pthread_kill|sigwait)\b"
+    r"|^ *(?:import|from) (?:fcntl|grp|pty|pwd|resource|termios|tty)\b|[\"']/tmp"
+)
+ASKED_FIRST = re.compile(r"sys\.platform|hasattr\(|getattr\(|suppress\((?:Import|Except)")
 
 
 def build(what: str, source: Path, folder: Path) -> Path:
@@ -86,4 +94,18 @@ def test_nothing_that_windows_lacks_is_imported_at_module_level() -> None:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
             found += [f"{path.name}: {name}" for name in names if name.split(".")[0] in POSIX_ONLY]
+    assert not found
+
+
+def test_what_windows_lacks_is_used_only_where_the_system_was_asked() -> None:
+    """In the same function, before it, or with a way out; Klipper's socket is one of another computer's."""
+    found = []
+    for path in SOURCE.rglob("*.py"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        for number, line in enumerate(lines):
+            if not LACKS.search(line) or path.name == "axes.py":
+                continue
+            begin = next((k for k in range(number, -1, -1) if re.match(r" *(?:def|class) ", lines[k])), 0)
+            if not any(ASKED_FIRST.search(before) for before in lines[begin : number + 1]):
+                found.append(f"{path.name}:{number + 1}: {line.strip()}")
     assert not found
