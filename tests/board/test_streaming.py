@@ -118,7 +118,7 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
     session.line.resent = 1
     assert streaming.lead(session, []) == 0.25
     monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
-    assert streaming.lead(session, []) == 0.1
+    assert streaming.lead(session, []) == 0.05
 
 
 @pytest.mark.parametrize("bad", [0, 1])

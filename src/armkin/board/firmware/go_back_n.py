@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 
 from armkin.board.firmware import protocol, reply_checks
 from armkin.board.firmware.protocol import Ack, Error, Info, Status
 from armkin.board.firmware.serial_line import Line
 
 _RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
-_GAP = 0.004  # [s] after all was sent, before an ACK of a gap leads to sending it again
+_GAP = 0.004  # [s] after all that was sent has left and an answer had its time
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 16  # frames
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
@@ -39,7 +40,9 @@ class Window:
         self._next = 0  # sequence number of the first of them
         self._free = 0
         self._receive = 0
-        self._gap = False
+        self._gap = False  # the first of those that were sent is lost for certain
+        self._sent_at = 0.0  # when any was written last
+        self._deaf = 0.0  # until then an answer may be to what was sent before the last going back
         self._bytes = _BYTES[1]  # that may be under way
 
     def begin(self, info: Info) -> None:
@@ -82,7 +85,17 @@ class Window:
         self._fill()
         patience = _EAGER if self._line.noisy else self._line.slowest + (_GAP if self._gap else _RESEND)
         if self._sent and begun - self._line.clear > patience:
-            self._again()
+            self._again(0, len(self._sent[0][1]))
+        elif self._gap and not self._line.noisy and begun > self._deaf:
+            # what told of it was the answer to the second or a later one: the oldest without one is the third
+            behind = sum(len(data) for _, data in islice(self._sent, 3, None))
+            if behind + len(self._sent[0][1]) <= self._receive - QUESTION:
+                self._again(behind, 0)
+
+    @property
+    def late(self) -> bool:
+        """Whether an answer to what was sent should be here by now."""
+        return bool(self._sent) and self._line.port.now() - self._line.clear > self._line.slowest + _GAP
 
     def _room(self, size: int, first: int) -> int:
         """Bytes that may be sent when `size` are under way, of which the first frame has `first`.
@@ -113,18 +126,23 @@ class Window:
                 return
             frame = self._waiting.popleft()
             self._sent.append((frame, data))
+            self._sent_at = self._line.port.now()
             credit -= frame.segments
             size += self._line.write_frame(data, room)
 
-    def _again(self) -> None:
-        """Go back to the first frame that was not acknowledged."""
+    def _again(self, size: int, first: int) -> None:
+        """Go back to the first frame that was not acknowledged.
+
+        size: bytes under way behind the oldest frame without an answer, first: of it what need not fit the ring.
+        """
         self._gap = False
         self._bytes = _BYTES[0] if self._line.noisy else max(_BYTES[0], self._bytes // 2)
+        self._sent_at = self._line.port.now()
+        self._deaf = max(self._sent_at, self._line.clear) + self._line.slowest + _GAP
         self._line.write(b"\0")
-        size, first = 0, len(self._sent[0][1])
-        for _, data in self._sent:
+        for k, (_, data) in enumerate(self._sent):
             room = self._room(size, first)
-            if size and len(data) > room:
+            if k and len(data) > room:
                 break  # what follows it would wait for it
             self._line.resent += 1
             size += self._line.write_frame(data, room)
@@ -133,8 +151,8 @@ class Window:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
-    def acknowledge(self, reply: Ack | Status) -> bool:
-        """Take a reply's `next` and `free`; True if that acknowledges something."""
+    def acknowledge(self, reply: Ack | Status, asked: float = 0.0) -> bool:
+        """Take a reply's `next` and `free`, asked for then; True if that acknowledges something."""
         done = (reply.next - self._next) & 255
         if done > len(self._sent):
             return False
@@ -144,6 +162,8 @@ class Window:
         if done:
             self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
             self._bytes = _BYTES[0] if self._line.noisy else min(_BYTES[1], self._bytes + 20)
-        elif self._sent and (type(reply) is Ack or (reply.detail == Error.SPILL and not reply.error)):
+        elif self._sent and (
+            type(reply) is Ack or asked > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
+        ):
             self._gap = True  # something behind the first frame has arrived, the first has not
         return done > 0

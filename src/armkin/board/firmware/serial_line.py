@@ -11,6 +11,7 @@ from armkin.board.ports import Port
 _COPIES = 3  # of every frame, on a bad line
 _LATE = 0.03  # [s] an answer may take
 _ASKING = 50  # [bytes] of a STATUS? and its answer, at least
+_PATIENCE, _SURELY = 0.05, 0.012  # [s] for an answer; beyond twice the slowest of those measured
 
 
 class Line:
@@ -29,7 +30,7 @@ class Line:
     def noisy(self) -> bool:
         """Whether the line damages so much that short frames, sent several times, get through sooner."""
         damaged = self.splitter.bad + self.resent
-        return damaged > max(2.0, 0.03 * self._written)
+        return damaged > max(1.0, 0.03 * self._written)
 
     @property
     def damaged(self) -> bool:
@@ -64,13 +65,19 @@ class Line:
         """Note that a STATUS? of this tag is being written."""
         self._asked_at[tag] = self.port.now()
 
-    def answered(self, tag: int) -> None:
-        """Wait as long as an answer was late: so long the line is behind what was written already."""
+    @property
+    def patience(self) -> float:
+        """Seconds in which an answer to a STATUS? is here, if nothing was lost."""
+        return min(_PATIENCE, 2 * self.slowest + _SURELY) if self.slowest else _PATIENCE
+
+    def answered(self, tag: int) -> float:
+        """When it was asked; waits as long as it was late: so long the line is behind what was written already."""
         asked = self._asked_at.pop(tag, None)
         if asked is None:
-            return
+            return 0.0
         self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
         took = self.port.now() - asked
         self.slowest = max(self.slowest, took - _ASKING * 10 / self.port.baud)
         if took > _LATE:
             self.clear = max(self.clear, self.port.now() + took - _LATE)
+        return asked

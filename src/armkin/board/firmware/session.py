@@ -21,6 +21,7 @@ _POLL_SOON = 0.01  # [s] while waiting for credit, which only answers bring, and
 _ENDS = 50  # [ms] of motion that the queue holds when its end is near
 _GIVE_UP = 1.5  # [s] without any answer,
 _TURN = 0.1  # [s] of which one turn counts at most: a program that had to wait longer for its own turn was deaf
+_QUIET = 3.0  # [s] of questions without an answer, of a board that was there
 _BEHIND = 16  # questions without an answer
 _STALLED = 5.0  # [s] beyond the time that all in the queue may take
 _HOLD = 15.0  # [s] that an arm may take to come to rest
@@ -47,6 +48,7 @@ class Session:
         self._tag = 0
         self._digest = 0
         self._status: Status | None = None
+        self._last: Ack | Status | None = None  # as last heard
         self._error: Ack | Status | None = None
         self.heard = port.now()
         self._silent_for = 0.0  # [s] in which an answer would have been heard
@@ -81,10 +83,12 @@ class Session:
 
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""
-        for attempt in range(40):
-            info = self._hello(_nonce(), 0.2 if attempt % 4 == 3 else 0.05)  # a busy computer's answers come late
-            if info is not None:
-                return info
+        for _ in range(8):
+            nonce = _nonce()  # an answer to any of these will do: a busy computer's come late
+            for patience in (self.line.patience,) * 8 + (0.2,):
+                info = self._hello(nonce, patience)
+                if info is not None:
+                    return info
         raise _silent(self.port)
 
     def _hello(self, nonce: int, timeout: float) -> Info | None:
@@ -164,8 +168,9 @@ class Session:
             raise StoppedError(self.hold())
         now = self.port.now()
         self._window.send()
-        soon = ends or self._window.out_of_credit
+        soon = ends or self._window.out_of_credit or self._window.late
         quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
+        quick = quick / 2 if self.line.noisy else quick
         if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
             quick = _POLL
         if now - self._asked >= quick:
@@ -200,13 +205,14 @@ class Session:
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 self._same(reply.session)
                 self._window.check(reply)
-            goes_on = reply.queued < self.queued or _moved(self.latest, reply)
+            goes_on, asked = reply.queued < self.queued or _moved(self.latest, reply), 0.0
             self.state, self.queued = State(reply.state), reply.queued
+            self._last = reply
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
-                self.line.answered(reply.tag)
-            if self._window.acknowledge(reply) or goes_on:
+                asked = self.line.answered(reply.tag)
+            if self._window.acknowledge(reply, asked) or goes_on:
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply
@@ -230,16 +236,17 @@ class Session:
 
     def status(self, page: int = 0) -> Status:
         """Where the board stands, now; also after the session has ended."""
-        tags: set[int] = set()  # asked since this was called: an answer may come later than the next question
-        for attempt in range(60):
-            self.line.resent += attempt > 0
-            tags.add(self._ask(page))
-            end = self.port.now() + 0.05
+        tags: list[int] = []  # asked since this was called: an answer may come later than the next question
+        begin = self.port.now()
+        while self.port.now() - begin < _QUIET:
+            tags.append(self._ask(page))
+            end = self.port.now() + self.line.patience
             while self.port.now() < end:
                 self._status = None
                 self._hear(max(0.001, end - self.port.now()))
                 answer: Status | None = self._status
                 if answer is not None and answer.tag in tags and answer.page == page:
+                    self.line.resent += tags.index(answer.tag)  # answers keep order: those before were lost
                     return answer
         raise _silent(self.port)
 
@@ -256,6 +263,13 @@ class Session:
             if self.port.now() - begin > _HOLD:
                 raise LinkError(f"the board on {self.port.name} does not come to rest: cut the motors' power")
             self._hear(0.03)
+
+    def standing(self) -> Status:
+        """The status of an arm that has come to rest: as just heard, if it was one that said so."""
+        last = self._last
+        if isinstance(last, Status) and last.page == 0 and last.state == State.IDLE:
+            return last
+        return self.status()
 
     def rest(self) -> Status:
         """Wait until the arm stands, whatever the session is; its status then."""
@@ -279,7 +293,8 @@ class Session:
             self._stalled()
             if not self._window and self.state == State.IDLE:
                 return
-            self.pump(ends=not self._window and self.queued < _ENDS)
+            left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
+            self.pump(ends=not self._window and left < _ENDS)
             yield self.under_way + self.queued / 1000
 
 

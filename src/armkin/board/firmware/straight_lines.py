@@ -24,7 +24,7 @@ from armkin.motion.profile import Profile, trapezoid
 _RATIO = 1.14  # with fewer segments than `_RAMP`
 _RAMP, _SHORT, _ROUGH = 27, 13, 12  # segments of a ramp at most, see `Pieces`
 _WIDEST = 1.4  # ratio, from where the first segment gets longer instead: the board takes 5/4 of the acceleration
-_FIRST, _FIRST_ROUGH = 0.003, 0.015  # [s] a ramp's first segment at least, and four times what any other lasts at least
+_FIRST, _FIRST_ROUGH = 0.003, 0.03  # [s] a ramp's first segment at least, and four times what any other lasts at least
 _FIRST_MOST = 0.1  # [s] the same at most: the board lets a speed jump by what 50 ms of 5/4 of the acceleration make
 _BEFORE_STEP = 0.9  # of the time to its first step: until then no motor tells how it got there
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.trajectory_to_counts import Cut
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
-_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.1
+_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles]
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
@@ -74,23 +74,29 @@ def carry_out(
         done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
         progress(done, total)
 
-    since = session.port.now()
-    try:
-        return stream(session, frames(source, 0.0), tell), end
-    except DeviceError as error:
-        if error.error != Error.DRY or session.port.now() - since > _LEAD_MOST + _BEGUN or len(first) != 1:
-            raise
-        status = session.rest()
-        counts = [status.counts[axis] for axis in axes]
-        left: Cut | None = first[0]
-        if counts != first[0].start.tolist():
-            known = all(status.known >> axis & 1 for axis in axes)
-            left = onwards(first[0], counts) if known and session.line.damaged else None
-        if left is None:
-            raise
-        session.reopen()
-        total = begun = 0.0
-        return stream(session, frames(chain([left], source), _LEAD_MOST), tell), end
+    least, todo = 0.0, source
+    while True:
+        since = session.port.now()
+        try:
+            return stream(session, frames(todo, least), tell), end
+        except DeviceError as error:
+            late = session.port.now() - since > _LEAD_MOST + _BEGUN
+            if error.error != Error.DRY or late or len(first) != 1 or least == _LEAD_MOST:
+                raise
+            status = session.rest()
+            counts = [status.counts[axis] for axis in axes]
+            left: Cut | None = first[0]
+            if counts != first[0].start.tolist():
+                known = all(status.known >> axis & 1 for axis in axes)
+                left = onwards(first[0], counts) if known and session.line.damaged else None
+            if left is None:
+                raise
+            session.reopen()
+            total = begun = done = 0.0
+            # a line of which it is known by now is given a bad one's lead, and only then the longest
+            least = _LEAD_BAD if session.line.damaged and not least else _LEAD_MOST
+            first.clear()
+            todo = chain([left], source)
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
@@ -114,7 +120,7 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
         left(session.under_way + session.queued / 1000)
     for seconds in session.arrivals():
         left(seconds)
-    return session.status()
+    return session.standing()
 
 
 _DONE = object()
