@@ -17,6 +17,7 @@ from armkin.board.firmware.serial_line import Line
 
 _RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
 _GAP = 0.004  # [s] after all that was sent has left and an answer had its time
+_LATE = 0.012  # [s] without progress, before a question is to find out
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 16  # frames
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
@@ -95,7 +96,7 @@ class Window:
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        return bool(self._sent) and self._line.port.now() - self._line.clear > self._line.slowest + _GAP
+        return bool(self._sent) and self._line.port.now() - self._line.clear > self._line.slowest + _LATE
 
     def _room(self, size: int, first: int) -> int:
         """Bytes that may be sent when `size` are under way, of which the first frame has `first`.

@@ -168,7 +168,8 @@ class Session:
             raise StoppedError(self.hold())
         now = self.port.now()
         self._window.send()
-        soon = ends or self._window.out_of_credit or self._window.late
+        late = self._window.late and not self.line.unanswered  # there is room for one question beside the frames
+        soon = ends or self._window.out_of_credit or late
         quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
         quick = quick / 2 if self.line.noisy else quick
         if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
