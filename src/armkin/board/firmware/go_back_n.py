@@ -96,7 +96,8 @@ class Window:
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        return bool(self._sent) and self._line.port.now() - self._line.clear > self._line.slowest + _LATE
+        patience = self._line.slowest + (_GAP if self._line.damaged else _LATE)
+        return bool(self._sent) and self._line.port.now() - self._line.clear > patience
 
     def _room(self, size: int, first: int) -> int:
         """Bytes that may be sent when `size` are under way, of which the first frame has `first`.

@@ -168,7 +168,8 @@ class Session:
             raise StoppedError(self.hold())
         now = self.port.now()
         self._window.send()
-        late = self._window.late and not self.line.unanswered  # there is room for one question beside the frames
+        # There is room for one question beside the frames; on a bad line the one before may be lost.
+        late = self._window.late and (self.line.damaged or not self.line.unanswered)
         soon = ends or self._window.out_of_credit or late
         quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
         quick = quick / 2 if self.line.noisy else quick
