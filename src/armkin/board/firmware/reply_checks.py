@@ -85,6 +85,16 @@ def check_reply(reply: Ack | Status, info: Info, port: str) -> None:
             raise _impossible(port, "counts", max(map(abs, reply.counts)), "31 bits")
 
 
+def check_session(digest: int, own: int, port: str) -> None:
+    """Raise ReplacedError if a reply belongs to another session than one's own."""
+    if digest != own:
+        raise ReplacedError(
+            f"another program has taken over the board on {port}: this one has ended\n"
+            "only one program may move an arm; armkin status tells where it stands",
+            port=port,
+        )
+
+
 def check_next(done: int, sent: int, port: str) -> None:
     """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
     if done > sent:

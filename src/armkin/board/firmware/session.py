@@ -200,12 +200,12 @@ class Session:
         for reply in self.line.replies(timeout):
             self.heard = self.port.now()
             if isinstance(reply, Info):
-                self._same(reply.nonce & 0xFFFF)
+                reply_checks.check_session(reply.nonce & 0xFFFF, self._digest, self.port.name)
                 continue  # of a HELLO that was repeated
             assert self.info is not None
             reply_checks.check_reply(reply, self.info, self.port.name)
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
-                self._same(reply.session)
+                reply_checks.check_session(reply.session, self._digest, self.port.name)
                 self._window.check(reply)
             goes_on, asked = reply.queued < self.queued or _moved(self.latest, reply), 0.0
             self.state, self.queued = State(reply.state), reply.queued
@@ -218,15 +218,6 @@ class Session:
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply
-
-    def _same(self, digest: int) -> None:
-        """Raise ReplacedError if a reply belongs to another session than this one."""
-        if digest != self._digest:
-            raise ReplacedError(
-                f"another program has taken over the board on {self.port.name}: this one has ended\n"
-                "only one program may move an arm; armkin status tells where it stands",
-                port=self.port.name,
-            )
 
     # Questions, and stopping
 
