@@ -48,7 +48,7 @@ class Session:
         self._tag = 0
         self._digest = 0
         self._status: Status | None = None
-        self._last: Ack | Status | None = None  # as last heard
+        self.last: Ack | Status | None = None  # as last heard
         self._error: Ack | Status | None = None
         self.heard = port.now()
         self._silent_for = 0.0  # [s] in which an answer would have been heard
@@ -209,7 +209,7 @@ class Session:
                 self._window.check(reply)
             goes_on, asked = reply.queued < self.queued or _moved(self.latest, reply), 0.0
             self.state, self.queued = State(reply.state), reply.queued
-            self._last = reply
+            self.last = reply
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
@@ -256,13 +256,6 @@ class Session:
             if self.port.now() - begin > _HOLD:
                 raise LinkError(f"the board on {self.port.name} does not come to rest: cut the motors' power")
             self._hear(0.03)
-
-    def standing(self) -> Status:
-        """The status of an arm that has come to rest: as just heard, if it was one that said so."""
-        last = self._last
-        if isinstance(last, Status) and last.page == 0 and last.state == State.IDLE:
-            return last
-        return self.status()
 
     def rest(self) -> Status:
         """Wait until the arm stands, whatever the session is; its status then."""

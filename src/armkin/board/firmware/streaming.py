@@ -120,7 +120,15 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
         left(session.under_way + session.queued / 1000)
     for seconds in session.arrivals():
         left(seconds)
-    return session.standing()
+    return _standing(session)
+
+
+def _standing(session: Session) -> Status:
+    """The status of an arm that has come to rest: as just heard, if it was one that said so."""
+    last = session.last
+    if isinstance(last, Status) and last.page == 0 and last.state == State.IDLE:
+        return last
+    return session.status()
 
 
 _DONE = object()
