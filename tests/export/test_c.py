@@ -221,6 +221,19 @@ def test_a_calibrated_arm_that_stands_at_its_target_stays(tmp_path: Path) -> Non
         np.testing.assert_array_equal(branches[best], near)
 
 
+@pytest.mark.parametrize("robot", ["ur5e", "puma560", "jaco_j2n6s300"])
+def test_an_arm_asked_for_its_own_pose_in_few_digits_stays(robot: str, tmp_path: Path) -> None:
+    """Wrists in line, every second of which moved a joint by up to 180 degrees."""
+    arm = armkin.load(robot)
+    code, q = Exported(arm, tmp_path), np.clip(postures(arm, 60), arm.lower, arm.upper)
+    q[:, 4] = 0.0
+    q = np.clip(q, arm.lower, arm.upper)
+    for k, (near, T) in enumerate(zip(q, armkin.fk(arm, q), strict=True)):
+        given = [np.round(T, 6), np.round(T, 8), T.astype(np.float32).astype(float)][k % 3]
+        _, _, branches, best = code.ik(given, near)
+        np.testing.assert_array_equal(branches[best], near)
+
+
 @pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
 def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tmp_path: Path) -> None:
     """Joint 5 at zero: joints 2, 3, 4 and 6 turn about parallel axes; few values of joint 6 leave the rest in reach."""

@@ -14,7 +14,7 @@ from armkin.inverse.tasks.task import LABELS
 from armkin.model.units import targets_out
 from command_line import run
 
-DIGITS = (6, 8, 12, 0)  # 0: float32
+DIGITS = ("6f", "8f", "12f", "7g", "float32")  # decimals, significant digits
 
 
 def postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
@@ -27,8 +27,10 @@ def postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
     return arm, np.clip(q, arm.lower, arm.upper)
 
 
-def rounded(T: np.ndarray, digits: int) -> np.ndarray:
-    return np.round(T, digits) if digits else T.astype(np.float32)
+def rounded(T: np.ndarray, digits: str) -> np.ndarray:
+    if digits == "float32":
+        return T.astype(np.float32)
+    return np.array([float(f"{x:.{digits}}") for x in T.ravel()]).reshape(T.shape)
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia"])
@@ -36,13 +38,13 @@ def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
     """Up to 37 of 40 moved by more than 10 degrees; some were called unreachable."""
     arm, q = postures(name, 4, 3)
     T = armkin.fk(arm, q)
-    for digits in DIGITS:
+    for number, digits in enumerate(DIGITS):
         given = rounded(T, digits)
         many = armkin.ik(arm, given, near=q)
         assert (many.best >= 0).all(), digits
         best = many.q[np.arange(len(q)), many.best]
-        np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=f"{digits} digits")
-        k = digits % len(q)
+        np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
+        k = number % len(q)
         one = armkin.ik(arm, given[k], near=q[k])
         np.testing.assert_array_equal(one.q[one.best], best[k])
         assert one.status == many.status[k]
@@ -52,11 +54,24 @@ def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
 def test_machine_code_stays_as_python_does(name: str) -> None:
     arm, q = postures(name, 4, 5)
     T, fast = armkin.fk(arm, q), armkin.compile(armkin.load(name))
-    for digits in (7, 0):
+    for digits in ("7f", "float32"):
         found, slow = fast.ik(rounded(T, digits), near=q), armkin.ik(arm, rounded(T, digits), near=q)
         best = found.q[np.arange(len(q)), found.best]
         np.testing.assert_array_equal(best, slow.q[np.arange(len(q)), slow.best])
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6)
+
+
+def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
+    """The columns of such a rotation stay at right angles, and may keep their length: of 2,000 some 50 were moved."""
+    arm, _ = shipped("ur5e")
+    rng = np.random.default_rng(1)
+    q = np.radians([[0.0, -90.0, 90.0, -90.0, 0.0, 0.0]]) + 0.0 * rng.uniform(size=(500, 1))
+    q[:, 0] = rng.uniform(-3.0, 3.0, len(q))
+    T = armkin.fk(arm, q)
+    for digits in ("6f", "7f", "7g"):
+        found = armkin.ik(arm, rounded(T, digits), near=q)
+        best = found.q[np.arange(len(q)), found.best]
+        np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
 
 
 def test_where_it_is_the_only_row_the_target_is_a_boundary() -> None:

@@ -194,7 +194,8 @@ class _CompiledTask:
             out = solved(target, each, workers, read=True)
             assert out is not None
         single = target_rounding.is_single(targets)
-        rounding, most = target_rounding.of_targets(self.arm, self.task, target, rounding, single, said, lead)
+        shown = given.reshape(target.shape), rounding
+        rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, said, lead)
         rows = near_itself.standing(self.arm, self.task, target, each, most)
         if len(rows):
             beside = each if each.ndim == 1 else each.reshape(-1, self.n)[rows]

@@ -111,7 +111,7 @@ def ik(
         target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
-    shown, most = target_rounding.of_targets(arm, definition, target, shown, single, rounding, lead)
+    shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     if examine:
         out = legal_postures.with_legal_postures(Goals(arm, definition, target, each), out)
         out = near_itself.stand(Goals(arm, definition, target, each), out, most)

@@ -13,12 +13,13 @@ from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
+from armkin.inverse.answers.rounding import FLOAT32
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.numeric.tolerances import CLOSE_BY
+from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import held_by_near, redundancy
-from armkin.inverse.tasks.task import LARGEST
+from armkin.inverse.tasks.task import LARGEST, ROUNDED
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
@@ -152,6 +153,7 @@ def has_form(geometry: Geometry) -> bool:
 def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
     values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be one
+    values |= {"ROUNDED": ROUNDED, "DECIMAL": DECIMAL, "FLOAT": FLOAT32}
     lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import DECIMAL, SOLUTION
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, SOLUTION
+from armkin.inverse.tasks.task import ROUNDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +24,12 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 # A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
-# the defect of nine rounded entries is less than a quarter of it in one case of 100,000.
+# the defect of nine rounded entries is less than a quarter of it in one case of 100,000, of a turn about one of the
+# base's axes, which has four, in one of 13. There the last digit that the entries have tells: an angle is off by less
+# than three halves of it, a position of as many digits by no more than six.
 DEFECTS = 4.0
+HALVES = 8.0
+COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
 FLOAT32 = 2.0**-24  # of a number: half a unit of its last place
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
@@ -42,11 +47,18 @@ def is_single(targets: Any) -> bool:
 
 
 def of_targets(
-    arm: Arm, task: Task, target: Array, defect: Array, single: bool, given: ArrayLike | None, lead: tuple[int, ...]
+    arm: Arm,
+    task: Task,
+    target: Array,
+    shown: tuple[Array, Array],
+    single: bool,
+    given: ArrayLike | None,
+    lead: tuple[int, ...],
 ) -> Rounding:
     """The rounding of targets (N, ...), a batch of shape lead.
 
-    defect: (N,) of rotations; single: they were given in float32; given: () or (...) what the caller says it is.
+    shown: targets as they were given, and how far their rotations were off (N,); single: they were given in float32;
+    given: () or (...) what the caller says it is.
     Raises UsageError for a rounding that is negative, not finite or of another shape.
     """
     if given is not None:
@@ -56,12 +68,37 @@ def of_targets(
             raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {said.shape}")
         known = np.broadcast_to(said, lead).reshape(-1).astype(float)
         return Rounding(known, SOLUTION + known)
+    numbers, defect = shown
     known = defect
     if single:
         point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
         largest = np.abs(point).max(axis=1, initial=0.0) / arm.reach
         known = np.maximum(defect, FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
-    return Rounding(known, SOLUTION + DEFECTS * known)
+    most = DEFECTS * known
+    rows = np.flatnonzero(defect > ROUNDED)
+    if len(rows):
+        most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
+    return Rounding(known, SOLUTION + most)
+
+
+def last_place(R: Array) -> Array:
+    """Half a unit (N,) of the last digit that rotations (N, 3, 3) are rounded to, or of float32; 0 where of neither.
+
+    All nine entries have to be numbers of so few digits, or too small to count: of others the chance is 1e-20 at
+    eight. What is rounded to decimals has as many digits, or fewer.
+    """
+    entries = R.reshape(-1, 9)
+    half = np.where((entries == entries.astype(np.float32)).all(axis=1), FLOAT32, 0.0)
+    left = np.flatnonzero(half == 0.0)
+    for digits in range(COARSEST, MOST):
+        some = entries[left]
+        size = np.floor(np.log10(np.maximum(np.abs(some), FEW_DIGITS)))
+        here = (_whole(some * 10.0 ** (digits - 1 - size)) | (np.abs(some) < FEW_DIGITS)).all(axis=1)
+        half[left[here]] = 0.5 * 10.0**-digits
+        left = left[~here]
+        if not len(left):
+            break
+    return half
 
 
 def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLike | None = None) -> Array:
@@ -89,11 +126,15 @@ def _needed(values: Array) -> Array:
     found = np.zeros(values.size)
     left, number = np.arange(values.size), values.ravel()
     for decimals in range(MOST):
-        scaled = number * 10.0**decimals
-        here = np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0)
+        here = _whole(number * 10.0**decimals)
         if decimals >= FEWEST:
             found[left[here]] = decimals
         left, number = left[~here], number[~here]
         if not len(left):
             break
     return found.reshape(values.shape)
+
+
+def _whole(scaled: Array) -> Bool:
+    """Which numbers are integers but for rounding."""
+    return np.asarray(np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0))

@@ -30,10 +30,10 @@ static arm_real arm_missed(const arm_real *q, const arm_real *goal)
 }
 
 /* `near`, if it is within limits and solves the target, takes the place of the branch that it is one with, or becomes one:
-   the arm that stands there stays. near: actual joint values, stand: the same as arm_fk takes them. Returns how many
-   branches there are. */
+   the arm that stands there stays. near: actual joint values, stand: the same as arm_fk takes them; most: what it may
+   miss, for rounding, squared. Returns how many branches there are. */
 static int arm_stay(const arm_real *near, const arm_real *stand, const arm_real *goal, const arm_real *q, arm_solution *out,
-    int count)
+    int count, arm_real most)
 {
     arm_real between[ARM_JOINTS], missed, least = ARM_INFINITY;
     int b, j, k, index = 0, at = -1;
@@ -41,7 +41,7 @@ static int arm_stay(const arm_real *near, const arm_real *stand, const arm_real 
         if (!(near[j] >= arm_lower[j] - ARM_SLACK && near[j] <= arm_upper[j] + ARM_SLACK))
             return count;
     missed = arm_missed(stand, goal);
-    if (!(missed <= ARM_SOLUTION))
+    if (!(missed <= most))
         return count;
     for (k = 0; k < count; k++) {
         const arm_real away = arm_away(out[k].q, stand);
@@ -56,7 +56,7 @@ static int arm_stay(const arm_real *near, const arm_real *stand, const arm_real 
             step -= ARM_TURN * ARM_RINT(step / ARM_TURN);
         between[j] = stand[j] + step / 2;
     }
-    if (at >= 0 && (count == ARM_BRANCHES || (least <= ARM_CLOSE_BY && arm_missed(between, goal) <= ARM_SOLUTION)))
+    if (at >= 0 && (count == ARM_BRANCHES || (least <= ARM_CLOSE_BY && arm_missed(between, goal) <= most)))
         index = out[at].branch;
     else { /* another one: named after the nearest that is not listed */
         for (b = 0, least = ARM_INFINITY; b < ARM_BRANCHES; b++) {
@@ -111,7 +111,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int 
         one->residual = ARM_SQRT(miss[b]);
         count++;
     }
-    return arm_stay(near, stand, goal, q, out, count);
+    return arm_stay(near, stand, goal, q, out, count, arm_most(target));
 }
 
 int arm_best(const arm_solution *found, int count, const arm_real *near)

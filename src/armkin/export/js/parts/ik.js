@@ -1,6 +1,8 @@
 const ACCEPTED = 1e-24; // squared residual of a candidate that needs no correction
 const NEARBY = 1e-12; // and of one that is worth correcting
 const LARGEST = 1e15; // mm, rad: of a target; its powers in polynomials stay finite
+const ROUNDED = 1e-14; // distance from orthonormal columns that needs no correction
+const DECIMAL = 4e-16; // relative distance of a number from a decimal one that it is printed as
 const STARTS = 48; // postures from which self-motions are searched for
 const DEGREES = 180 / Math.PI;
 
@@ -39,7 +41,21 @@ function read(target) {
   const z = goal[3] * goal[7] - goal[4] * goal[6];
   if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
     throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
-  return { goal, rounding: given };
+  return { goal, rounding: given > ROUNDED ? Math.max(4 * given, 8 * lastPlace(flat)) : 0 };
+}
+
+/** Half a unit of the last digit of a rotation's entries, or of single precision; 0 where of neither. @param {Float64Array} T */
+function lastPlace(T) {
+  const entries = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((k) => Math.abs(T[k])).filter((x) => x >= 1e-4); // smaller ones have few
+  if (entries.every((x) => Math.fround(x) === x)) return 2 ** -24;
+  for (let digits = 5; digits < 12; digits++) {
+    const has = (/** @type {number} */ x) => {
+      const scaled = x * 10 ** (digits - 1 - Math.floor(Math.log10(x)));
+      return Math.abs(scaled - Math.round(scaled)) <= DECIMAL * scaled;
+    };
+    if (entries.every(has)) return 0.5 / 10 ** digits;
+  }
+  return 0;
 }
 
 /** R (3 - R'R) / 2, which squares the distance from a rotation; the largest entry of R'R - 1 before. @param {Float64Array} R */
