@@ -13,9 +13,8 @@ from armkin.export.c.golden import golden_test
 from armkin.export.c.text import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
-from armkin.inverse.answers.rounding import FLOAT32
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL
+from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import held_by_near, redundancy

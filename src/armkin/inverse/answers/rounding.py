@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, SOLUTION
+from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
 from armkin.inverse.tasks.task import ROUNDED
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 DEFECTS = 4.0
 HALVES = 8.0
 COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
-FLOAT32 = 2.0**-24  # of a number: half a unit of its last place
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
 

@@ -117,6 +117,7 @@ MOVED = 1e-3  # of the way: a joint that moves less along a component does not m
 DOUBLE_ROOT = 3e-4  # [rad] how far rounding parts a candidate from its root at most
 ROOT_ROUNDING = 1e-13  # that way times the smallest singular value
 DECIMAL = 4e-16  # relative distance of a number from a decimal one that it is printed as
+FLOAT32 = 2.0**-24  # of a number in single precision: half a unit of its last place
 FEW_DIGITS = 1e-4  # entry of a rounded rotation below which it does not tell to how many digits
 SHORTEST_STEP = 1e-4  # [rad, reaches] along a curve of a self-motion
 OFF_CURVE = 1e-6  # residual above which the joints move no farther
