@@ -18,7 +18,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.followed import Follower, Ik, Postures
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import REACH
+from armkin.inverse.numeric.tolerances import REACH, SOLUTION
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import distance, read_near, read_targets
 from armkin.keep_out.clearance import clear
@@ -252,7 +252,7 @@ def _of_chunk(find: Follower, finer: int = 1) -> _Rows:
     t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
     found = find.along(t)
     if finer == 1 and find.labelled:
-        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1 + 1e-9)
+        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
         none = np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough)
         if len(none):
             parts = [_of_chunk(find._replace(target=find.target[[k]], near=find.near[[k]]), FINER) for k in none]
