@@ -15,8 +15,10 @@ from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
 from armkin.inverse.elimination.method import Elimination
-from armkin.inverse.elimination.passes import shaken_goal
+from armkin.inverse.elimination.passes import REGULAR, TILT, shaken_goal
 from armkin.inverse.elimination.plans import Kind
+from armkin.inverse.elimination.roots import STEADY
+from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
@@ -29,6 +31,13 @@ if TYPE_CHECKING:
 
 # each needs those before
 _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
+_NAMED = {  # numbers that the method reads, by the names that they have in Python
+    name: getattr(tolerances, name)
+    for name in (
+        "ALONE", "BLURRED_ROOT", "CLOSE_RESIDUAL", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED", "GRAZING", "INFINITE",
+        "NO_PRODUCT", "OWN_ROOT", "PAIRED", "SAME_KEY", "SAME_ROOT", "STRAY", "TWIN_ROOTS", "UPRIGHT",
+    )
+}  # fmt: skip
 BRANCHES = MOST
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
 OWN = 2  # of a kind of poses
@@ -72,7 +81,8 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
         "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
         "ANSWERS": passes * max(pencil.size for pencil in pencils),
     }
-    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL}
+    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
+    numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY}
     lines = [f"#define ARM_{name} {value}" for name, value in sizes.items()]
     lines += [f"#define ARM_{name} {c_and_js_code.number(value)}" for name, value in numbers.items()]
     moves = np.concatenate(moves_of(passes))

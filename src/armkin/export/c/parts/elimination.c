@@ -27,10 +27,10 @@ static int arm_stands_for_nothing(const arm_seed *seed, const double *goal, cons
     for (j = 0; j < size && i >= 0; j++) {
         const double a = 1 + re[i] * re[i] + im[i] * im[i], b = 1 + re[j] * re[j] + im[j] * im[j];
         const double x = re[i] - re[j], y = im[i] - im[j];
-        if (j != i && !(4 * (x * x + y * y) > 1e-6 * a * b))
+        if (j != i && !(4 * (x * x + y * y) > ARM_ALONE * ARM_ALONE * a * b))
             return 0;
     }
-    return arm_missing(q, goal, frame, joints, error) > 1e-3;
+    return arm_missing(q, goal, frame, joints, error) > ARM_STRAY;
 }
 
 /* One pass over a pose: its answers (`found`, from `count` on), and whether the pass leaves it open; *touching: two
@@ -40,7 +40,7 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
     const arm_pencil *pencil = &arm_pencils[arm_plan[kind * ARM_PASSES + pass]];
     const double shake = arm_shakes[pass];
     const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden];
-    const double pair = 1e-4 + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
+    const double pair = ARM_PAIRED + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
     const int size = pencil->size, lead = pencil->wide ? 16 : 12, c = lead + size, length = ARM_PRODUCTS + ARM_MOST;
     const int row = size <= 16 ? 16 : ARM_MOST, begin = *count; /* numbers in a row of C */
     double moved[12], back[12], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)];
@@ -81,32 +81,34 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
     }
     if (!(row == 16 ? arm_roots_of(C, size, 16, re, im) : arm_roots_of(C, size, ARM_MOST, re, im)))
         return 1;
-    seeds = arm_seeds(pencil, E, back, &ends, re, im, careful ? 0.3 : 0.02,
+    seeds = arm_seeds(pencil, E, back, &ends, re, im, careful ? ARM_LATER_TILT : ARM_MAIN_TILT,
         (careful || pencil->wide) && !(pencil->slides[2] || pencil->slides[3] || pencil->slides[4]), seed);
     for (i = 0; i < seeds && *count < ARM_ANSWERS; i++) {
         const double tilt = seed[i].tilt;
         arm_answer *one = &found[*count];
         int good;
-        if (seed[i].defect > 1e-5 && !(shake > 0) && most < 1e5 && arm_stands_for_nothing(seed + i, goal, re, im, size))
+        if (seed[i].defect > ARM_NO_PRODUCT && !(shake > 0) && most < ARM_STEADY
+            && arm_stands_for_nothing(seed + i, goal, re, im, size))
             continue;
         for (k = 0; k < 6; k++)
             one->q[k] = seed[i].q[k];
         hidden[*count - begin] = one->q[joint];
         arm_refine(goal, careful ? 12 : 4, careful, one);
-        good = one->residual < (careful ? 3e-9 : 1e-10);
-        if (!good && (tilt < 1e-4 || (careful ? one->residual < 1e-5 && tilt < (pair > 1e-3 ? pair : 1e-3)
-                                              : one->residual < 1e-3)))
+        good = one->residual < (careful ? ARM_GRAZING : ARM_ELIMINATED);
+        if (!good && (tilt < ARM_UPRIGHT || (careful ? one->residual < ARM_CLOSE_RESIDUAL
+                    && tilt < (pair > ARM_STRAY ? pair : ARM_STRAY) : one->residual < ARM_STRAY)))
             open = 1; /* a complex pair that steps brought near the pose may be a real one, seen through rounding */
         if (good && tilt > 0 && tilt < pair)
             open = 1; /* a move of the pose may turn two close real roots into such a pair */
-        if ((good && tilt > 0 && tilt < 1e-4) || (one->residual > 1e-10 && one->residual < 3e-6))
+        if ((good && tilt > 0 && tilt < ARM_UPRIGHT) || (one->residual > ARM_ELIMINATED && one->residual < 3e-6))
             *touching = 1;
         if (!good)
             continue;
         weakest = one->weakness > weakest ? one->weakness : weakest;
-        own[*count - begin] = fabs(arm_less(one->q[joint], hidden[*count - begin], arm_loop_slides[joint])) < 1e-6;
+        own[*count - begin] = fabs(arm_less(one->q[joint], hidden[*count - begin], arm_loop_slides[joint]))
+            < ARM_OWN_ROOT;
         stands[*count - begin] = tilt < pair; /* of others damped steps bring many to an answer that has its own root */
-        blurred[*count - begin] = one->guess > 1e-5 + 10 * shake;
+        blurred[*count - begin] = one->guess > ARM_BLURRED_ROOT + 10 * shake;
         real[*count - begin] = !(tilt > 0);
         arm_sortable(one);
         ++*count;
@@ -115,8 +117,8 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
        the hidden joint: around a value there are no more solutions than roots, and no two roots may have led to one answer.
        Near singularities roots are too far off to say so. */
     for (j = begin; j < *count; j++) {
-        own[j - begin] &= !(shake > 0) && weakest < 1e3;
-        if (real[j - begin] && found[j].guess > 1e-3 + 30 * shake && !own[j - begin])
+        own[j - begin] &= !(shake > 0) && weakest < ARM_REGULAR;
+        if (real[j - begin] && found[j].guess > ARM_STRAY + 30 * shake && !own[j - begin])
             open = 1;
     }
     /* Two roots that share the hidden joint: good if both were near an answer at once, and, of real ones, if these are not
@@ -125,10 +127,10 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
         for (k = begin; k < j; k++) {
             const int one = j - begin, other = k - begin;
             if (stands[one] && stands[other] && (blurred[one] || blurred[other]) && !(own[one] && own[other])
-                && fabs(hidden[one] - hidden[other]) < 1e-4)
+                && fabs(hidden[one] - hidden[other]) < ARM_SAME_ROOT)
                 open = 1;
-            if (real[one] && real[other] && fabs(found[j].key - found[k].key) < 1e-5
-                && arm_apart(found[j].q, found[k].q) < 1e-2)
+            if (real[one] && real[other] && fabs(found[j].key - found[k].key) < ARM_SAME_KEY
+                && arm_apart(found[j].q, found[k].q) < ARM_EXAMINED)
                 open = 1;
         }
     return open;
@@ -157,7 +159,7 @@ static int arm_merge(const double *goal, arm_answer *found, int count, int *merg
                 half[k] = found[i].q[k] + step[k] / 2;
                 distance = fabs(step[k]) > distance ? fabs(step[k]) : distance;
             }
-            if (!(distance < 1e-2))
+            if (!(distance < ARM_EXAMINED))
                 continue;
             blur = 4 * (found[i].residual > found[j].residual ? found[i].residual : found[j].residual);
             radius = 3 * found[i].weakness * found[i].residual;
@@ -206,9 +208,9 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
         open = arm_attempt(there, kind, pass, found, &number, &edge);
     }
     for (i = 0; i < number; i++)
-        exact += found[i].residual < 1e-10;
+        exact += found[i].residual < ARM_ELIMINATED;
     for (i = k = 0; i < number; i++) /* a closest point stands in for answers only where there are none */
-        if (!exact || found[i].residual < 1e-10)
+        if (!exact || found[i].residual < ARM_ELIMINATED)
             found[k++] = found[i];
     number = arm_merge(there, found, k, &edge);
     for (i = 0; i < number; i++)

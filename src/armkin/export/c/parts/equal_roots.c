@@ -1,9 +1,6 @@
 /* Solutions that share the hidden joint: their root is multiple, its vectors are any mixtures of theirs, and are taken apart
    as in `armkin.inverse.elimination.equal_roots`. */
-#define ARM_SHARED 8        /* solutions that one root may stand for */
-#define ARM_EQUAL_ROOTS 1e-7 /* [rad] roots no further apart may be one */
-#define ARM_TWIN_ROOTS 1e-4  /* [rad] to the next one of others */
-#define ARM_UPRIGHT 1e-4     /* to the next product of the same root, and to the real line */
+#define ARM_SHARED 8 /* solutions that one root may stand for */
 
 /* A candidate: joint values of the loop, its imaginary part as an angle, the defect of its vector; root: which one it is of,
    -1 of a multiple one all of whose solutions are known. */
