@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+BLOCK = 8_192  # targets that are asked together: what is known of them stays in the cache
+
+
 class Question(NamedTuple):
     """Targets of one arm, in the targets' frame."""
 
@@ -55,43 +58,62 @@ def positions_of(task: Task, targets: Array) -> Array:
 
 
 def counted(question: Question, at: Array) -> NDArray[np.int64]:
-    """Of one position (2,): (1, K)."""
-    legal = _legal_yaws(question, at)
+    """How many targets are reached from positions (P, 2) at each yaw: (P, K)."""
+    at_once = max(BLOCK // len(question.targets), 1)
+    blocks = [at[start : start + at_once] for start in range(0, len(at), at_once)]
+    return np.concatenate([_counted(question, block, _legal_yaws(question, block)) for block in blocks])
+
+
+def _counted(question: Question, at: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The same of what is legal (P, N, K); of ways that one branch does not carry, less than all."""
     if not question.ways:
-        return np.asarray(legal.sum(axis=0, dtype=np.int64)[None])
-    counts, begin = np.zeros(question.yaws, np.int64), 0
+        return np.asarray(legal.sum(axis=1, dtype=np.int64))
+    counts, begin = np.zeros((len(at), question.yaws), np.int64), 0
     for length in question.ways:
         here = slice(begin, begin + length)
-        count = legal[here].sum(axis=0, dtype=np.int64)
+        count = legal[:, here].sum(axis=1, dtype=np.int64)
         whole = count == length
-        if length > 1 and whole.any():
-            whole = _on_one_branch(question._replace(targets=question.targets[here]), at, whole)
+        for p in np.flatnonzero(whole.any(axis=1)) if length > 1 else ():
+            whole[p] = _on_one_branch(question._replace(targets=question.targets[here]), at[p], whole[p])
         counts += np.where(whole, length, np.minimum(count, length - 1))
         begin += length
-    return counts[None]
+    return counts
 
 
 def _legal_yaws(question: Question, at: Array) -> NDArray[np.bool_]:
-    """Which targets are reached from one position at each yaw: (N, K)."""
-    arm, K = question.arm, question.yaws
-    turns = np.arange(K) * question.step
+    """Which targets are reached from positions (P, 2) at each yaw: (P, N, K)."""
+    arm, N, K = question.arm, len(question.targets), question.yaws
+    turns = (np.arange(K) * question.step).tolist()
     if not question.arcs:
-        return np.stack([legal_from(question, at, turn) for turn in turns.tolist()], axis=1)
-    goals = seen_from(question, at, 0.0)
+        return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in at])
+    target, place = np.tile(np.arange(N), len(at)), np.repeat(at, N, axis=0)
+    goals = seen_from(question._replace(targets=question.targets[target]), place, 0.0)
     legal = np.zeros((len(goals), K), bool)
     near = np.linalg.norm(positions_of(question.task, goals), axis=1) <= 2 * arm.reach + np.linalg.norm(arm.base[:3, 3])
     some = np.flatnonzero(near)
-    if not len(some):
-        return legal
-    s = ik(arm, goals[some], question.task.name)
-    allowed = s.valid & inside(arm, s.q, range(1, arm.n))
-    first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
-    places = (np.arange(K) - first[:, :, None]) % K < np.where(allowed, length, 0)[:, :, None]
-    legal[some] = places.any(axis=1)
-    for row in some[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)].tolist():
-        one = question._replace(targets=question.targets[row : row + 1])
-        legal[row] = [bool(legal_from(one, at, turn)[0]) for turn in turns]
-    return legal
+    if len(some):
+        s = ik(arm, goals[some], question.task.name)
+        allowed = s.valid & inside(arm, s.q, range(1, arm.n))
+        first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
+        legal[some] = _covered(first, np.where(allowed, length, 0), K)
+        edge = some[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
+        if len(edge):
+            asked = question._replace(targets=question.targets[target[edge]])
+            legal[edge] = np.stack([legal_from(asked, place[edge], turn) for turn in turns], axis=1)
+    return legal.reshape(len(at), N, K)
+
+
+def _covered(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
+    """Which places of circles of `count` lie on one of their arcs at least: (M, B), (M, B) -> (M, count)."""
+    row, end = np.arange(len(first))[:, None] * (count + 1), first + length
+    size = len(first) * (count + 1)
+    steps = np.bincount((row + first).ravel(), minlength=size)
+    steps -= np.bincount((row + np.minimum(end, count)).ravel(), minlength=size)
+    steps = steps.reshape(len(first), count + 1)
+    k, b = np.nonzero(end > count)  # goes on at 0
+    np.add.at(steps, (k, np.zeros_like(k)), 1)
+    np.add.at(steps, (k, end[k, b] - count), -1)
+    return np.asarray(steps.astype(np.int16).cumsum(axis=1, dtype=np.int16)[:, :count] > 0)
 
 
 def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -131,16 +153,16 @@ def free_from(question: Question, at: Array, turn: float, within: bool = True) -
 
 
 def seen_from(question: Question, at: Array, turn: float) -> Array:
-    """The targets in the frame of an arm at a place."""
+    """The targets in the frame of an arm at a place (2,), or each in that of one at a place of its own (N, 2)."""
     task, targets = question.task, question.targets.copy()
     R = rotation_about(2, -turn)
-    shift = np.array([at[0], at[1], question.z])
+    shift = np.concatenate([at, np.full((*at.shape[:-1], 1), question.z)], axis=-1)
     if task.orientation == "full":
         targets[:, :3, 3] = (targets[:, :3, 3] - shift) @ R.T
         targets[:, :3, :3] = R @ targets[:, :3, :3]
         return targets
     k = task.position
-    targets[:, :k] = (targets[:, :k] - shift[:k]) @ R[:k, :k].T
+    targets[:, :k] = (targets[:, :k] - shift[..., :k]) @ R[:k, :k].T
     if task.orientation == "axis":
         targets[:, 3:6] = targets[:, 3:6] @ R.T
     if task.name in ("xy_theta", "xyz_yaw"):

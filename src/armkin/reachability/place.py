@@ -249,8 +249,7 @@ def _blocks(question: Question, at: Array) -> Iterator[Array]:
 
 def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
-    counts = [counted(questions[chunk.which], at).ravel() for at in chunk.at]
-    return chunk.number, {"reached": np.concatenate(counts)}
+    return chunk.number, {"reached": counted(questions[chunk.which], chunk.at).ravel()}
 
 
 def _margins(good: NDArray[np.bool_], step: float) -> Array:

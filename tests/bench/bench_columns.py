@@ -1,0 +1,221 @@
+"""CPU time a row of `ik --batch`, processes, memory, rows that nothing reaches, and what a Dask cluster costs.
+
+python tests/bench/bench_columns.py [--rows N] [rows] [unsolvable] [workers] [memory] [cluster]
+
+Typed poses: random ones of a UR5e, rounded to three decimals. "whole" is the command from its start; "slope" leaves out
+what does not grow with the rows (imports, the compiled arm). CPU time is that of all processes, the least of three.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import armkin
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+from armkin.model import units
+
+LABELS = ("x", "y", "z", "roll", "pitch", "yaw")
+BARS = {"csv": 6.0, "npz": 3.0, "parquet": 3.0, "all branches": 20.0}  # [us] a row
+UNSOLVABLE = 3_000  # [rows a second]
+MEMORY = 300  # [MB]
+FASTER = 1.7  # times by two processes on two cores
+OVERHEAD = 0.03  # of chunks of a second
+
+
+class Spent(NamedTuple):
+    """Of a command and its processes: CPU and wall time [s], largest memory of one process [MB]."""
+
+    cpu: float
+    wall: float
+    memory: float
+
+
+def poses(count: int) -> np.ndarray:
+    """Random typed targets (count, 6) of a UR5e."""
+    return typed(armkin.load("ur5e"), np.random.default_rng(3).uniform(-np.pi, np.pi, (count, 6)))
+
+
+def typed(arm: Any, q: np.ndarray) -> np.ndarray:
+    """Targets (N, 6) [mm, deg] of joint values as people write them."""
+    return np.round(units.targets_out(LABELS, targets_of(task_for(arm, None), armkin.fk(arm, q), q)), 3)
+
+
+def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
+    """The targets in each format, and "all branches" as CSV."""
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+
+    columns = dict(zip(LABELS, values.T, strict=True))
+    found = {end: folder / f"{name}.{end}" for end in ("csv", "npz", "parquet")}
+    with found["csv"].open("w") as file:
+        file.write(",".join(LABELS) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in values.tolist())
+    np.savez(found["npz"], **columns)
+    parquet.write_table(pa.table(columns), found["parquet"])
+    return found | {"all branches": found["csv"]}
+
+
+def spent(*words: Any, times: int = 3) -> Spent:
+    """The least CPU time of some runs of a command, with byte code as an installed package has it."""
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
+    least = Spent(np.inf, np.inf, 0.0)
+    for _ in range(times):
+        began, at = _children(), time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-m", "armkin", *map(str, words)],
+            env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
+        )  # fmt: skip
+        one = Spent(_children() - began, time.perf_counter() - at, 0.0)
+        least = Spent(min(one.cpu, least.cpu), min(one.wall, least.wall), 0.0)
+    return least._replace(memory=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
+
+
+def _children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def batch(given: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
+    """The command."""
+    out = folder / f"out{given.suffix}"
+    return ("ik", "ur5e", "--batch", given, "--compiled", "--out", out, *more)
+
+
+def rows(folder: Path, count: int) -> bool:
+    """CPU time a row, best branch and all."""
+    values, good = poses(count), True
+    few, many = write(values[: count // 10], folder, "few"), write(values, folder, "many")
+    for name, bar in BARS.items():
+        more = ("--all-branches",) if name == "all branches" else ()
+        small, large = (spent(*batch(files[name], folder, *more)).cpu for files in (few, many))
+        slope, whole = (large - small) / (0.9 * count) * 1e6, large / count * 1e6
+        good &= slope <= bar
+        print(f"{name:13}{count:,} rows: {slope:5.2f} us a row, {whole:5.2f} with the start (bar {bar:g})", flush=True)
+    return good
+
+
+def unsolvable(folder: Path, count: int) -> bool:
+    """Rows far away, outside the limits, and of a straight elbow, which rounding takes a little too far."""
+    good, count = True, count // 4
+    rng, arm, tight = np.random.default_rng(4), armkin.load("ur5e"), armkin.load("irb120")
+    q = rng.uniform(-np.pi, np.pi, (count * 20, 6))
+    bent = q[(np.abs(q[:, 4]) > 2.2) & (np.abs(q[:, 2]) > 2.2)][:count]
+    straight = np.where(np.arange(6) == 2, 0.0, q[: count // 50])
+    cases = {
+        "far away": ("ur5e", poses(count) * [3.0, 3.0, 3.0, 1.0, 1.0, 1.0]),
+        "outside limits": ("irb120", typed(tight, bent)),
+        "a little too far": ("ur5e", typed(arm, straight)),
+    }
+    for name, (robot, values) in cases.items():
+        many = write(values, folder, "off")["csv"]
+        few = write(values[: len(values) // 10], folder, "few")["csv"]
+        each = [spent("ik", robot, *batch(path, folder)[2:]).cpu for path in (few, many)]
+        rate = 0.9 * len(values) / max(each[1] - each[0], 1e-3)
+        good &= rate >= UNSOLVABLE
+        print(f"{name:17}{len(values):,} rows: {rate:,.0f} a second (bar {UNSOLVABLE:,})", flush=True)
+    return good
+
+
+def workers(folder: Path, count: int) -> bool:
+    """Two processes against one: wall time, and what it would be on two cores that do nothing else."""
+    given = write(poses(count), folder, "many")["csv"]
+    one, two = (spent(*batch(given, folder, "--workers", n)) for n in (1, 2))
+    print(f"workers      1: {one.cpu:.2f} s of CPU, {one.wall:.2f} s; 2: {two.cpu:.2f} s, {two.wall:.2f} s")
+    faster, most = one.wall / two.wall, 2 * one.cpu / two.cpu
+    print(f"{'':13}{faster:.2f} times as fast (bar {FASTER}), at most {most:.2f} by the CPU time")
+    return one.wall / two.wall >= FASTER
+
+
+def memory(folder: Path, count: int) -> bool:
+    """Memory of a process for some rows, and for ten times as many."""
+    values = poses(count)
+    few, many = write(values[: count // 10], folder, "few"), write(values, folder, "many")
+    found = {}
+    for name, files in (("few", few), ("many", many)):
+        found[name] = spent(*batch(files["csv"], folder), times=1).memory
+        print(f"memory       {name}: {found[name]:.0f} MB (bar {MEMORY})", flush=True)
+    return found["many"] <= MEMORY
+
+
+def second(job: float, chunk: bytes) -> bytes:
+    """A chunk that takes `job` seconds of CPU time."""
+    end = time.process_time() + job
+    while time.process_time() < end:
+        pass
+    return chunk
+
+
+def cluster(folder: Path, count: int) -> bool:
+    """CPU time of client, scheduler and worker beside that of twelve chunks of a second, a megabyte each way."""
+    from armkin.engines.run import Engine, in_order
+
+    environment = {**os.environ, "PYTHONPATH": os.fspath(Path(__file__).parent)}
+    file = folder / "scheduler.json"
+    words = [sys.executable, "-m", "dask"]
+    with (
+        subprocess.Popen([*words, "scheduler", "--scheduler-file", file, "--host", "127.0.0.1", "--port", "0",
+                          "--no-dashboard"], env=environment, stderr=subprocess.DEVNULL) as scheduler,
+        subprocess.Popen([*words, "worker", "--scheduler-file", file, "--no-nanny", "--nthreads", "1",
+                          "--no-dashboard"], env=environment, stderr=subprocess.DEVNULL) as worker,
+    ):  # fmt: skip
+        try:
+            address = _address(file)
+            sys.modules.setdefault("bench_columns", sys.modules["__main__"])
+            second.__module__ = "bench_columns"
+            data = [bytes(1 << 20)] * 12
+            list(in_order(Engine(cluster=address), second, 0.01, data[:3]))  # imports
+            began, at = _used(scheduler.pid) + _used(worker.pid) + time.process_time(), time.perf_counter()
+            list(in_order(Engine(cluster=address), second, 1.0, data))
+            more = _used(scheduler.pid) + _used(worker.pid) + time.process_time() - began - len(data)
+            wall = time.perf_counter() - at  # heartbeats go with it
+        finally:
+            worker.terminate()
+            scheduler.terminate()
+    share = more / len(data)
+    print(f"cluster      {share:.1%} of chunks of a second besides the work (bar {OVERHEAD:.0%})")
+    print(f"{'':13}{more / wall:.1%} of the time that passed: a worker that waits for its core has heartbeats, too")
+    return share <= OVERHEAD
+
+
+def _address(file: Path) -> str:
+    import json
+
+    while not (file.exists() and file.stat().st_size):
+        time.sleep(0.05)
+    return str(json.loads(file.read_text())["address"])
+
+
+def _used(pid: int) -> float:
+    """CPU time of a process [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+PARTS = {"rows": rows, "unsolvable": unsolvable, "workers": workers, "memory": memory, "cluster": cluster}
+
+
+def results() -> Iterator[bool]:
+    """Whether each part that is asked for meets its bars."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--rows", type=int, default=200_000)
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
+    asked = parser.parse_args()
+    for name in asked.parts or PARTS:
+        with tempfile.TemporaryDirectory() as folder:
+            yield PARTS[name](Path(folder), asked.rows)
+
+
+if __name__ == "__main__":
+    sys.exit(0 if all([*results()]) else 1)
