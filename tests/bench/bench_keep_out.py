@@ -353,8 +353,8 @@ def _path() -> None:
 
 def _curve(arm: Arm, corners: Array) -> Trajectory:
     """One curve of 10,000 cells through postures: smooth between them."""
+    from armkin.motion.cubics import Knots
     from armkin.motion.curve import Curve
-    from armkin.motion.time_optimal import Knots
 
     u = np.linspace(0.0, len(corners) - 1.0, 10_001)
     i = np.minimum(u.astype(int), len(corners) - 2)

@@ -28,12 +28,13 @@ from lines import random_line
 import armkin
 from armkin.inverse.tasks.fitting import task_for
 from armkin.motion.branch_chains import Chain, chains, fewest
+from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve
 from armkin.motion.geometry import spot
 from armkin.motion.linked_branches import linked
 from armkin.motion.path_plan import PathPlan
 from armkin.motion.profile import seven_phases
-from armkin.motion.time_optimal import Bounds, Knots, finer, optimal
+from armkin.motion.time_optimal import Bounds, finer, optimal
 
 SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")

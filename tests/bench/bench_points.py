@@ -1,6 +1,7 @@
 """Points and one tolerance: time beside the smooth curve, slicers' points, starts at points and singular homes.
 
-    OPENBLAS_NUM_THREADS=1 python tests/bench/bench_points.py [--shapes] [--slicer N] [--saw N] [--lines N] [--homes]
+    OPENBLAS_NUM_THREADS=1 python tests/bench/bench_points.py [--shapes] [--slicer N] [--saw N] [--lines N]
+        [--homes [ROBOT ...]]
 
 Without options all, small. Each prints its worst case; times are of the process. --slicer: points of the layers that
 scripts/first_layer.py writes; --saw: of a zigzag that turns back at every point; --lines: with `start: {point}`, each
@@ -144,10 +145,10 @@ def _place(target: np.ndarray) -> np.ndarray:
     return np.asarray(target[:3, 3] if target.ndim == 2 else target)
 
 
-def homes() -> None:
-    """Every shipped arm whose home is singular: carried, or turned at rest, or truly not to be done."""
+def homes(names: list[str]) -> None:
+    """Arms whose home is singular, every shipped one if none is named: carried, turned at rest, or not to be done."""
     print("arm               carried  at rest  refused  false sentences")
-    for name in catalogue.names():
+    for name in names or catalogue.names():
         arm = moving(name)
         if arm.n != 6 or condition(arm, arm.home) < 1e9:
             continue
@@ -178,11 +179,11 @@ def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--shapes", action="store_true")
-    parser.add_argument("--homes", action="store_true")
+    parser.add_argument("--homes", nargs="*", metavar="ROBOT")
     for name in ("slicer", "saw", "lines"):
         parser.add_argument(f"--{name}", type=int, default=0)
     given = parser.parse_args()
-    every = not any(vars(given).values())
+    every = given.homes is None and not any(vars(given).values())
     if given.shapes or every:
         shapes()
     if given.slicer or every:
@@ -191,8 +192,8 @@ def main() -> None:
         saw(given.saw or 1000)
     if given.lines or every:
         lines(given.lines or 14)
-    if given.homes or every:
-        homes()
+    if given.homes is not None or every:
+        homes(given.homes or [])
 
 
 if __name__ == "__main__":
