@@ -72,7 +72,7 @@ ARM_INLINE int arm_reduce(double *a, int n, int right, int m)
     return 1;
 }
 
-/* The right singular vector of the smallest singular value of an n x n matrix, n = 12 or 16: inverse iteration on A^T A. */
+/* The right singular vector of the smallest singular value of an n x n matrix, n = 8, 12 or 16: inverse iteration on A^T A. */
 ARM_INLINE void arm_null_vector(double *a, double *v, const int n)
 {
     double w[16], lower[256], over[16], size = 0;
