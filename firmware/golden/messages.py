@@ -25,7 +25,7 @@ class Board(NamedTuple):
 
 BOARDS = {
     "uno_cnc_shield": Board(1, 5, 0x10, 3, 4, 32, 152, 167, 16_000_000, 4),  # X Y Z A and a servo
-    "uno_servos": Board(3, 6, 0x3F, 0, 6, 32, 128, 127, 16_000_000, 0),
+    "uno_servos": Board(3, 6, 0x3F, 0, 3, 32, 120, 127, 16_000_000, 0),
     "pico6": Board(4, 8, 0xC0, 6, 6, 128, 250, 2047, 25_000_000, 6),  # X Y Z A B C and two servos
 }
 board = BOARDS["uno_cnc_shield"]  # the one that the conversation is with

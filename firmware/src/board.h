@@ -14,7 +14,7 @@
 
 #define AXES (STEPPERS + SERVOS)
 _Static_assert(STEPPERS <= 8 && AXES <= 15, "masks of axes");
-#define ROWS (STEPPERS ? STEPPERS : AXES)  // of the configuration: coupled joints
+#define ROWS (STEPPERS ? STEPPERS : AXES / 2)  // of the configuration: coupled joints
 #define ALL_AXES ((1U << AXES) - 1)
 #define STEPPER_AXES ((1U << STEPPERS) - 1)
 #define SERVO_AXES (ALL_AXES & ~STEPPER_AXES)

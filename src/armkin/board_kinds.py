@@ -38,7 +38,7 @@ class Board(NamedTuple):
     @property
     def rows(self) -> int:
         """Joint-limit rows that its configuration may have."""
-        return len(self.steppers) or len(self.axes)
+        return len(self.steppers) or len(self.axes) // 2
 
 
 BOARDS = {
@@ -58,7 +58,7 @@ BOARDS = {
             power="A4",
             chip="atmega2560",
         ),
-        Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 128, 1600),
+        Board("uno_servos", 3, (), ("S0", "S1", "S2", "S3", "S4", "S5"), (), 32, 120, 1600),
         Board(
             "pico6",
             4,

@@ -7,7 +7,7 @@
 #define UNIT_FACTOR 2  // 256 cycles are 2/125 ms
 #define UNIT_DIVISOR 125
 #define QUEUE_SLOTS 32  // a power of two
-#define FRAME_MAX 128
+#define FRAME_MAX 120
 #define RECEIVE 127       // bytes
 #define MIN_INTERVAL 1600  // cycles between ticks: 10 kHz; a servo hears of its count every 20 ms
 
