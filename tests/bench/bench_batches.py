@@ -26,7 +26,7 @@ RUNS, ALONE, FEW = 3, 60, 1_000
 def postures(arm: armkin.Arm, kind: str, count: int) -> np.ndarray | None:
     """Joint values (N, n) of a set; None if the arm has no such."""
     rng = np.random.default_rng(7)
-    q = rng.uniform(-np.pi, np.pi, (count, arm.n))
+    q: np.ndarray = rng.uniform(-np.pi, np.pi, (count, arm.n))
     if kind == "45 degrees":
         q = rng.integers(-4, 4, (count, arm.n)) * (np.pi / 4)
     if kind == "q5 = 0":

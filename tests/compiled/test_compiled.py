@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.compiled import arm as compiled_arm
 from armkin.compiled import toolchain
+from armkin.inverse import solve as solving
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
@@ -331,13 +331,13 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch
     T[:, 0, 0], T[:, 0, 1], T[:, 1, 0], T[:, 1, 1] = np.cos(yaw), np.sin(yaw), np.sin(yaw), -np.cos(yaw)
     T[:, :3, 3] = arm.reach * rng.uniform(-0.4, 0.4, (40, 3)) + [0, 0, 0.2 * arm.reach]
     own = armkin.ik(arm, T)
-    solve = compiled_arm.solve.ik
+    solve = solving.ik
 
     def counted(one: armkin.Arm, targets: np.ndarray, *words: object, **more: object) -> armkin.Solutions:
         asked.append(len(targets))
         return solve(one, targets, *words, **more)
 
-    monkeypatch.setattr(compiled_arm.solve, "ik", counted)
+    monkeypatch.setattr(solving, "ik", counted)
     found = armkin.compile(arm).ik(T)
     assert sum(asked) <= 1
     assert own.valid.sum() > 100

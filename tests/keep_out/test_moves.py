@@ -59,12 +59,12 @@ def test_a_jog_ends_so_early_that_it_stands_at_the_hit(table: str, monkeypatch: 
         return 0.5, SimpleNamespace(message="hit", fields={})
 
     monkeypatch.setattr(jogging, "free_way", half)
-    axes = ("X", "Y", "Z")
+    axes = (0, 1, 2)
     machine: Any = SimpleNamespace(
         arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=SimpleNamespace(axes=axes)
     )
     rates = jogging.rates(machine, 0, 30.0)  # deg/s
-    rate = float((np.linalg.pinv(arm.motor_gain) @ [rates[axis] for axis in axes])[0])
+    rate = float((np.linalg.pinv(arm.motor_gain) @ np.array([rates[axis] for axis in axes]))[0])
     seconds = jogging.free_seconds(machine, 0, rates) + jogging.HANDLE
     assert seconds * rate + rate**2 / (2 * float(arm.max_accel[0])) == pytest.approx(way[0])
 
