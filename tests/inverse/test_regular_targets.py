@@ -1,6 +1,8 @@
-"""Doubtful targets that are decided all at once come out as those examined posture by posture."""
+"""Targets on an edge that are decided all at once come out as each alone."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ import armkin
 from armkin import Status
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.singular import components, regular_targets
+from armkin.inverse.singular import components
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import moved
 from armkin.model.arm import Arm
@@ -35,42 +37,32 @@ def nearly_singular(name: str, least: float, most: float) -> tuple[Arm, armkin.S
     ("name", "least", "most"),
     [*((name, -7.0, -3.0) for name in NAMES), ("puma560", -9.5, -7.5), ("ur5e", -9.5, -7.5), ("irb120", -9.5, -7.5)],
 )
-def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float) -> None:
     """Off singular postures by what makes folds, and by so little that the arm all but moves by itself."""
     arm, at_once = nearly_singular(name, least, most)
-    decided = []
-
-    def nothing(goals: Goals, q: np.ndarray, valid: np.ndarray) -> regular_targets.Regular:
-        decided.append(len(q))
-        none = np.zeros(len(q), bool)
-        branch = np.zeros(q.shape[:2], bool)
-        return regular_targets.Regular(none, branch, none, np.zeros((len(q), q.shape[2]), bool), q, none, branch, none)
-
-    monkeypatch.setattr(regular_targets, "settle", nothing)
-    _, one_by_one = nearly_singular(name, least, most)
-    assert sum(decided) > 4
-    for k in range(len(at_once.status)):
-        a, b = at_once.q[k][at_once.valid[k]], one_by_one.q[k][one_by_one.valid[k]]
+    some = np.random.default_rng(5).choice(len(at_once.target), 24)
+    for k in some:
+        alone = armkin.ik(arm, at_once.target[k], near=at_once.near[k])
+        a, b = alone.q[alone.valid], at_once.q[k][at_once.valid[k]]
         assert len(a) == len(b)
-        assert at_once.status[k] == one_by_one.status[k]
-        if at_once.status[k] == Status.EXACT:
+        assert alone.status == at_once.status[k]
+        if alone.status == Status.EXACT:
             assert newton.wrapped_distance(arm, a[:, None], b[None]).min(axis=1).max(initial=0.0) < 1e-6
-    assert (at_once.complete == one_by_one.complete).all()
-    assert (at_once.free == one_by_one.free).all()
+        assert alone.complete == at_once.complete[k]
+        assert (alone.free == at_once.free[k]).all()
 
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560", "ur5e"])
 def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: no singular value, one call."""
+    """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: one call."""
     known = []
-    settle = regular_targets.settle
+    examine = components.examine
 
-    def counted(*args: object) -> regular_targets.Regular:
-        found = settle(*args)  # type: ignore[arg-type]
-        known.append(found.known)
-        return found
+    def counted(goals: Goals, *more: Any) -> components.Examined:
+        known.append(len(goals.target))
+        return examine(goals, *more)
 
-    monkeypatch.setattr(regular_targets, "settle", counted)
+    monkeypatch.setattr(components, "examine", counted)
     arm, _ = shipped(name)
     task, _ = solver(arm, None)
     screw = shipped(name)[1]
@@ -80,16 +72,14 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     q[:, 2] = straight + 10.0 ** rng.uniform(-4.5, -3.6, 100) * rng.choice([-1.0, 1.0], 100)
     answers = armkin.ik(arm, goal(task, screw, q).array())
     assert len(known) == 1
-    assert known[0].mean() > 0.9, known[0].mean()
-    assert len(known[0]) > 50
+    assert known[0] > 50
     assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
 
 
-def test_two_folds_in_one_posture_are_a_boundary_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_folds_in_one_posture_are_a_boundary() -> None:
     """A stretched elbow under a wrist over the shoulder: eight candidates in three postures, each a multiple root."""
     arm = shipped("ur5e")[0]
     T = armkin.fk(arm, np.radians([[180.0, 90.0, 0.0, 90.0, 135.0, -135.0], [-90.0, -90.0, 0.0, 90.0, -135.0, -90.0]]))
-    monkeypatch.setattr(components, "examine", None)  # not asked
     s = armkin.ik(arm, T)
     assert (s.status == Status.BOUNDARY).all()
     assert s.valid.sum(axis=1).tolist() == [3, 3]

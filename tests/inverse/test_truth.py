@@ -192,9 +192,9 @@ def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) ->
     asked: list[int] = []
     examine = components.examine
 
-    def counted(goals: Goals, q: np.ndarray, *rest: object) -> object:
-        asked.append(len(q))
-        return examine(goals, q, *rest)  # type: ignore[arg-type]
+    def counted(goals: Goals, *rest: object) -> object:
+        asked.append(len(goals.target))
+        return examine(goals, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(components, "examine", counted)
     arm = shipped("puma560")[0]

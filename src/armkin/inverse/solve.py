@@ -34,6 +34,7 @@ from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examined
 from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import free_postures, legal_postures, near_itself
+from armkin.inverse.singular.components import Seeds
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.fitting import task_for
@@ -201,11 +202,11 @@ def _rows(
     if examine and len(doubted):
         solve = geometry.rows
 
-        def candidates(some: NDArray[np.intp]) -> tuple[Array, Bool]:
+        def candidates(some: NDArray[np.intp]) -> Seeds:
             found = q[doubted[some]]
             if guesses is not None:
                 found = np.concatenate([found, guesses[doubted[some]]], axis=1)
-            return found, np.zeros(found.shape[:2], bool)
+            return Seeds.of(found, np.arange(found.shape[1]) % max(out.q.shape[1], 1))
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.

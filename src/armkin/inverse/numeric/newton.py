@@ -153,9 +153,13 @@ def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
 
 def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
-    _, J = scaled(arm, task, q, target)
+    return null_space_of(arm, task, scaled(arm, task, q, target)[1])
+
+
+def null_space_of(arm: Arm, task: Task, J: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """The same of Jacobians J (M, r, n)."""
     _, S, Vt = np.linalg.svd(J, full_matrices=True)
-    full = np.zeros((len(q), arm.n))
+    full = np.zeros((len(J), arm.n))
     full[:, : S.shape[1]] = S
     # a task with an axis has one more row than constraints
     count = min(task.constraints, arm.n)

@@ -18,7 +18,7 @@ from armkin.inverse.branches.turns import nearest_copy
 from armkin.inverse.closed.candidates import Recorded, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
-from armkin.inverse.run.edges import Doubts, as_doubts, decided
+from armkin.inverse.run.edges import decided
 from armkin.inverse.run.workers import shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
@@ -60,10 +60,9 @@ def solve(
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
 
-    def part(rows: slice) -> tuple[list[Doubts], list[NDArray[np.intp]]]:
-        """Some rows, by a thread of its own; returns the targets on an edge, as doubts or as rows."""
+    def part(rows: slice) -> list[NDArray[np.intp]]:
+        """Some rows, by a thread of its own; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
-        doubts: list[Doubts] = []
         left: list[NDArray[np.intp]] = []
         for start in range(rows.start, rows.stop, arrays.CHUNK):
             some = slice(start, min(start + arrays.CHUNK, rows.stop))
@@ -77,21 +76,17 @@ def solve(
                 first = goal[:, 0] if columns is None else columns[9]
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
-            edge = _keep(goals, runner.axes, out.part(some), found, close, there)
-            if geometry.doubts is not None:
-                left.append(start + edge)
-            elif examine and len(edge):
-                doubts.append(as_doubts(runner, found, start + edge, edge))
-        return doubts, left
+            left.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
+        return left
 
     parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
-    doubts = [doubt for one_part, _ in parts for doubt in one_part]
-    left = [rows for _, one_part in parts for rows in one_part]
+    edge = np.concatenate([np.empty(0, np.intp), *(rows for one_part in parts for rows in one_part)])
     out.complete[...] = geometry.complete
-    if doubts:
-        together = Doubts(*map(np.concatenate, zip(*doubts, strict=True)))
-        out = decided(Goals(arm, task, target, near), runner, out, together)
-    return Solved(out, math.prod(runner.axes), target, rounding, np.concatenate([np.empty(0, np.intp), *left]))
+    if geometry.doubts is None:
+        if examine and len(edge):
+            out = decided(Goals(arm, task, target, near), runner, out, edge)
+        edge = edge[:0]
+    return Solved(out, math.prod(runner.axes), target, rounding, edge)
 
 
 def _candidates(

@@ -1,4 +1,4 @@
-"""Targets with a nearly singular candidate: regular ones are accepted in bulk, the others analysed one by one."""
+"""Targets with a nearly singular candidate: what goes to `singular.components`, and where its answers are written."""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
-from armkin.inverse.answers.solutions import Status
 from armkin.inverse.closed.candidates import Recorded
-from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, SAME, SOLUTION
-from armkin.inverse.singular import components, linkages, regular_targets
+from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, SAME
+from armkin.inverse.singular import components, linkages
+from armkin.inverse.singular.components import Seeds
 
 AT_ONCE = 256  # targets examined together
 
 
 class Doubts(NamedTuple):
-    """Targets on an edge: rows (K,), candidates q (K, B, n), valid (K, B) accepted ones, free (K,) a joint is free."""
+    """Targets on an edge: rows (K,), candidates q (K, B, n), free (K,) whether a joint is free."""
 
     rows: NDArray[np.intp]
     q: Array
-    valid: Bool
     free: Bool
 
 
@@ -37,40 +35,18 @@ def as_doubts(runner: Recorded, found: list[Array], rows: NDArray[np.intp], some
         own = entry[..., some] if np.ndim(entry) and entry.shape[-1] > 1 else entry  # constants are numbers
         return np.broadcast_to(own, shape).reshape(-1, len(some)).T
 
-    *values, miss, _, free = found
+    *values, _, _, free = found
     q = np.stack([of_some(value) for value in values], axis=2)
-    return Doubts(rows, q, of_some(miss) <= ACCEPTED**2, np.asarray((of_some(free) > 0).any(axis=1)))
+    return Doubts(rows, q, np.asarray((of_some(free) > 0).any(axis=1)))
 
 
-def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch:
-    """Decide what doubted targets are: those that are regular all at once, the others posture by posture.
+def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) -> Batch:
+    """Decide what the targets `rows` are, which are on an edge.
 
     Where a joint is free, the candidates are not all.
     """
-    arm, task, target, near = goals
-    left = doubts.free.copy()
-    for start in range(0, len(left), AT_ONCE):
-        part = start + np.flatnonzero(~doubts.free[start : start + AT_ONCE])
-        if not len(part):
-            continue
-        rows = doubts.rows[part]
-        found = regular_targets.settle(goals.of(rows), doubts.q[part], doubts.valid[part])
-        found.known[...] &= found.branch.any(axis=1) | found.beyond
-        found.known[...] &= newton.missing(arm, task, near[rows], target[rows]) > SOLUTION
-        left[part] = ~found.known
-        moving = np.asarray(found.free.any(axis=1))
-        new = np.flatnonzero(found.known & (found.double | found.changed | moving))
-        if len(new):
-            order = np.argsort(~found.branch[new], axis=1, kind="stable")
-            kept = np.take_along_axis(found.q[new], order[:, :, None], axis=1)
-            there = np.take_along_axis(found.branch[new], order, axis=1)
-            write(arm, out, rows[new], kept, there, order, near[rows[new]])
-            out.status[rows[new]] = np.where(found.double[new], Status.BOUNDARY, Status.EXACT)
-            out.status[rows[new[moving[new]]]], out.free[rows[new]] = Status.SINGULAR, found.free[new]
-    if not left.any():
-        return out
-
-    rows = doubts.rows[left]  # what is singular hangs on the last digit
+    _, _, target, near = goals
+    # what is singular hangs on the last digit
     some = as_doubts(runner, runner.in_numbers(target[rows]), rows, np.arange(len(rows)))
     freed = _freed(goals, runner, some)
     out, done = _on_linkages(goals, runner, out, some, freed)
@@ -84,15 +60,18 @@ def decided(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts) -> Batch
     rows, tight = rows[open_], some.q[open_]
     first, other, loose, at_ends = freed.first[open_], freed.other[open_], freed.loose[open_], freed.ends[open_]
 
-    def candidates(of: NDArray[np.intp]) -> tuple[Array, Bool]:
+    def candidates(of: NDArray[np.intp]) -> Seeds:
         """With the preferred values for joints that are free, and those that other values would change."""
+        label = np.arange(first.shape[1])
         if not loose[of].any():
-            return first[of], loose[of]
-        more = [other[of]]
+            return Seeds.of(first[of], label, loose[of])
+        more = [first[of], other[of]]
         if runner.geometry.ends:
             more.append(tight[of])  # it may be that the joint is not quite free
-        fixed = np.zeros((len(of), sum(part.shape[1] for part in more)), bool)
-        return np.concatenate([first[of], *more], axis=1), np.concatenate([loose[of], fixed], axis=1)
+        fixed = np.zeros((len(of), (len(more) - 1) * len(label)), bool)
+        return Seeds.of(
+            np.concatenate(more, axis=1), np.tile(label, len(more)), np.concatenate([loose[of], fixed], axis=1)
+        )
 
     unsettled = None
     if runner.geometry.ends:
@@ -125,24 +104,33 @@ def _on_linkages(goals: Goals, runner: Recorded, out: Batch, doubts: Doubts, fre
         for _ in range(2):
             if not len(part):
                 break
-            rows, some = doubts.rows[part], goals.of(doubts.rows[part])
+            some = goals.of(doubts.rows[part])
             found = linkages.settle(some, q, freed.loose[part])
             known = np.flatnonzero(found.known)
-            order = np.argsort(np.where(found.branch[known], found.label, found.q.shape[1]), axis=1, kind="stable")
-            order = order[:, : int(found.branch.sum(axis=1).max(initial=1))]
-            there = np.take_along_axis(found.branch[known], order, axis=1)
-            kept = np.take_along_axis(found.q[known], order[:, :, None], axis=1)
-            width = order.shape[1]
-            if width > out.q.shape[1]:
-                out = wider(out, width)
-            write(goals.arm, out, rows[known], kept, there, named(found.label[order], there), some.near[known])
-            out.status[rows[known]], out.free[rows[known]] = Status.SINGULAR, found.free[known]
-            done[part[known]] = True
+            if len(known):
+                seeds = _seeds(found, known, freed.first[part[known]], freed.loose[part[known]])
+                out = examined(goals, out, doubts.rows[part[known]], seeds.part, runner.others)
+                done[part[known]] = True
             lacking = np.flatnonzero(found.lacking)
             part, q = part[lacking], q[lacking]
             if len(part):
                 q = np.concatenate([q, runner.samples(some.target[lacking], some.near[lacking])], axis=1)
     return out, done
+
+
+def _seeds(found: linkages.Linkages, known: NDArray[np.intp], first: Array, loose: Bool) -> Seeds:
+    """Postures of known self-motions, and the candidates first (K, B, n) that are not loose (K, B)."""
+    order = np.argsort(~found.listed[known], axis=1, kind="stable")
+    order = order[:, : int(found.listed[known].sum(axis=1).max(initial=0))]
+    there = np.take_along_axis(found.listed[known], order, axis=1)[:, :, None]
+    on = np.where(there, np.take_along_axis(found.q[known], order[:, :, None], axis=1), np.nan)
+    joints = np.take_along_axis(found.joints[known], order[:, :, None], axis=1)
+    q = np.concatenate([np.where(loose[:, :, None], np.nan, first), on], axis=1)
+    label = np.concatenate([np.broadcast_to(np.arange(first.shape[1]), first.shape[:2]), found.label[order]], axis=1)
+    sure = np.concatenate([np.zeros(first.shape, bool), joints], axis=1)
+    order = np.argsort(label, axis=1, kind="stable")
+    q, sure = (np.take_along_axis(x, order[:, :, None], axis=1) for x in (q, sure))
+    return Seeds(q, np.zeros(order.shape, bool), np.take_along_axis(label, order, axis=1), sure)
 
 
 def _freed(goals: Goals, runner: Recorded, doubts: Doubts) -> _Freed:
@@ -186,28 +174,25 @@ def examined(
     goals: Goals,
     out: Batch,
     doubted: NDArray[np.intp],
-    candidates: Callable[[NDArray[np.intp]], tuple[Array, Bool]],
+    candidates: Callable[[NDArray[np.intp]], Seeds],
     others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64]]],
     unsettled: Bool | None = None,
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
 
-    candidates: joint values (K, M, n) for some of the doubted ones, and which depend on `near` (K, M); others: more
-    of them, for targets and preferred values, and whether branches seem lost or an elimination did not settle them;
-    unsettled: (N,), see `components.examine`.
+    candidates: of some of the doubted ones; others: more of them, for targets and preferred values, and whether
+    branches seem lost or an elimination did not settle them; unsettled: (N,), see `components.examine`.
     """
     for start in range(0, len(doubted), AT_ONCE):
         rows = doubted[start : start + AT_ONCE]
-        some, columns = goals.of(rows), out.q.shape[1]
-        q, loose = candidates(np.arange(start, start + len(rows)))
-
+        some = goals.of(rows)
+        seeds = candidates(np.arange(start, start + len(rows)))
         incomplete = np.zeros(len(rows), bool) if unsettled is None else unsettled[rows] & ~out.complete[rows]
 
         def more(which: NDArray[np.int64], lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
             return others(some.target[which], some.near[which], lost | incomplete[which])
 
-        label = np.arange(q.shape[1]) % max(columns, 1)
-        seen = components.examine(some, q, label, loose, more, None if unsettled is None else unsettled[rows])
+        seen = components.examine(some, seeds, more, None if unsettled is None else unsettled[rows])
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)

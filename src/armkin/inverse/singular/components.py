@@ -1,15 +1,15 @@
 """Targets on an edge: merging roots, singular postures, self-motions, boundaries.
 
-The solvers say which targets are in doubt; these few are examined here, posture by posture, with the
-Jacobian: the general mechanism behind the words exact, boundary, singular and unreachable. Candidate
-postures of a target are moved onto it, and grouped: what lies on one self-motion is reported by one of
-its postures, two postures between which a third solves the target as well are one branch.
+The solvers say which targets are in doubt. One pass over them, with the Jacobian, is the mechanism behind the words
+exact, boundary, singular and unreachable. Candidate postures are moved onto their targets, and grouped: those on one
+component of the solution set are one branch. Regular postures with none close by need no more than an inverse; of weak
+ones `local_structure` tells the component.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,32 +18,28 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
+    CLOSED,
     DOUBLE,
-    DOUBLE_ROOT,
     EQUAL_RESIDUALS,
     FOLDED,
+    HIGH,
     HOPELESS,
     MOVING,
     RESTING,
-    ROOT_ROUNDING,
     SAME,
     SEED,
     SOLUTION,
-    TINY,
     TURNED,
 )
 from armkin.inverse.singular import circuits, meetings, roots, self_motions
 from armkin.inverse.singular.local_structure import local_structure, members
-from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
+FEW = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 OWN = -1  # label of a posture that comes from `near`
 
@@ -69,7 +65,10 @@ class Examined(NamedTuple):
 
 
 class _Settled(NamedTuple):
-    """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each."""
+    """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each.
+
+    moved: (K, n) joints that move along self-motions other than those that were known.
+    """
 
     q: Array
     valid: Bool
@@ -78,23 +77,47 @@ class _Settled(NamedTuple):
     free: Bool
     open: Bool
     surface: Bool
+    moved: Bool
 
 
-def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettled: Bool | None = None) -> Examined:
+class Seeds(NamedTuple):
+    """Candidate branches of K targets.
+
+    q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
+    label: (B,) or (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
+    lie on a self-motion, one posture of each.
+    """
+
+    q: Array
+    loose: Bool
+    label: Int
+    sure: Bool
+
+    @classmethod
+    def of(cls, q: Array, label: Int, loose: Bool | None = None) -> Seeds:
+        """Candidates of which no self-motion is known; by default none is loose."""
+        return cls(q, np.zeros(q.shape[:2], bool) if loose is None else loose, label, np.zeros(q.shape, bool))
+
+    def part(self, rows: Int) -> Seeds:
+        """Those of some targets, of labels (K, B)."""
+        return Seeds(self.q[rows], self.loose[rows], self.label[rows], self.sure[rows])
+
+
+def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
     """Correct, group and classify candidate branches of doubted targets.
 
-    goals: K targets; `near` is a branch itself where it solves its target. q: (K, B, n), nan where there is none;
-    label: (B,); loose: (K, B) candidates that depend on a value preferred for a free joint; more: others, for
+    goals: K targets; `near` is a branch itself where it solves its target. more: other candidates, for
     targets that seem to have no branch, for those of which the preferred value leaves the other joints no solution,
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
     that loses singular ones: more are asked for these and for what is singular.
     """
-    found = _settle(goals, q, np.broadcast_to(label, q.shape[:2]), loose, SEED)
+    q = seeds.q
+    found = _settle(goals, seeds, SEED)
     again = found.open | found.surface | ~found.valid.any(axis=1)
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
-        first, last = found.free.argmax(axis=1), goals.arm.n - 1 - found.free[:, ::-1].argmax(axis=1)
-        wider = again | found.free.any(axis=1) & (last - first > 2)
+        first, last = found.moved.argmax(axis=1), goals.arm.n - 1 - found.moved[:, ::-1].argmax(axis=1)
+        wider = again | found.moved.any(axis=1) & (last - first > 2)
     else:
         wider = again | unsettled | (found.status != Status.EXACT)
     if not wider.any():
@@ -110,9 +133,8 @@ def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettl
     if not len(rows):
         return Examined(*found[:5], again)
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
-    seeds = np.concatenate([found.q[rows], others], axis=1)
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
-    second = _settle(goals.of(rows), seeds, whose, np.zeros(seeds.shape[:2], bool), HOPELESS)
+    second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), HOPELESS)
     K, n = found.free.shape
     width = max(found.q.shape[1], second.q.shape[1])
     out = Examined(
@@ -127,174 +149,251 @@ def examine(goals: Goals, q: Array, label: Int, loose: Bool, more: More, unsettl
     return out
 
 
-def _settle(goals: Goals, q: Array, label: Int, loose: Bool, seed: float) -> _Settled:
-    """Candidates (K, M, n) with their labels (K, M), moved onto their targets and grouped; seed: see `tolerances`."""
-    arm, task, target, near = goals
-    K, _, n = q.shape
-    q, label, size = _onto(goals, q, label, seed)
-    missed = loose & (size[:, 1:] > SOLUTION)
-    q, label, size = meetings.ways_out(goals, q, label, size, OWN)
-    valid = size <= SOLUTION
-    M = q.shape[1]
-    sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
-    k, b = np.nonzero(valid)
-    if len(k):
-        sigma[k, b], V[k, b], nullity[k, b] = newton.null_space(arm, task, q[k, b], target[k])
-    # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
-    resting = (nullity == 1)[:, :, None] & (np.abs(V[:, :, -1]) < RESTING)
-    # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
-    rank = np.maximum(size, EQUAL_RESIDUALS)
-    rank[:, 0] = 0.0
-    group = np.where(valid, -1, M)  # which candidate stands for each one
-    free, singular, double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
-    moves, which, asked = np.zeros((K, M), bool), np.zeros((K, M, n), bool), ~(valid & (sigma < FOLDED))
+def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
+    """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
+    at, missed = _onto(goals, seeds, most)
+    lost = _lost(goals, at)
+    if (lost.nullity[:, 1:] > 1).any():
+        more = meetings.ways_out(goals, at.q, at.label, at.size, lost.V, lost.nullity, OWN)
+        wider = more[0].shape[1] - at.q.shape[1]
+        at = _Candidates(*more, np.pad(at.sure, ((0, 0), (0, wider), (0, 0))))
+        lost = _lost(goals, at)
+    groups = _Groups(goals, at, lost)
+    groups.find()
+    return groups.settled(missed)
 
-    known, edge = np.zeros((K, M), bool), np.zeros((K, M), bool)
-    place, component = np.zeros((K, M), np.int64), np.zeros((0, M), bool)
 
-    def ask(k: Int, b: Int) -> None:
-        """What components these candidates lie on, if that is not known."""
-        nonlocal component
-        some = np.flatnonzero(~asked[k, b])
-        if not len(some):
+class _Candidates(NamedTuple):
+    """Candidates q (K, M, n), `near` the first, with labels and residuals (K, M).
+
+    sure: (K, M, n) joints that move along those that are known to lie on a self-motion, one posture of each.
+    """
+
+    q: Array
+    label: Int
+    size: Array
+    sure: Bool
+
+
+class _Lost(NamedTuple):
+    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
+    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
+
+    sigma: Array
+    nullity: Int
+    V: Array
+
+
+def _lost(goals: Goals, at: _Candidates) -> _Lost:
+    """What the candidates that solve their targets lose."""
+    arm, task, target, _ = goals
+    K, M, n = at.q.shape
+    out = _Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
+    on = at.sure.any(axis=2)
+    out.sigma[on] = 0.0
+    k, b = np.nonzero((at.size <= SOLUTION) & ~on)
+    if not len(k):
+        return out
+    _, J = newton.scaled(arm, task, at.q[k, b], target[k])
+    if J.shape[1] == n == task.constraints:
+        # the Frobenius norm of the inverse is no smaller than its largest singular value
+        inverse = nudged(np.linalg.inv, J)
+        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+        weak = bound < FOLDED
+        k, b, J = k[weak], b[weak], J[weak]
+    out.sigma[k, b], out.V[k, b], out.nullity[k, b] = newton.null_space_of(arm, task, J)
+    return out
+
+
+class _Groups:
+    """Which candidates are one, and what: a candidate of each target at a time leads those that are one with it."""
+
+    def __init__(self, goals: Goals, at: _Candidates, lost: _Lost) -> None:
+        self.goals, self.at, self.lost = goals, at, lost
+        K, M, n = at.q.shape
+        self.valid: Bool = np.asarray(at.size <= SOLUTION)
+        on: Bool = np.asarray(at.sure.any(axis=2))
+        # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
+        self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < RESTING)
+        # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
+        self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
+        self.rank[:, 0] = 0.0
+        self.open: Bool = self.valid.copy()  # those of no group yet
+        self.asked: Bool = ~(self.valid & (lost.sigma < FOLDED) & ~on)
+        self.known: Bool = on.copy()
+        self.moves: Bool = on.copy()
+        self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
+        self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
+        self.chosen, self.curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
+        self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
+
+    def find(self) -> None:
+        """Group all candidates."""
+        self._alone()
+        if (~self.asked).sum() <= AT_ONCE:
+            self._ask(*np.nonzero(~self.asked))
+        while self.open.any():
+            k = np.flatnonzero(self.open.any(axis=1))
+            self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
+        arm, task, target, _ = self.goals
+        q, sigma = self.at.q, self.lost.sigma
+        rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | self._weak_beside())
+        if len(rows):
+            q, chosen, curve, target = q[rows], self.chosen[rows], self.curve[rows], target[rows]
+            self_motions.drop_contained(arm, task, q, sigma[rows], self.resting[rows], chosen, curve, target)
+            self_motions.drop_twins(arm, task, q, chosen, curve, target)
+            self.chosen[rows] = chosen
+
+    def _weak_beside(self) -> Bool:
+        """Targets (K,) with a root of high order beside a self-motion."""
+        weak = self.chosen & (self.lost.sigma < HIGH) & ~self.curve.any(axis=2)
+        return np.asarray(weak.any(axis=1) & self.curve.any(axis=(1, 2)))
+
+    def _alone(self) -> None:
+        """Regular candidates with none close by are branches; so are self-motions where nothing else is weak."""
+        if self.valid.shape[1] > FEW:
             return
+        weak = self.valid & (self.lost.sigma < FOLDED) & ~self.moves
+        with np.errstate(invalid="ignore"):
+            away = newton.wrapped_distance(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])
+        close = (away < CLOSE_BY) & (self.valid & ~self.moves)[:, None] & ~np.eye(self.valid.shape[1], dtype=bool)
+        alone = self.valid & ~weak & np.where(self.moves, ~weak.any(axis=1, keepdims=True), ~close.any(axis=2))
+        self.open &= ~alone
+        self.chosen |= alone
+        self.curve |= alone[:, :, None] & self.which
+        self.singular |= (alone & self.moves).any(axis=1)
+        self.free |= (alone[:, :, None] & self.which).any(axis=1)
+
+    def _ask(self, k: Int, b: Int) -> None:
+        """What components these candidates lie on, if that is not known."""
+        arm, task, target, _ = self.goals
+        q, nullity = self.at.q, self.lost.nullity
+        some = ~self.asked[k, b]
         k, b = k[some], b[some]
-        asked[k, b] = True
-        one = np.flatnonzero(nullity[k, b] < 2)
-        if len(one):
+        self.asked[k, b] = True
+        one = nullity[k, b] < 2
+        if one.any():
             i, c = k[one], b[one]
             at = local_structure(arm, task, q[i, c], target[i])
-            known[i, c], moves[i, c], which[i, c], edge[i, c] = at.known, at.manifold, at.joints, at.boundary
-            place[i, c] = len(component) + np.arange(len(i))
+            self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, at.joints
+            self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
             ways = newton.difference(arm, q[i], q[i, c][:, None])
-            component = np.concatenate([component, members(at, np.arange(len(i)), ways)])
-        rest = np.flatnonzero(~known[k, b] & (sigma[k, b] < MOVING))
-        if len(rest):
+            self.component = np.concatenate([self.component, members(at, np.arange(len(i)), ways)])
+        rest = ~self.known[k, b] & (self.lost.sigma[k, b] < MOVING)
+        if rest.any():
             k, b = k[rest], b[rest]
             lost = np.maximum(nullity[k, b], 1)
-            moves[k, b], which[k, b] = self_motions.self_motion(arm, task, q[k, b], V[k, b], lost, target[k])
+            found = self_motions.self_motion(arm, task, q[k, b], self.lost.V[k, b], lost, target[k])
+            self.moves[k, b], self.which[k, b] = found
 
-    if (~asked).sum() <= AT_ONCE:
-        ask(*np.nonzero(~asked))
-    chosen, curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
-    while (group < 0).any():
-        k = np.flatnonzero((group < 0).any(axis=1))
-        b = np.where(group[k] < 0, rank[k], np.inf).argmin(axis=1)
-        ask(k, b)
-        moving, joints = moves[k, b], which[k, b]
-        away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (k, M, n)
-        rest = group[k] < 0
-        # of a self-motion: whatever differs in its free joints alone; but where the residual grows along it at all,
-        # its points are not equal, and the exact ones are listed
-        held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        # (two postures of it, each off by as much as a double root)
-        mine = rest & moving[:, None] & (held < 3 * TURNED) & (sigma[k] < SOLUTION)
-        sure = known[k, b]
-        one, some = component[place[k, b]] if len(component) else np.zeros((len(k), M), bool), np.flatnonzero(~sure)
+    def _lead(self, k: Int, b: Int) -> None:
+        """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
+        self._ask(k, b)
+        arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
+        q, label, size = self.at.q, self.at.label, self.at.size
+        moving, joints, sure = self.moves[k, b], self.which[k, b], self.known[k, b]
+        away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
+        one: Bool = np.asarray(self.component[self.place[k, b]])
+        some = np.flatnonzero(~sure)
         if len(some):
-            one[some] = _joined(arm, task, q, k[some], b[some], away[some].max(axis=2), sigma, size, target)
-        one &= rest
-        mine |= one & (sure & moving)[:, None]
-        far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
-        if (some := np.flatnonzero(far.any(axis=1))).size:
-            at, goal = q[k[some], b[some]], target[k[some]]
-            mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
-            i, c = np.nonzero(far & mine & (resting[k] & joints[:, None]).any(axis=2))  # where another curve crosses
-            ask(k[i], c)
-            rests = resting[k[i], c] & ~which[k[i], c]
-            mine[i, c] &= ~(moves[k[i], c] & (joints[i] & rests).any(axis=1))
-        mine[np.arange(len(k)), b] = True
-        on = mine  # but not what is one with it along a curve beside the self-motion
-        mine = on | one
-        group[k] = np.where(mine, b[:, None], group[k])
+            far = away[some].max(axis=2)
+            one[some] = roots.alike(arm, self.goals.task, q, k[some], b[some], far, sigma, size, self.goals.target)
+        one &= self.open[k]
+        on = self._on_motion(k, b, away, one | ~self.open[k]) | (one & (sure & moving)[:, None])
+        on[np.arange(len(k)), b] = True
+        mine = on | one  # but what is one with it along a curve beside the self-motion is not on that
+        self.open[k] &= ~mine
         other = (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
-        double[k] |= np.where(sure, edge[k, b], other)
-        singular[k] |= moving
-        free[k] |= joints & moving[:, None]
+        self.double[k] |= np.where(sure, self.edge[k, b], other)
+        self.singular[k] |= moving
+        self.free[k] |= joints & moving[:, None]
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
         pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, size[k], np.inf)).argmin(axis=1)
         own = np.flatnonzero(label[k, b] == OWN)
         pick[own] = b[own]
-        chosen[k, pick] = True
-        curve[k, pick] = joints & moving[:, None]
+        self.chosen[k, pick] = True
+        self.curve[k, pick] = joints & moving[:, None]
         if len(own):  # named like the candidate of its group that is closest to it
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
-    self_motions.drop_contained(arm, task, q, sigma, resting, chosen, curve, target)
-    self_motions.drop_twins(arm, task, q, chosen, curve, target)
-    order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
-    there = np.take_along_axis(chosen, order, axis=1)
-    out = np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan)
-    status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
-    status[double] = Status.BOUNDARY
-    status[singular] = Status.SINGULAR
-    surface, (k, b) = np.zeros(K, bool), np.nonzero(chosen & (nullity == 2) & curve.any(axis=2))
-    if len(k):
-        surface[k[self_motions.on_surface(arm, task, q[k, b], V[k, b], target[k])]] = True
-    return _Settled(
-        out,
-        there,
-        np.where(there, np.take_along_axis(label, order, axis=1), OWN),
-        status,
-        free,
-        np.asarray(missed.any(axis=1)),
-        surface,
-    )
+
+    def _on_motion(self, k: Int, b: Int, away: Array, one: Bool) -> Bool:
+        """Which candidates (m, M) lie on the self-motions of those that lead, besides those `one` with them (m, M).
+
+        Whatever differs in its free joints alone; but where the residual grows along it at all, its points are not
+        equal, and the exact ones are listed.
+        """
+        arm, task, target, _ = self.goals
+        q, joints = self.at.q, self.which[k, b]
+        held = np.where(joints[:, None], 0.0, away).max(axis=2)
+        # (two postures of it, each off by as much as a double root)
+        mine: Bool = self.moves[k, b][:, None] & (held < 3 * TURNED) & (self.lost.sigma[k] < SOLUTION) & self.open[k]
+        far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
+        some = np.flatnonzero(far.any(axis=1))
+        if len(some):
+            at, goal = q[k[some], b[some]], target[k[some]]
+            mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
+            i, c = np.nonzero(far & mine & (self.resting[k] & joints[:, None]).any(axis=2))  # another curve crosses
+            self._ask(k[i], c)
+            rests = self.resting[k[i], c] & ~self.which[k[i], c]
+            mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
+        return np.asarray(mine)
+
+    def settled(self, missed: Bool) -> _Settled:
+        """What was found; missed: (K,) a candidate that depends on a preferred value came to nothing."""
+        arm, task, target, _ = self.goals
+        K, chosen, q = len(self.chosen), self.chosen, self.at.q
+        order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
+        there = np.take_along_axis(chosen, order, axis=1)
+        status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
+        status[self.double] = Status.BOUNDARY
+        status[self.singular] = Status.SINGULAR
+        surface, (k, b) = np.zeros(K, bool), np.nonzero(chosen & (self.lost.nullity == 2) & self.curve.any(axis=2))
+        if len(k):
+            surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
+        return _Settled(
+            np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan),
+            there,
+            np.where(there, np.take_along_axis(self.at.label, order, axis=1), OWN),
+            status,
+            self.free,
+            missed,
+            surface,
+            np.asarray((self.curve & ~self.at.sure).any(axis=1)),
+        )
 
 
-def _onto(goals: Goals, q: Array, label: Int, seed: float) -> tuple[Array, Int, Array]:
-    """`near` and candidates (K, M, n) moved onto their targets: postures, labels and residuals, (K, M + 1)."""
+def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool]:
+    """`near` and candidates moved onto their targets, those that are there in front.
+
+    Also of which targets (K,) a loose one came to nothing.
+    """
     arm, task, target, near = goals
-    K, _, n = q.shape
-    both, whose = np.concatenate([near[:, None], q], axis=1), np.insert(label, 0, OWN, axis=1)
-    flat, goal = both.reshape(-1, n).copy(), np.repeat(target, both.shape[1], axis=0)
-    known = np.flatnonzero(~np.isnan(flat).any(axis=1))
-    size = np.full(len(flat), np.inf)
-    size[known] = newton.missing(arm, task, flat[known], goal[known])
-    mean = np.concatenate([near[:, None], roots.means(arm, q)], axis=1).reshape(-1, n)
-    better = newton.missing(arm, task, mean[known], goal[known]) < size[known]
-    flat[known[better]] = mean[known[better]]
-    own = np.zeros(both.shape[:2], bool)
+    K, _, n = seeds.q.shape
+    there = ~np.isnan(seeds.q).any(axis=2)
+    order = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
+    q = np.concatenate([near[:, None], np.take_along_axis(seeds.q, order[:, :, None], axis=1)], axis=1)
+    label = np.take_along_axis(np.broadcast_to(seeds.label, there.shape), order, axis=1)
+    label = np.insert(label, 0, OWN, axis=1)
+    sure = np.pad(np.take_along_axis(seeds.sure, order[:, :, None], axis=1), ((0, 0), (1, 0), (0, 0)))
+    loose = np.take_along_axis(seeds.loose, order, axis=1)
+    flat, goal = q.reshape(-1, n).copy(), np.repeat(target, q.shape[1], axis=0)
+    size = newton.missing(arm, task, flat, goal)
+    own = np.zeros(q.shape[:2], bool)
     own[:, 0] = True
-    # `near` is taken as it is, or not at all
-    some = np.flatnonzero((size < seed) & ~own.ravel())
-    if len(some):
+    free = np.flatnonzero(~(own.ravel() | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
+    if len(free):
+        mean = np.concatenate([near[:, None], roots.means(arm, q[:, 1:])], axis=1).reshape(-1, n)[free]
+        better = newton.missing(arm, task, mean, goal[free]) < size[free]
+        flat[free[better]] = mean[better]
+        some = free[size[free] < most]
         steps = 40  # towards a root of third order each step goes a third of the way
         flat[some], size[some] = newton.correct(arm, task, flat[some], goal[some], steps=steps, patience=PATIENCE)
-    flat[own.ravel() & (size > SOLUTION)] = np.nan
-    return flat.reshape(K, -1, n), whose, np.where(np.isnan(size), np.inf, size).reshape(K, -1)
-
-
-def _joined(
-    arm: Arm, task: Task, q: Array, k: Int, b: Int, away: Array, sigma: Array, size: Array, target: Array
-) -> Bool:
-    """Which candidates are one with the b-th of their target: (k, M).
-
-    Those that rounding explains, and those between which and it the posture in the middle solves the target.
-    """
-    with np.errstate(invalid="ignore"):
-        same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-        row, column = np.nonzero(~same & (away < CLOSE_BY))
-    if len(row):
-        start = q[k[row], b[row]]
-        way = newton.difference(arm, q[k[row], column], start)
-        # a pair's longer Newton step; of rounding alone the quotient says nothing
-        one, other = (k[row], b[row]), (k[row], column)
-        longer = size[other] * sigma[one] > size[one] * sigma[other]
-        miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
-        further = roots.joined(arm, task, start, way, miss, weakest, target[k[row]])
-        same[row, column] = further
-        for i in np.unique(row[further]):  # and those that rounding alone parts from these
-            there, some = q[k[i]], np.flatnonzero(same[i])
-            with np.errstate(invalid="ignore"):
-                apart = newton.wrapped_distance(arm, there[:, None], there[some])
-                close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
-            same[i] |= close.any(axis=1)
-    return np.asarray(same)
-
-
-def _radius(sigma: Array) -> Array:
-    """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return SAME + np.minimum(ROOT_ROUNDING / np.maximum(sigma, TINY), DOUBLE_ROOT)
+    q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
+    # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
+    stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
+    q[stands | (size[:, 0] > SOLUTION), 0], size[stands, 0] = np.nan, np.inf
+    missed = (loose & (size[:, 1:] > SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
+    return _Candidates(q, label, size, sure), np.asarray(missed)

@@ -53,7 +53,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = components.examine(beside, q[None], label, np.zeros((1, len(q)), bool), no_more)
+        found = components.examine(beside, components.Seeds.of(q[None], label), no_more)
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue

@@ -2,8 +2,8 @@
 
 Two joints about one line (a straight wrist, a wrist over the shoulder) move at the same pace, so the tool's pose is a
 trigonometric polynomial of second degree in the way: it keeps its target everywhere if it does at five places. Four
-bars move as `closed.four_bars` says. What else these targets have is decided by `regular_targets`; what is closer, or
-loses more than one direction, is left to `singular.components`.
+bars move as `closed.four_bars` says. One posture of each goes to `singular.components`, with what else these targets
+have; what is closer, or loses more than one direction, goes there as it is.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSE_BY, CLOSED, FOLDED, SAME, SOLUTION, THERE, TURNED
-from armkin.inverse.singular import regular_targets
+from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSED, FOLDED, SAME, SOLUTION, TURNED
 
 if TYPE_CHECKING:
     from armkin.inverse.answers.batch import Goals
@@ -31,16 +30,16 @@ Int = NDArray[np.int64]
 class Linkages(NamedTuple):
     """What is known of K targets.
 
-    known: (K,) whether all is; lacking: (K,) more candidates may tell. q: (K, M, n) postures, of which branch (K, M)
-    are listed, named label (M,). free: (K, n) joints that a self-motion moves.
+    known: (K,) whether all self-motions of loose candidates are; lacking: (K,) more candidates may tell. q: (K, M, n)
+    postures, of which listed (K, M) stand for a self-motion each, named label (M,), that moves joints (K, M, n).
     """
 
     known: Bool
     lacking: Bool
     q: Array
-    branch: Bool
+    listed: Bool
     label: Int
-    free: Bool
+    joints: Bool
 
 
 class _Motions(NamedTuple):
@@ -59,8 +58,7 @@ class _Motions(NamedTuple):
 def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     """Candidates q (K, S, B, n) for S values of the joints that are free; loose: (K, B) those that these change.
 
-    The first value is that of `near`, the second 1 rad more. Others than the loose ones are only asked for at the
-    first.
+    The first value is that of `near`, the second 1 rad more.
     """
     arm, task, target, near = goals
     K, S, B, n = q.shape
@@ -68,21 +66,19 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
         known=np.zeros(K, bool),
         lacking=np.zeros(K, bool),
         q=q.reshape(K, S * B, n).copy(),
-        branch=np.zeros((K, S * B), bool),
+        listed=np.zeros((K, S * B), bool),
         label=np.tile(np.arange(B), S),
-        free=np.zeros((K, n), bool),
+        joints=np.zeros((K, S * B, n), bool),
     )
-    if not (regular_targets.square(arm, task) and task.orientation == "full"):
+    if not (task.constraints == n and task.orientation == "full"):
         return found
-    asked = ~np.isnan(q[..., 0])
-    asked[:, 1:] &= loose[:, None]
+    asked = ~np.isnan(q[..., 0]) & loose[:, None]
     size = np.full(asked.shape, np.inf)
     size[asked] = newton.missing(arm, task, q[asked], np.repeat(target, asked.sum(axis=(1, 2)), axis=0))
-    there, own = (size < CLOSED) & loose[:, None], newton.missing(arm, task, near, target)
+    there, own = size < CLOSED, newton.missing(arm, task, near, target)
     known, motions = _motions(goals, q, there, loose)
     found.lacking[...] = (loose & (there.sum(axis=1) < 2)).any(axis=1)
     known &= ~found.lacking & ~((own > CLOSED) & (own <= SOLUTION))
-    stands: Bool = known & (own <= CLOSED)
     one, apart = _columns(arm, motions, loose)
     known &= apart
     circuit = np.zeros((K, S, B), bool)
@@ -97,14 +93,10 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     with np.errstate(invalid="ignore"):
         motion = np.abs(newton.difference(arm, found.q, near[:, None])).sum(axis=2)
     listed = _nearest(key, motion) & (key < 2 * B)
-    known &= _replaced(goals, found.q, listed, key, motions, one, loose, stands)
+    known &= _replaced(goals, found.q, listed, key, motions, one, loose, known & (own <= CLOSED))
     known &= _one_direction(goals, found.q, listed & known[:, None], key)
-    found.free[...] = ((motions.d != 0.0) & loose[:, :, None]).any(axis=1)
-    found.branch[...] = listed
-    rows = np.flatnonzero(known)
-    if len(rows) and not loose[rows].all():
-        _beside(goals, q[:, 0], size[:, 0], loose, motions, rows, stands, known, found)
-    found.known[...] = known & (found.branch.any(axis=1))
+    found.known[...], found.listed[...] = known, listed & known[:, None]
+    found.joints[...] = found.listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
     return found
 
 
@@ -212,30 +204,4 @@ def _replaced(
         mine[two] += four_bars.sides(arm, near[k[two]], at.d[k[two], b[two]] != 0.0, at.joint[k[two], b[two]])
     row, m = np.nonzero(listed[k] & (key[k] == mine[:, None]))
     q[k[row], m] = near[k[row]]
-    stands[k[row]] = False
     return known
-
-
-def _beside(
-    goals: Goals, q: Array, size: Array, loose: Bool, at: _Motions, rows: Int, stands: Bool, known: Bool, out: Linkages
-) -> None:
-    """Decide what else targets rows have, q (K, B, n): change known and out.
-
-    stands: (K,) `near` solves its target, but not on a self-motion.
-    """
-    arm, _, _, near = goals
-    B = q.shape[1]
-    rest = np.where(loose[rows][..., None], np.nan, q[rows])
-    found = regular_targets.settle(goals.of(rows), rest, (size[rows] < CLOSED) & ~loose[rows])
-    held = _held(arm, found.q[:, :, None], at.base[rows][:, None], at.d[rows][:, None], at.line[rows][:, None])
-    pair = found.branch[:, :, None] & loose[rows][:, None]
-    least = np.where(found.firm, APART_ROOTS, CLOSE_BY)[:, :, None]
-    good = found.known & ~(pair & ~(held > least)).any(axis=(1, 2))
-    with np.errstate(invalid="ignore"):
-        own = (newton.wrapped_distance(arm, found.q, near[rows][:, None]) < THERE) & found.branch
-    good &= ~stands[rows] | own.any(axis=1)
-    there = np.where((own & stands[rows][:, None])[..., None], near[rows][:, None], found.q)
-    known[rows] = good
-    out.q[rows, :B] = np.where(loose[rows][..., None], out.q[rows, :B], there)
-    out.branch[rows, :B] |= found.branch
-    out.free[rows] |= found.free

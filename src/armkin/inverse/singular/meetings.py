@@ -28,25 +28,24 @@ BOW = 0.1  # of its length: a curve is no farther off its chord
 Int = NDArray[np.int64]
 
 
-def ways_out(goals: Goals, q: Array, label: Int, size: Array, none: int) -> tuple[Array, Int, Array]:
+def ways_out(
+    goals: Goals, q: Array, label: Int, size: Array, V: Array, nullity: Int, none: int
+) -> tuple[Array, Int, Array]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
     The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
-    high order, and postures of surfaces. none: the label of what is no candidate.
+    high order, and postures of surfaces. V, nullity: what they lose, (K, M, n, n) and (K, M). none: the label
+    of what is no candidate.
     """
     arm, task, target, _ = goals
-    k, b = np.nonzero(size[:, 1:] <= SOLUTION)
+    k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (nullity[:, 1:] > 1))
     b += 1
-    _, V, nullity = newton.null_space(arm, task, q[k, b], target[k])
-    some = np.flatnonzero(nullity > 1)
-    if not len(some):
-        return q, label, size
-    k, b = k[some], b[some]
+    V, nullity = V[k, b], nullity[k, b]
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ONE_CROSSING)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     at, row = q[k[first], b[first]], k[first]
     most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])
-    who, there = _steps_out(arm, task, at, V[some[first]], nullity[some[first]], target[row], most)
+    who, there = _steps_out(arm, task, at, V[first], nullity[first], target[row], most)
     left = np.isin(same.reshape(-1), who)
     size[k[left], b[left]] = np.inf
     order = np.argsort(row[who], kind="stable")

@@ -10,10 +10,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLUSTER, HIGH, SOLUTION
+from armkin.inverse.numeric.tolerances import (
+    CLOSE_BY,
+    CLUSTER,
+    DOUBLE_ROOT,
+    HIGH,
+    ROOT_ROUNDING,
+    SAME,
+    SOLUTION,
+    TINY,
+)
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -68,3 +78,44 @@ def means(arm: Arm, q: Array) -> Array:
     out = np.empty_like(q)
     np.put_along_axis(out, order[:, :, None], there + shift * radian_or_reach(arm), axis=1)
     return out
+
+
+def alike(
+    arm: Arm,
+    task: Task,
+    q: Array,
+    k: NDArray[np.int64],
+    b: NDArray[np.int64],
+    away: Array,
+    sigma: Array,
+    size: Array,
+    target: Array,
+) -> Bool:
+    """Which candidates are one with the b-th of their target: (k, M).
+
+    Those that rounding explains, and those between which and it the posture in the middle solves the target.
+    """
+    with np.errstate(invalid="ignore"):
+        same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
+        row, column = np.nonzero(~same & (away < CLOSE_BY))
+    if len(row):
+        start = q[k[row], b[row]]
+        way = newton.difference(arm, q[k[row], column], start)
+        # a pair's longer Newton step; of rounding alone the quotient says nothing
+        one, other = (k[row], b[row]), (k[row], column)
+        longer = size[other] * sigma[one] > size[one] * sigma[other]
+        miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
+        further = joined(arm, task, start, way, miss, weakest, target[k[row]])
+        same[row, column] = further
+        for i in np.unique(row[further]):  # and those that rounding alone parts from these
+            there, some = q[k[i]], np.flatnonzero(same[i])
+            with np.errstate(invalid="ignore"):
+                apart = newton.wrapped_distance(arm, there[:, None], there[some])
+                close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
+            same[i] |= close.any(axis=1)
+    return np.asarray(same)
+
+
+def _radius(sigma: Array) -> Array:
+    """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
+    return SAME + np.minimum(ROOT_ROUNDING / np.maximum(sigma, TINY), DOUBLE_ROOT)
