@@ -18,7 +18,6 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
@@ -36,7 +35,7 @@ from armkin.inverse.numeric.tolerances import (
     TURNED,
 )
 from armkin.inverse.singular import circuits, meetings, roots, self_motions
-from armkin.inverse.singular.local_structure import local_structure, members
+from armkin.inverse.singular.local_structure import Lost, beyond_folds, local_structure, lost_directions, members
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 FEW = 24  # candidates of a target that are compared all with all
@@ -67,7 +66,8 @@ class Examined(NamedTuple):
 class _Settled(NamedTuple):
     """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each.
 
-    moved: (K, n) joints that move along self-motions other than those that were known.
+    moved: (K, n) joints that move along self-motions other than those that were known. beyond: (K,) all that is near
+    lies beyond a fold.
     """
 
     q: Array
@@ -78,6 +78,7 @@ class _Settled(NamedTuple):
     open: Bool
     surface: Bool
     moved: Bool
+    beyond: Bool
 
 
 class Seeds(NamedTuple):
@@ -113,7 +114,7 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     """
     q = seeds.q
     found = _settle(goals, seeds, SEED)
-    again = found.open | found.surface | ~found.valid.any(axis=1)
+    again = found.open | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
         first, last = found.moved.argmax(axis=1), goals.arm.n - 1 - found.moved[:, ::-1].argmax(axis=1)
@@ -151,16 +152,17 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
 
 def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
-    at, missed = _onto(goals, seeds, most)
-    lost = _lost(goals, at)
+    arm, task, target, _ = goals
+    at, missed, beyond = _onto(goals, seeds, most)
+    lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
     if (lost.nullity[:, 1:] > 1).any():
         more = meetings.ways_out(goals, at.q, at.label, at.size, lost.V, lost.nullity, OWN)
         wider = more[0].shape[1] - at.q.shape[1]
         at = _Candidates(*more, np.pad(at.sure, ((0, 0), (0, wider), (0, 0))))
-        lost = _lost(goals, at)
+        lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
     groups = _Groups(goals, at, lost)
     groups.find()
-    return groups.settled(missed)
+    return groups.settled(missed, beyond)
 
 
 class _Candidates(NamedTuple):
@@ -175,40 +177,10 @@ class _Candidates(NamedTuple):
     sure: Bool
 
 
-class _Lost(NamedTuple):
-    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
-    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
-
-    sigma: Array
-    nullity: Int
-    V: Array
-
-
-def _lost(goals: Goals, at: _Candidates) -> _Lost:
-    """What the candidates that solve their targets lose."""
-    arm, task, target, _ = goals
-    K, M, n = at.q.shape
-    out = _Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
-    on = at.sure.any(axis=2)
-    out.sigma[on] = 0.0
-    k, b = np.nonzero((at.size <= SOLUTION) & ~on)
-    if not len(k):
-        return out
-    _, J = newton.scaled(arm, task, at.q[k, b], target[k])
-    if J.shape[1] == n == task.constraints:
-        # the Frobenius norm of the inverse is no smaller than its largest singular value
-        inverse = nudged(np.linalg.inv, J)
-        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        weak = bound < FOLDED
-        k, b, J = k[weak], b[weak], J[weak]
-    out.sigma[k, b], out.V[k, b], out.nullity[k, b] = newton.null_space_of(arm, task, J)
-    return out
-
-
 class _Groups:
     """Which candidates are one, and what: a candidate of each target at a time leads those that are one with it."""
 
-    def __init__(self, goals: Goals, at: _Candidates, lost: _Lost) -> None:
+    def __init__(self, goals: Goals, at: _Candidates, lost: Lost) -> None:
         self.goals, self.at, self.lost = goals, at, lost
         K, M, n = at.q.shape
         self.valid: Bool = np.asarray(at.size <= SOLUTION)
@@ -219,6 +191,7 @@ class _Groups:
         self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.open: Bool = self.valid.copy()  # those of no group yet
+        lost.sigma[on] = 0.0
         self.asked: Bool = ~(self.valid & (lost.sigma < FOLDED) & ~on)
         self.known: Bool = on.copy()
         self.moves: Bool = on.copy()
@@ -341,8 +314,8 @@ class _Groups:
             mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
         return np.asarray(mine)
 
-    def settled(self, missed: Bool) -> _Settled:
-        """What was found; missed: (K,) a candidate that depends on a preferred value came to nothing."""
+    def settled(self, missed: Bool, beyond: Bool) -> _Settled:
+        """What was found; missed, beyond: see `_onto`."""
         arm, task, target, _ = self.goals
         K, chosen, q = len(self.chosen), self.chosen, self.at.q
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
@@ -362,13 +335,14 @@ class _Groups:
             missed,
             surface,
             np.asarray((self.curve & ~self.at.sure).any(axis=1)),
+            beyond,
         )
 
 
-def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool]:
+def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, Bool]:
     """`near` and candidates moved onto their targets, those that are there in front.
 
-    Also of which targets (K,) a loose one came to nothing.
+    Also of which targets (K,) a loose one came to nothing, and of which all that are near lie beyond a fold.
     """
     arm, task, target, near = goals
     K, _, n = seeds.q.shape
@@ -381,7 +355,7 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool]:
     loose = np.take_along_axis(seeds.loose, order, axis=1)
     flat, goal = q.reshape(-1, n).copy(), np.repeat(target, q.shape[1], axis=0)
     size = newton.missing(arm, task, flat, goal)
-    own = np.zeros(q.shape[:2], bool)
+    own, beyond = np.zeros(q.shape[:2], bool), np.zeros(len(flat), bool)
     own[:, 0] = True
     free = np.flatnonzero(~(own.ravel() | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
     if len(free):
@@ -389,6 +363,9 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool]:
         better = newton.missing(arm, task, mean, goal[free]) < size[free]
         flat[free[better]] = mean[better]
         some = free[size[free] < most]
+        far = some[size[some] > SOLUTION]
+        beyond[far] = beyond_folds(arm, task, flat[far], goal[far])
+        some = some[~beyond[some]]
         steps = 40  # towards a root of third order each step goes a third of the way
         flat[some], size[some] = newton.correct(arm, task, flat[some], goal[some], steps=steps, patience=PATIENCE)
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
@@ -396,4 +373,6 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool]:
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
     q[stands | (size[:, 0] > SOLUTION), 0], size[stands, 0] = np.nan, np.inf
     missed = (loose & (size[:, 1:] > SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
-    return _Candidates(q, label, size, sure), np.asarray(missed)
+    far = beyond.reshape(K, -1)
+    out = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
+    return _Candidates(q, label, size, sure), np.asarray(missed), np.asarray(out)

@@ -17,7 +17,21 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import ARRIVED, FINEST, MOVED, REACH, SMOOTH, SOLUTION, TINY
+from armkin.inverse.numeric.tolerances import (
+    ARRIVED,
+    BENT,
+    CLEAR,
+    FINEST,
+    FOLD_WAY,
+    FOLDED,
+    MOVED,
+    NEARBY_STEP,
+    REACH,
+    SMOOTH,
+    SOLUTION,
+    TINY,
+    WEAK,
+)
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -221,3 +235,52 @@ def members(at: Structure, rows: NDArray[np.intp], way: Array) -> Bool:
         off = np.abs(way - x).max(axis=2)
         inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
         return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
+
+
+class Lost(NamedTuple):
+    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
+    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
+
+    sigma: Array
+    nullity: NDArray[np.int64]
+    V: Array
+
+
+def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:
+    """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
+    K, M, n = q.shape
+    out = Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
+    k, b = np.nonzero(asked)
+    if not len(k):
+        return out
+    _, J = newton.scaled(arm, task, q[k, b], target[k])
+    if J.shape[1] == n == task.constraints:
+        # the Frobenius norm of the inverse is no smaller than its largest singular value
+        inverse = nudged(np.linalg.inv, J)
+        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+        weak = bound < FOLDED
+        k, b, J = k[weak], b[weak], J[weak]
+    out.sigma[k, b], out.V[k, b], out.nullity[k, b] = newton.null_space_of(arm, task, J)
+    return out
+
+
+def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
+    """Which postures (M, n), close to their targets, show that these are out of reach there: (M,).
+
+    To second order the tool moves along the direction u that the Jacobian cannot reach by half of `bend` times the
+    square of the way. A residual along u of the same sign is one that no motion takes anything away of; what else is
+    missing must be so little that putting it right does not lead back.
+    """
+    if not (task.constraints == arm.n > 1 and task.orientation != "axis" and len(q)):
+        return np.zeros(len(q), bool)
+    r, J = newton.scaled(arm, task, q, target)
+    U, S, V = np.linalg.svd(J)
+    u, way = U[:, :, -1], FOLD_WAY * V[:, -1] * radian_or_reach(arm)
+    both = np.concatenate([q + way, q - way])
+    ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
+    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / FOLD_WAY**2
+    lost = (u * r).sum(axis=1)
+    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], TINY)
+    fold = (S[:, -2] > CLEAR) & (S[:, -1] < WEAK) & (np.abs(bend) > BENT)
+    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * SOLUTION)
+    return np.asarray(fold & beyond & (rest < NEARBY_STEP) & (100.0 * rest**2 < np.abs(lost)))
