@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import NOISE
+from armkin.inverse.numeric.tolerances import NOISE, TINY
 
 
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:
@@ -48,7 +48,7 @@ def damped_steps(J: Array, r: Array, damping: float) -> Array:
             entry = (J[i] * J[j]).sum(axis=0)
             for above, below in zip(L[i], L[j], strict=False):
                 entry -= above * below
-            L[i].append(np.sqrt(np.maximum(entry + damping, 1e-300)) if i == j else entry / L[j][j])
+            L[i].append(np.sqrt(np.maximum(entry + damping, TINY)) if i == j else entry / L[j][j])
         for j in range(i):
             x[i] -= L[i][j] * x[j]
         x[i] /= L[i][i]
