@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -333,7 +334,7 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch
     own = armkin.ik(arm, T)
     solve = solving.ik
 
-    def counted(one: armkin.Arm, targets: np.ndarray, *words: object, **more: object) -> armkin.Solutions:
+    def counted(one: armkin.Arm, targets: np.ndarray, *words: Any, **more: Any) -> armkin.Solutions:
         asked.append(len(targets))
         return solve(one, targets, *words, **more)
 
