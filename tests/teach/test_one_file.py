@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import chromium, opened, repainted, settled
+from browsing import chromium, opened, repainted, settled, until
 from playwright.sync_api import Browser, expect
 
 import armkin
@@ -70,6 +70,18 @@ def test_the_branches_are_those_of_python(browser: Browser, tmp_path: Path) -> N
         assert np.abs(armkin.fk(arm, np.deg2rad(other)) - armkin.fk(arm, np.deg2rad(shown))).max() < 1e-2
         for absent in ("#send", "#board", "#record", "#save", "#stop", "#follow", "#take"):
             assert page.locator(absent).count() == 0, absent
+        at_once = """() => {
+          const bar = document.querySelectorAll('#sliders input[type=range]')[2];
+          const seen = new Set();
+          for (let k = 0; k < 300; k++) {
+            bar.value = 20 + k / 10;
+            bar.dispatchEvent(new Event('input'));
+            seen.add(document.querySelector('#target input').value);
+          }
+          return seen.size;
+        }"""
+        assert page.evaluate(at_once) > 200  # numbers follow before a picture is drawn
+        until(page, "location.hash.includes(',49.')")  # and the address, not too often for the browser
         page.evaluate("location.hash = '#q=0,-90,90,0,90,0'")
         expect(page.locator("#box-1")).to_have_value("-90.0000")
 

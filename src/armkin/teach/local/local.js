@@ -19,9 +19,8 @@ function shown(fields) {
   return answer;
 }
 
-/** Carry out an action. @param {string} name @param {any} [fields] @returns {Promise<any>} */
-export async function act(name, fields = {}) {
-  if (name === "look") return shown(fields);
+/** Carry out an action. @param {string} name @returns {Promise<any>} */
+export async function act(name) {
   if (name === "stop") return {};
   throw new Refused("this page has no server: start armkin teach for that");
 }
@@ -35,6 +34,28 @@ function addressed() {
 }
 
 const shared = { link: "", command: "", python: "" };
+const PACE = 100; // [ms] from one change of the address to the next: browsers refuse hundreds in a few seconds
+let [addressAt, waiting] = [-Infinity, false];
+
+/** The address says what is shown: at once, or when it may change again. */
+function address() {
+  const early = addressAt + PACE - performance.now();
+  if (waiting) return;
+  if (early > 0) {
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      address();
+    }, early);
+    return;
+  }
+  addressAt = performance.now();
+  try {
+    history.replaceState(null, "", shared.link);
+  } catch {
+    // a page whose address cannot change, such as one in a frame, is shown all the same
+  }
+}
 
 /** What the address and the buttons say. @param {number[]} q [deg | mm] @param {number[]} goal */
 function share(q, goal) {
@@ -48,11 +69,7 @@ function share(q, goal) {
     `q = np.array([${said.replaceAll(",", ", ")}]) * [${scene.joints.map((/** @type {any} */ j) => (j.prismatic ? "1" : "np.pi / 180")).join(", ")}]`,
     "T = armkin.fk(arm, q)",
   ].join("\n");
-  try {
-    history.replaceState(null, "", shared.link);
-  } catch {
-    // a page whose address cannot change, such as one in a frame, is shown all the same
-  }
+  address();
 }
 
 /** A button that copies a text. @param {string} title @param {() => string} text */
@@ -98,5 +115,5 @@ export async function enter(hears) {
   /** @type {any} */ (window).armkin = arm;
   hears.control({ holder: "yours", pages: 1 });
   const program = { moves: [], blend: 0, speed: 100, tool_speed: null, via: false, undo: 0, redo: 0 };
-  return { scene, look: shown({ q: addressed() }), program, ready };
+  return { scene, look: shown({ q: addressed() }), program, ready, alone: shown };
 }

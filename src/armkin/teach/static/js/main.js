@@ -22,8 +22,9 @@ const CONFIRMED = 100; // [ms] between two questions to the server while this pa
 const drawing = import("./view.js"); // while the server is asked for the arm
 
 class Page {
-  /** @param {import("./types.js").Arm} arm @param {Look} look */
-  constructor(arm, look) {
+  /** @param {import("./types.js").Arm} arm @param {Look} look @param {((fields: any) => Look) | null} alone of a page without a server: its answer */
+  constructor(arm, look, alone = null) {
+    this.alone = alone;
     this.arm = arm;
     this.look = look;
     this.q = look.q;
@@ -41,10 +42,7 @@ class Page {
     /** @type {{look: (fields: any) => Look, held: string} | null} the arm's own module */
     this.own = null;
     this.mine = false; // whether this page holds control; one that watches asks for nothing
-    const pose = async () => {
-      await this.asking.idle();
-      return this.q;
-    };
+    const pose = /** @type {() => Promise<number[]>} */ (() => this.asking.idle().then(() => this.q));
     this.board = new Board(arm, {
       pose, show: (q) => this.turn(q), moved: (state) => this.moved(state), trouble: (text, source = "board") => trouble(text, source), begun,
     });
@@ -103,6 +101,10 @@ class Page {
     if (!this.mine) return;
     document.documentElement.dataset.asking = "yes";
     const asked = { q: this.q, ...fields };
+    if (this.alone) {
+      this.answer(asked); // at once: nothing is waited for
+      return;
+    }
     this.asking.push(asked);
     this.first(asked);
   }
@@ -127,9 +129,8 @@ class Page {
   /** @param {any} fields */
   async answer(fields) {
     try {
-      const look = /** @type {Look} */ (await act("look", {
-        q: this.q, held: [...this.joints.held], best: this.motors.best.checked, ...fields,
-      }));
+      const asked = { q: this.q, held: [...this.joints.held], best: this.motors.best.checked, ...fields };
+      const look = this.alone ? this.alone(asked) : /** @type {Look} */ (await act("look", asked));
       const older = (this.answersItself() || !fields.target) && this.asking.next !== null; // what is shown is newer
       if (!older) this.show(look, fields.target !== undefined, this.asking.next !== null);
       trouble("");
@@ -206,9 +207,8 @@ class Page {
     try {
       this.view = new View(canvas, this.arm);
     } catch {
-      canvas.hidden = true;
+      canvas.hidden = get("views").hidden = true;
       get("flat").hidden = false;
-      get("views").hidden = true;
       return;
     }
     const view = this.view;
@@ -262,7 +262,7 @@ async function start() {
       here.page?.board.gone(lost);
     },
   );
-  const one = new Page(opened.scene, opened.look);
+  const one = new Page(opened.scene, opened.look, opened.alone);
   here.page = one;
   theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light", one);
   get("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark", one));
