@@ -106,6 +106,19 @@ def test_of_seven_joints_the_redundant_one_is_held_where_it_carries_the_path(rob
     assert "held: J7 at" in run("path", robot, "-", stdin=SEVEN.encode()).out
 
 
+def test_near_says_where_the_redundant_joint_is_preferred() -> None:
+    near = "0,-17,0,-126,0,114,-20"
+    assert run("path", "panda", "-", "--near", near, "--json", stdin=SEVEN.encode()).json["held"][
+        "J7"
+    ] == pytest.approx(-20)
+    from_here = SEVEN.replace("  - point: [400, 0, 400, 180, 0, 0]\n", "").replace(
+        "line: [", "offset: {xyz: [0, 20, 0]}  # ["
+    )
+    kept = run("path", "panda", "-", "--near", near, "--json", stdin=from_here.encode())
+    assert kept.code == 0, kept.err
+    assert kept.json["held"]["J7"] == pytest.approx(45.0)  # the way begins where the joints stand
+
+
 def arm_with_rates(robot: str) -> armkin.Arm:
     arm = armkin.load(robot)
     return replace(arm, max_speed=np.full(7, 0.5), max_accel=np.full(7, 1.0))

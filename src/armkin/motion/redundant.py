@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 VALUES = 72  # of the redundant joint that are asked, over its range
 STEP = 0.02  # of the arm's reach, between targets that are asked
+ASKED = 200  # targets of a way, at most
 MOST = 6  # values that are planned for
 SAME = 1e-9  # [rad] values of joint moves that are one
 
@@ -44,17 +45,20 @@ def path_redundant(
 ) -> PathPlan:
     """`armkin.path` of an arm with a redundant joint, whose plan says in `held` where that is held.
 
-    The file's joint moves say where; else it is where the joint stands when the path begins, if that carries the path,
-    or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint moves that want
-    the joint at different values.
+    The file's joint moves say where; else it is where `near` has it, by default where it stands when the path begins,
+    if that carries the path, or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint
+    moves that want the joint at different values.
     """
     name, here = arm.joint_names[spare.joint], arm.home if start is None else np.asarray(start, dtype=float)
     begin = _begin(arm, file, here)
     said = _said(arm, file, spare.joint, here)
-    close = begin if begin is not None else here if near is None else np.asarray(near, dtype=float)
+    stands = here if begin is None else begin
+    close = stands if near is None else np.asarray(near, dtype=float)
     others = _of_others(arm, file, spare.joint)
     refused: NoSolutionError | None = None
-    for value in _values(arm, file, task, float(close[spare.joint])) if said is None else [said]:
+    for value in (
+        _values(arm, file, task, float(close[spare.joint]), float(stands[spare.joint])) if said is None else [said]
+    ):
         try:
             return path_held(arm, others, {name: value}, start=start, near=near, task=task, begin=begin, **options)
         except NoSolutionError as error:
@@ -113,10 +117,11 @@ def _of_others(arm: Arm, file: PathFile, joint: int) -> PathFile:
     return file.model_copy(update={"start": start, "moves": [move(one) for one in file.moves]})
 
 
-def _values(arm: Arm, file: PathFile, task: str | None, close: float) -> Iterator[float]:
+def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
-    Where there is none, the one at which most have. A way that begins where the joints leave the tool keeps them.
+    The nearest to `close` first; where there is none, the one at which most have. A way that begins where the joints
+    stand keeps them there.
     """
     turned = actual(arm)
     spare = redundancy(turned, task or file.task)
@@ -127,11 +132,12 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float) -> Iterato
     try:
         _, ways = routes(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
     except UsageError:  # what is wrong with it, if anything, is said by its plan
-        yield close
+        yield stands
         return
     t = np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
     missing = np.zeros(len(t), int)
-    for way in ways:
+    for every in ways:
+        way = every[np.unique(np.linspace(0, len(every) - 1, ASKED).astype(int))]
         goals = np.repeat(way[None], len(t), axis=0).reshape(-1, *way.shape[1:])
         goals = moved(turned, spare, goals, np.repeat(t * arm.ratio[j], len(way)))
         s = ik(spare.rest, goals, spare.task.name, examine=False)
