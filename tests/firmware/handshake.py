@@ -1,4 +1,4 @@
-"""A model of what the tick interrupt and the main loop share: queue_tail, queue_head, left, now, settled, stretch.
+"""A model of what tick interrupt and main loop share: queue_tail, queue_head, left, now, settled, stretch, prepared.
 
 Every step is one access that an interrupt may come before or after. `explore` visits every state that any interleaving
 reaches, and returns the first promise that one of them breaks. The words are those of motion.c and dda.h.
@@ -25,6 +25,8 @@ class State:
     slots: tuple[int, ...] = (0,) * SLOTS  # ticks of each segment
     now: int = NONE  # slot + 1
     left: int = 0
+    rates: int = 0  # dda.rate: whose they are, told by its ticks
+    prepared: bool = False  # they are the next segment's
     fed: bool = False  # the timer has a tick to put out
     pending: bool = False  # an edge is out whose interrupt has not run
     locked: bool = False
@@ -52,7 +54,17 @@ def load(s: State) -> State:
         return replace(s, now=NONE, fed=False)
     slot = s.tail % SLOTS
     promise(s.slots[slot] > 0, "the interrupt takes up a segment that is not written")
-    return replace(s, now=slot + 1, left=s.slots[slot], fed=True)
+    rates = s.rates if s.prepared else s.slots[slot]
+    return replace(s, now=slot + 1, left=s.slots[slot], fed=True, rates=rates, prepared=False)
+
+
+def prepare(s: State) -> State:
+    """The short tick, behind the steps of a segment's last one: the next one's rates, if it is there."""
+    after = (s.tail + 1) % (2 * SLOTS)
+    if s.now == NONE or s.left or after == s.head:
+        return s
+    promise(s.slots[after % SLOTS] > 0, "the interrupt takes the rates of a segment that is not written")
+    return replace(s, rates=s.slots[after % SLOTS], prepared=True)
 
 
 def interrupt(s: State) -> State:
@@ -63,6 +75,7 @@ def interrupt(s: State) -> State:
         if s.now == NONE:
             return s
     promise(s.stretch in ((1, 0), (2, 1)), "the interrupt reads half of a stretch")
+    promise(s.rates == s.slots[s.now - 1], "a segment moves by another one's rates")
     return replace(s, left=s.left - 1, fed=True)
 
 
@@ -179,6 +192,10 @@ def stop_timer_forgetting(s: State) -> State:
 
 
 def stand_still(s: State) -> State:
+    return replace(stand_still_prepared(s), prepared=False)
+
+
+def stand_still_prepared(s: State) -> State:
     s = settle_to(s, s.tail)
     s = replace(s, counts=out(s, s.now, s.left), now=NONE, left=0, stretch=(1, 0))
     promise(s.counts == s.ghost_edges, "a hold ends with a count that is not that of the pins")
@@ -199,6 +216,7 @@ MUTANTS: dict[str, tuple[str, tuple[Step, ...]]] = {
     "looked at once": ("poll", (*SETTLE, read_now_low, look, arrive_or_start)),
     "counted without a lock": ("counts", (read_running_first, read_running_then, tell)),
     "stretched without a lock": ("hold", (stretch_low, stretch_high)),
+    "rates of a segment that a stop has dropped": ("stand still", (lock, stop_timer, unlock, stand_still_prepared)),
     "an edge forgotten at the stop": ("stand still", (lock, stop_timer_forgetting, unlock, stand_still)),
 }
 
@@ -207,7 +225,9 @@ def successors(s: State, calls: dict[str, tuple[Step, ...]]) -> Iterator[State]:
     if s.fed and not s.pending:
         yield replace(s, fed=False, pending=True, ghost_edges=s.ghost_edges + 1)
     if s.pending and not s.locked:
-        yield interrupt(s)
+        after = interrupt(s)
+        yield after
+        yield prepare(after)
     if not s.call:
         yield from (replace(s, call=name) for name in calls)
         return
