@@ -96,7 +96,8 @@ def words(arm: Arm, where: Reconfiguration) -> str:
 def closeness(plan: PathPlan) -> str:
     """How far the motion leaves the path, or the points that it was fitted to."""
     if plan.rounded_most is None:
-        return f"at most {plan.deviation:.4f} mm from the path; {plan.tolerance:g} allowed"
+        bound = np.ceil(plan.deviation * 1e4) / 1e4  # what it says is a bound, too
+        return f"at most {bound:.4f} mm from the path; {plan.tolerance:g} allowed"
     return (
         f"points within {plan.deviation:.4f} mm of the motion, the farthest at {plan.rounded_most:.3f} mm; "
         f"{plan.tolerance:g} allowed"
