@@ -188,7 +188,7 @@ class Board(ABC):
     ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
         """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
 
-        note: of `recall`, the motion that is gone on with; None: all of it.
+        note: of `recall`, the motion that is resumed; None: all of it.
         """
         yield parts, 0, lambda seconds: None
 

@@ -97,7 +97,7 @@ def under_way(
 ) -> Iterator[tuple[Sequence[Cut], int, Callable[[float], None]]]:
     """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
 
-    note: of the motion that is gone on with; None: all of it.
+    note: of the motion that is resumed; None: all of it.
     """
     place = None if note is None else find(machine, note, cuts)
     left = cuts if place is None else rest(machine, cuts, place)

@@ -132,7 +132,7 @@ class FirmwareBoard(Board):
     def under_way(
         self, parts: Sequence[Planned], note: resuming.Note | None
     ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
-        """The parts to be carried out or, of a motion that is gone on with, what is left of them."""
+        """The parts to be carried out or, of a resumed motion, what is left of them."""
         with resuming.under_way(self.machine, [part for part in parts if isinstance(part, Cut)], note) as found:
             yield found
 

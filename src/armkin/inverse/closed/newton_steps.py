@@ -48,7 +48,7 @@ class NewtonSteps:
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
         error = min(SLOPE * off, 0.5)  # its square after a step, and so on
         self.steps = min(max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1), MOST)
-        self.absent = math.inf if arm.prismatic.any() else ABSENT * off  # far out on a slide a turn tells more
+        self.absent = math.inf if arm.prismatic.any() else ABSENT * off  # the error grows with the slide's extension
         self.counted = task.name == "xyz" and not arm.prismatic.any()
 
     def corrected(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
