@@ -32,6 +32,7 @@ UNSOLVABLE = 3_000  # [rows a second]
 MEMORY = 300  # [MB]
 FASTER = 1.7  # times by two processes on two cores
 OVERHEAD = 0.03  # of chunks of a second
+AT_REST = 0.56  # [us] a pose of a UR5e, all branches
 
 
 class Spent(NamedTuple):
@@ -93,9 +94,24 @@ def batch(given: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
     return ("ik", "ur5e", "--batch", given, "--compiled", "--out", out, *more)
 
 
+def reference() -> float:
+    """CPU time of a pose solved in numpy [us], the least of five: how busy the machine is."""
+    arm, least = armkin.load("ur5e"), np.inf
+    T = armkin.fk(arm, np.random.default_rng(1).uniform(-3.0, 3.0, (16_384, 6)))
+    for _ in range(5):
+        began = time.process_time()
+        armkin.ik(arm, T)
+        least = min(least, time.process_time() - began)
+    return least / len(T) * 1e6
+
+
 def rows(folder: Path, count: int) -> bool:
     """CPU time a row, best branch and all."""
     values, good = poses(count), True
+    print(
+        f"a pose solved in numpy: {reference():.2f} us here, {AT_REST:g} on a machine at rest (docs/figures.md)",
+        flush=True,
+    )
     few, many = write(values[: count // 10], folder, "few"), write(values, folder, "many")
     for name, bar in BARS.items():
         more = ("--all-branches",) if name == "all branches" else ()

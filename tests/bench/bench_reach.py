@@ -76,7 +76,9 @@ def place() -> bool:
         targets, half, began = targets_of(task, armkin.fk(arm, q), q), arm.reach, time.process_time()
         step = half / 18
         [found] = armkin.place([arm], targets, area=(-half, half + 1e-6, -half, half + 1e-6), step=step, yaw=np.pi / 36)
-        total, arms = total + time.process_time() - began, arms + 1
+        took = time.process_time() - began
+        total, arms = total + took, arms + 1
+        print(f"{name:16}{took:.2f} s", flush=True)
         asked = from_place.Question(arm, task, targets, 72, np.pi / 36, 0.0)
         for i, j, k in rng.integers(0, found.reached.shape, (1000 // 20, 3)).tolist():
             there = from_place.legal_from(asked, np.array([found.x[i], found.y[j]]), float(found.yaw[k]))
