@@ -116,7 +116,8 @@ def ik(
     if examine:
         out = legal_postures.with_legal_postures(Goals(arm, definition, target, each), out)
         out = near_itself.stand(Goals(arm, definition, target, each), out, most)
-        out = free_postures.with_free_postures(Goals(arm, definition, target, each), out)
+        if arm.keep_out:
+            out = free_postures.with_free_postures(Goals(arm, definition, target, each), out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:

@@ -32,8 +32,6 @@ def with_free_postures(goals: Goals, out: Batch) -> Batch:
     its self-motion that is neither, if there is one to 0.1 degrees.
     """
     arm, task, target, near = goals
-    if not arm.keep_out:
-        return out
     good = clear(arm, out.q) & out.within
     for k, b in np.argwhere((out.status == Status.SINGULAR)[:, None] & out.valid & ~good):
         on_it = followed(arm, task, out.q[k, b], target[k])

@@ -38,6 +38,8 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64)
 
     rows = np.flatnonzero(((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR)) & ~out.within.any(axis=1))
+    if not len(rows):
+        return out
     for k in rows[_may_be_legal(goals, out, rows)]:
         q = out.q[k, out.valid[k]]
         at_limit = _at_limits(arm, q).all(axis=1).any()

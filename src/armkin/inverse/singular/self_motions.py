@@ -181,25 +181,6 @@ def _both_ways(arm: Arm, way: Array) -> Array:
     return ways
 
 
-def distinct(arm: Arm, task: Task, q: Array, curve: Bool, target: Array) -> bool:
-    """Whether it is clear that no two postures (B, n) of one target, whose self-motions move curve (B, n), share one.
-
-    Not if they are close. If they differ in moving joints alone, one half way between them that misses the target by
-    far tells: `drop_twins` would have to move it farther than it does.
-    """
-    halfway, unit = [], radian_or_reach(arm)
-    for i, j in itertools.combinations(np.flatnonzero(curve.any(axis=1)), 2):
-        way = newton.difference(arm, q[j], q[i])
-        if np.abs(way).max() < BESIDE:
-            return False
-        if np.where(curve[i] & curve[j], 0.0, np.abs(way)).max() < DRIFT:
-            halfway.append(q[i] + 0.5 * _both_ways(arm, way) * unit)
-    if not halfway:
-        return True
-    between = np.concatenate(halfway)
-    return bool((newton.missing(arm, task, between, np.repeat(target[None], len(between), axis=0)) > 0.01).all())
-
-
 def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
