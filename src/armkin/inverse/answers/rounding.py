@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 # A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
 # the defect of nine rounded entries is less than a quarter of it in one case of 100,000, of a turn about one of the
 # base's axes, which has four, in one of 13. There the last digit that the entries have tells: an angle is off by less
-# than three halves of it, a position of as many digits by no more than six.
+# than three halves of it, a position of as many digits, beside the reach, by some eleven.
 DEFECTS = 4.0
-HALVES = 8.0
+HALVES = 12.0
 COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 

@@ -53,6 +53,6 @@ static arm_real arm_most(const arm_real *target)
         half = here ? (arm_real)0.5 / unit : 0;
     }
     half = single ? ARM_FLOAT : half;
-    missed = ARM_SQRT(ARM_SOLUTION) + (4 * defect > 8 * half ? 4 * defect : 8 * half);
+    missed = ARM_SQRT(ARM_SOLUTION) + (4 * defect > 12 * half ? 4 * defect : 12 * half);
     return missed * missed;
 }

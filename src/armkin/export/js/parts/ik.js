@@ -41,7 +41,7 @@ function read(target) {
   const z = goal[3] * goal[7] - goal[4] * goal[6];
   if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
     throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
-  return { goal, rounding: given > ROUNDED ? Math.max(4 * given, 8 * lastPlace(flat)) : 0 };
+  return { goal, rounding: given > ROUNDED ? Math.max(4 * given, 12 * lastPlace(flat)) : 0 };
 }
 
 /** Half a unit of the last digit of a rotation's entries, or of single precision; 0 where of neither. @param {Float64Array} T */
