@@ -216,7 +216,7 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         b = np.nan_to_num(d[k].max(axis=2), nan=np.inf).argmin(axis=1)
         # a longer valley is a self-motion, which the answer has to report
         long = (d[k, b].max(axis=1) > CLOSE) & (s.status[k] != Status.SINGULAR)
-        verdict.lost = k[long | ~_in_one_valley(arm, screw, goals.take(k), asked[k], s.q[k, b])].tolist()
+        verdict.lost = k[long | ~_in_one_component(arm, screw, goals.take(k), asked[k], s.q[k, b])].tolist()
     pairs = [np.zeros((4, 0), int)]
     for i in range(s.q.shape[1]):
         for j in range(i):
@@ -288,8 +288,8 @@ def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     return out
 
 
-def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
-    """Whether three postures between two (M, n) solve the target: on the chord, or beside it where a valley is curved.
+def _in_one_component(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+    """Whether three postures between two (M, n) solve the target: on the chord, or beside it if that is curved.
 
     Beside it means within a tenth of its length: that reaches neither of the two, so that what is found is a third
     solution. Isolated branches have none.
@@ -297,7 +297,7 @@ def _in_one_valley(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> 
     d, one = _way(screw, a, b), np.ones(len(a), bool)
     for part in (0.25, 0.5, 0.75):
         q = a + part * d
-        there = across(screw, goals, q)
+        there = across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
         beside = np.abs(there - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
         beside &= miss_of(arm, screw, goals, there) < 0.9 * SOLVES
         one &= beside | (miss_of(arm, screw, goals, q) < 0.9 * SOLVES)
