@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.board.firmware.configuration import configure
+from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.onwards import onwards, places_on
+from armkin.board.firmware.protocol import HALF, STEP
+from armkin.board.firmware.trajectory_to_counts import Cut, cut, plan
 from armkin.board.ports import note_path
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS
-from armkin.motors import places
+from armkin.motion.plan import straight
+from armkin.motion.trajectory import Trajectory
+from armkin.motors import joints, places
 from command_line import ROOT, THREE_DOF, run
 
 ROWS = "10,80,-80\n12,60,-82\n-3,70,-60\n-20,70,-85\n0,90,-90\n"
@@ -214,6 +221,41 @@ def test_a_stop_says_where_the_arm_stands_and_that_it_can_go_on(
     monkeypatch.setattr(Stop, "__call__", lambda self: False)
     assert arm.send(*motions["single"], "--resume")[0] == 0
     assert arm.counts == [-1067, -10144, 5667]
+
+
+def _moves(way: Cut) -> list[int]:
+    """Where a fresh board has come to that carries a plan out from its start."""
+    arm = way.trajectory.arm
+    machine = Machine(SimPort(SimBoard(BOARDS["uno_cnc_shield"])), arm, configure(arm))
+    machine.prepare(assume=joints(arm, way.start))
+    machine.run([way])
+    return list(machine.counts())
+
+
+@pytest.mark.parametrize("goal", [(-30, 5, -5), (10, 80, -80), (25, 85, -60)])
+def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, ...]) -> None:
+    """ACCEL was answered within the last two steps: whole steps are another direction there than the line's."""
+    one = armkin.load(ROOT / THREE_DOF)
+    whole = plan(one, [0, 0, 0], np.deg2rad(goal), min_interval=448)
+    at, stands = np.array(whole.start) * STEP + HALF, list[list[int]]()
+    for s in next(whole.moves()).segments:
+        stands += ((at + np.arange(1, s.ticks + 1)[:, None] * np.array(s.rates)) // STEP).tolist()
+        at += s.ticks * np.array(s.rates)
+    last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
+    for counts in map(np.array, last):
+        place = next(places_on([whole], counts))
+        left = cut(onwards(whole, place, joints(one, counts)), counts, min_interval=448)
+        assert _moves(left) == whole.end.tolist(), counts
+
+
+def test_a_way_of_less_than_a_step_is_taken() -> None:
+    """An arm 0.55 steps before a path's start has a whole one to make: ACCEL was answered."""
+    one = armkin.load(ROOT / THREE_DOF)
+    here = joints(one, [128, -1193, 1333])
+    for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
+        goal = here + joints(one, steps) - one.home
+        way = cut(Trajectory(one, here, (straight(one, here, goal),)), [128, -1193, 1333], min_interval=448)
+        assert _moves(way) == way.end.tolist() != way.start.tolist()
 
 
 @pytest.mark.parametrize("begin", [0.3, 0.5, 0.8, 0.95])

@@ -62,7 +62,7 @@ def straight(
     speed, share: fractions of max_speed and max_accel; jerk: (n,) [rad/s3 | mm/s3].
 
     A motor that turns several joints keeps to `motor_accel`, so that a hold, of which a board knows motors
-    only, is within the joints' max_accel.
+    only, is within the joints' max_accel; with its whole steps, too, which on a way of few are more than the joints'.
     """
     change = np.abs(end - start)
     moving = change > 1e-12
@@ -71,6 +71,8 @@ def straight(
     top = float((arm.max_speed[moving] / change[moving]).min()) * speed
     accel = float((arm.max_accel[moving] / change[moving]).min())
     turned = np.abs(arm.motor_gain @ (end - start))
+    if arm.motors and not undriven(arm):
+        turned = np.maximum(turned, np.abs(np.diff(pulses(arm, [start, end]), axis=0)[0]))
     if turned.any():
         accel = min(accel, float((motor_accel(arm)[turned > 0] / turned[turned > 0]).min()))
     accel *= share

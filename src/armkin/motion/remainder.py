@@ -35,11 +35,11 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, here: Array) -> Stretch:
             return Straight(stretch.end, stretch.end, at_rest(max(left, 0.0)))  # a pause
         return straight(arm, here, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
-        share = 1.0 - float(stretch.law.at(np.array([begin]))[0])
-        if share <= 1e-9:
-            return straight(arm, here, stretch.end)
-        law = trapezoid(1.0, stretch.law.peak / share, stretch.law.accel / share)
-        return Straight(here, stretch.end, law)
+        share = max(1.0 - float(stretch.law.at(np.array([begin]))[0]), 1e-9)
+        # Whole steps make a short way another one for some joints: they keep to their own limits there.
+        fastest = straight(arm, here, stretch.end).law
+        top, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
+        return Straight(here, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)
     if left < _SHORT:
         return straight(arm, here, stretch.end)
     s = _grid(stretch, begin)
