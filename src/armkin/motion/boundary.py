@@ -6,6 +6,7 @@ there, which is linked to one of them. The other one's chain ends a few micromet
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ _NEAR = 10 * ENDS  # [mm] of a chain's end before the boundary
 _ALIKE = 1e-3  # [rad | mm] between the ends of two chains that are one
 _SAME = 1e-4  # [rad | mm] between two postures that are one
 _MOST = 8  # boundaries on the way: a path along one has thousands, and its chains go on anyway
+_WAYS = 64  # chains in all, as every boundary may multiply them: what goes through one more boundary comes last
 
 
 def through_boundaries(
@@ -37,11 +39,14 @@ def through_boundaries(
     for j in [0, *(rows if len(rows) <= _MOST else []), end]:
         postures = fixed[None] if j == 0 and fixed is not None else columns.q[j][columns.valid[j]]
         to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)] if j > 0 else []
-        on = [one for c in found for one in _leaving(s, c, j, postures, tolerance)] if j < end else []
+        # Beyond an inner boundary, what was joined at one before it is what its last part was: `all_` has that.
+        after = found if j == 0 else all_
+        on = [one for c in after for one in _leaving(s, c, j, postures, tolerance)] if j < end else []
         if j in (0, end):
             found += [c for c in (*to, *on) if c not in found]
         else:
-            found += [_joined(a, b) for a in to for b in on if _meet(a, b)]
+            ways = (_joined(a, b) for a in to for b in on if _meet(a, b))
+            found += islice(ways, max(_WAYS - len(found), 0))
     return found
 
 
