@@ -177,6 +177,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         page.get_by_role("button", name="home", exact=True).click()
         settled(page)
         unfollowed()
+        drag(0, 110)  # so far that it plays for seconds
         page.click("#record")
         page.wait_for_selector("#player:not([hidden])")
         follow()
