@@ -13,6 +13,14 @@ from armkin.errors import NoSolutionError
 from armkin.model.arm import Arm
 from armkin.motion import boundary
 from armkin.motion.branch_chains import Chain
+from armkin.motion.linked_branches import _Linking
+
+
+def moving(name: str) -> Arm:
+    """An arm with rates, ours where its file has none."""
+    arm = armkin.load(name)
+    speed, accel = (np.where(np.isnan(x), 2.0, x) for x in (arm.max_speed, arm.max_accel))
+    return replace(arm, max_speed=speed, max_accel=accel)
 
 
 def planned_to(arm: Arm, points: list[np.ndarray], start: dict[str, Any]) -> np.ndarray:
@@ -43,9 +51,7 @@ def test_both_branches_go_on_from_a_boundary_and_end_on_it(joints: tuple[float, 
 @pytest.mark.parametrize("name", ["ar4", "irb120", "irb2400", "kuka_kr6_r700", "fanuc_crx10ia"])
 def test_a_singular_home_is_left_or_the_wrist_turns_first(name: str) -> None:
     """20 mm up and 20 mm sideways; --split turns the wrist at rest where the straight way makes the joints jump."""
-    arm = armkin.load(name)
-    speed, accel = (np.where(np.isnan(x), 2.0, x) for x in (arm.max_speed, arm.max_accel))
-    arm = replace(arm, max_speed=speed, max_accel=accel)
+    arm = moving(name)
     home = armkin.fk(arm, arm.home)[:3, 3]
     up, sideways = ({"start": "home", "moves": [{"offset": {"xyz": way}}]} for way in ([0, 0, 20], [0, 20, 0]))
     plan = armkin.path(arm, up)
@@ -72,13 +78,24 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
         return joined(a, b)
 
     monkeypatch.setattr(boundary, "_joined", counted)
-    arm = armkin.load("mycobot_280")
-    speed, accel = (np.where(np.isnan(x), 2.0, x) for x in (arm.max_speed, arm.max_accel))
-    arm = replace(arm, max_speed=speed, max_accel=accel)
+    arm = moving("mycobot_280")
     plan = armkin.path(arm, {"start": "home", "moves": [{"offset": {"xyz": [0, 0, -20]}}]})
     down = armkin.fk(arm, arm.home)[:3, 3] - np.array([0, 0, 20])
     np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], down, atol=0.01)
     assert count > 0
+
+
+def test_a_stretched_arm_stands_at_its_path_s_start() -> None:
+    """Thor's home is straight up, its wrist singular: beside it, upwards, there is nothing, and it was out of reach."""
+    arm = armkin.load("thor")
+
+    def up(s: np.ndarray) -> np.ndarray:
+        T = np.tile(armkin.fk(arm, arm.home), (len(s), 1, 1))
+        T[:, 2, 3] += s
+        return T
+
+    found = _Linking(arm, up, None, 0.05, arm.home, 20.0)._solved(np.array([0.0, 20.0]))
+    assert found.valid.any(axis=1).tolist() == [True, False]
 
 
 def test_an_offset_in_the_tool_s_frame_takes_the_posture_that_carries_what_follows() -> None:

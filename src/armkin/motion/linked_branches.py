@@ -279,7 +279,8 @@ class _Linking:
             aside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
             aside = np.where(aside == s[singular], s[singular] - 1e-7 * self.length, aside)
             beside = ik(self.arm, self.targets(aside), self.task, near=self.near)
-            good = beside.status != Status.SINGULAR
+            # Where there is nothing beside it, a stretched arm's wrist for example, the posture there stays.
+            good = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
             B = max(q.shape[1], beside.q.shape[1])
             q, name, within = _widened(q, B).copy(), _widened(name, B, -1).copy(), _widened(within, B, 0).copy()
             within[singular[good]] = _widened(beside.within_limits, B, 0)[good]
