@@ -225,9 +225,9 @@ def successors(s: State, calls: dict[str, tuple[Step, ...]]) -> Iterator[State]:
     if s.fed and not s.pending:
         yield replace(s, fed=False, pending=True, ghost_edges=s.ghost_edges + 1)
     if s.pending and not s.locked:
-        after = interrupt(s)
-        yield after
-        yield prepare(after)
+        interrupted = interrupt(s)
+        yield interrupted
+        yield prepare(interrupted)
     if not s.call:
         yield from (replace(s, call=name) for name in calls)
         return
