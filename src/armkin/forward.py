@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -248,6 +248,7 @@ def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) 
     flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
     code = _recorded(arm, formula).get(len(flat_q))
     if code is None:
+        entry: Any  # numpy takes any
         for k, entry in enumerate(formula(arm, list(flat_q.T))):
             flat_out[:, k] = entry
         return out

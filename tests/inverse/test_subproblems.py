@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -48,9 +50,10 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     e = e[:, ~vanishing]
     scale = np.abs(e).sum(axis=0)
     pair, told = trig_quadratic(list(e), 1.0)
-    q = np.arctan2(pair.s, pair.c).reshape(4, -1)
+    c, s = cast("list[Array]", pair)
+    q = np.arctan2(s, c).reshape(4, -1)
     doubt = np.asarray(told.edge.reshape(-1, e.shape[1]).any(axis=0))
-    on_circle = np.abs(pair.c**2 + pair.s**2 - 1).reshape(4, -1) < 1e-12
+    on_circle = np.abs(c**2 + s**2 - 1).reshape(4, -1) < 1e-12
     assert not np.any(told.free)
     root = on_circle & (np.abs(values(e, q)) < 1e-12 * scale)
     assert not (on_circle & ~root & ~doubt).any()
@@ -79,7 +82,8 @@ def test_two_double_roots() -> None:
     e *= 1 + 3e-16 * rng.integers(-1, 2, e.shape)
     pair, told = trig_quadratic(list(e), 1.0)
     middle, half = np.arctan2(y, x), np.arccos(-z / np.hypot(x, y))
-    q = np.arctan2(pair.s, pair.c).reshape(4, -1)
+    c, s = cast("list[Array]", pair)
+    q = np.arctan2(s, c).reshape(4, -1)
     for wanted in (middle + half, middle - half):
         assert np.abs(np.exp(1j * q) - np.exp(1j * wanted)).min(axis=0).max() < 1e-5
     assert np.asarray(told.edge.any(axis=(0, 1, 2))).all()
@@ -91,10 +95,11 @@ def test_a_conic_that_vanishes_on_the_circle_leaves_the_angle_free() -> None:
     none = np.zeros(6)
     off = np.array([0.0, 1e-16, 0.0, 0.0, 1e-9, 1e-3])
     pair, told = trig_quadratic([-k, none, off, k + off, none, k], 1.0, Pair(0.6, 0.8))
-    assert told.free.tolist() == [True] * 4 + [False] * 2
+    c, s = cast("list[Array]", pair)
+    assert np.asarray(told.free).tolist() == [True] * 4 + [False] * 2
     assert np.asarray(told.edge.any(axis=(0, 1, 2)))[:5].all()
-    assert (pair.c[..., :4] == 0.6).all()
-    assert (pair.s[..., :4] == 0.8).all()
+    assert (c[..., :4] == 0.6).all()
+    assert (s[..., :4] == 0.8).all()
 
 
 def test_quadratic() -> None:
@@ -104,6 +109,6 @@ def test_quadratic() -> None:
     d = rng.normal(size=(2, 2000)) * size
     a = np.where(rng.random(2000) < 0.2, 0.0, 1.0)
     b, c = np.where(a == 0.0, 1.0, -d[0] - d[1]), np.where(a == 0.0, -d[0], d[0] * d[1])
-    roots = quadratic(a, b, c, 0, 1.0, 1e-300, None)[0].reshape(2, -1)
+    roots = cast("Array", quadratic(a, b, c, 0, 1.0, 1e-300, None)[0]).reshape(2, -1)
     for wanted in (d[0], np.where(a == 0.0, d[0], d[1])):
         assert (np.abs(roots - wanted).min(axis=0) / (1 + np.abs(wanted) + np.abs(d).max(axis=0))).max() < 1e-9

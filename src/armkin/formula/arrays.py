@@ -7,7 +7,8 @@ costs nothing. A single pose is the same code with nothing but floats.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,45 @@ from armkin.errors import UsageError
 
 Array = NDArray[np.float64]
 Bool = NDArray[np.bool_]
-Entry = Any  # float | Array: numpy arithmetic accepts both, and the type checker cannot tell them apart
+Truth = Bool | bool  # what a comparison of entries gives
+
+
+class Entry(Protocol):
+    """A plain number, an array over the batch, or a symbol of a recording: what arithmetic works on entry by entry."""
+
+    # of what stands on the other side Any: a float takes floats alone, an array takes all that numpy does
+    def __add__(self, other: Any, /) -> Entry: ...
+    def __radd__(self, other: Any, /) -> Entry: ...
+    def __sub__(self, other: Any, /) -> Entry: ...
+    def __rsub__(self, other: Any, /) -> Entry: ...
+    def __mul__(self, other: Any, /) -> Entry: ...
+    def __rmul__(self, other: Any, /) -> Entry: ...
+    def __truediv__(self, other: Any, /) -> Entry: ...
+    def __rtruediv__(self, other: Any, /) -> Entry: ...
+    def __pow__(self, other: Any, /) -> Entry: ...
+    def __neg__(self) -> Entry: ...
+    def __abs__(self) -> Entry: ...
+    def __lt__(self, other: Any, /) -> Any: ...
+    def __le__(self, other: Any, /) -> Any: ...
+    def __gt__(self, other: Any, /) -> Any: ...
+    def __ge__(self, other: Any, /) -> Any: ...
+
+
+E = TypeVar("E", bound=Entry)
+
+_numpy: Any = np  # its functions take entries of every kind; its stubs do not know so
+absolute: Callable[[Entry], Entry] = _numpy.abs
+sign: Callable[[Entry], Entry] = _numpy.sign
+sqrt: Callable[[Entry], Entry] = _numpy.sqrt
+cbrt: Callable[[Entry], Entry] = _numpy.cbrt
+tan: Callable[[Entry], Entry] = _numpy.tan
+maximum: Callable[[Entry, Entry], Entry] = _numpy.maximum
+minimum: Callable[[Entry, Entry], Entry] = _numpy.minimum
+arctan2: Callable[[Entry, Entry], Entry] = _numpy.arctan2
+copysign: Callable[[Entry, Entry], Entry] = _numpy.copysign
+where: Callable[[Any, Entry, Entry], Entry] = _numpy.where
+flip: Callable[[Entry, int], Entry] = _numpy.flip
+
 
 CHUNK = 8000  # poses worked on at once: long enough to hide the calls, short enough for a processor's cache
 
@@ -79,7 +118,7 @@ def sub(a: Entry, b: Entry) -> Entry:
     return a - b
 
 
-def dot(u: list[Entry], v: list[Entry]) -> Entry:
+def dot(u: Sequence[Entry], v: Sequence[Entry]) -> Entry:
     """Scalar product of two vectors of entries."""
     total: Entry = 0.0
     for a, b in zip(u, v, strict=True):
@@ -87,12 +126,12 @@ def dot(u: list[Entry], v: list[Entry]) -> Entry:
     return total
 
 
-def combine(a: Entry, u: list[Entry], b: Entry, v: list[Entry]) -> list[Entry]:
+def combine(a: Entry, u: Sequence[Entry], b: Entry, v: Sequence[Entry]) -> list[Entry]:
     """The vector ``a u + b v``."""
     return [add(mul(a, x), mul(b, y)) for x, y in zip(u, v, strict=True)]
 
 
-def cross(u: list[Entry], v: list[Entry]) -> list[Entry]:
+def cross(u: Sequence[Entry], v: Sequence[Entry]) -> list[Entry]:
     """Vector product of two vectors of entries."""
     return [
         sub(mul(u[1], v[2]), mul(u[2], v[1])),
@@ -110,16 +149,17 @@ def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
     """
     if isinstance(angle, float):
         return math.cos(angle), math.sin(angle)
-    t = np.tan(0.5 * angle)
+    t = tan(0.5 * angle)
     t2 = t * t
     scale = 1.0 / (1.0 + t2)
     return (1.0 - t2) * scale, (t + t) * scale
 
 
-def wrapped(angle: Entry) -> Entry:
+def wrapped(angle: E) -> E:
     """An angle [rad] less its whole turns, in [-pi, pi].
 
     >>> round(float(wrapped(7.0)), 6)
     0.716815
     """
-    return angle - 2 * np.pi * np.rint(angle / (2 * np.pi))
+    less: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
+    return less

@@ -11,6 +11,9 @@ the x, y and z columns of the rotation, then the position.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from armkin.formula.arrays import Array, Entry, combine, dot, mul
@@ -47,17 +50,17 @@ def times(P: Pose, Q: Pose) -> Pose:
     return out
 
 
-def apply(P: Pose, v: list[Entry]) -> list[Entry]:
+def apply(P: Pose, v: Sequence[Entry]) -> list[Entry]:
     """``P v`` for a point v."""
     return combine(1.0, turn(P, v), 1.0, P[9:12])
 
 
-def turn(P: Pose, v: list[Entry]) -> list[Entry]:
+def turn(P: Pose, v: Sequence[Entry]) -> list[Entry]:
     """``R v`` for a direction v, R the rotation of P."""
     return combine(1.0, combine(v[0], P[0:3], v[1], P[3:6]), v[2], P[6:9])
 
 
-def turn_back(P: Pose, v: list[Entry]) -> list[Entry]:
+def turn_back(P: Pose, v: Sequence[Entry]) -> list[Entry]:
     """``R^T v`` for a direction v, R the rotation of P."""
     return [dot(P[0:3], v), dot(P[3:6], v), dot(P[6:9], v)]
 
@@ -70,15 +73,16 @@ def inverse(P: Pose) -> Pose:
 
 def write(P: Pose, out: Array) -> None:
     """Write a pose into ``out (..., 4, 4)``; entries broadcast."""
+    entry: Any  # numpy takes any
     for k, entry in enumerate(P):
         out[..., k % 3, k // 3] = entry
     out[..., 3, :3] = 0.0
     out[..., 3, 3] = 1.0
 
 
-def read_one(T: Array) -> Pose:
+def read_one(T: Array) -> list[float]:
     """The entries of one pose (4, 4) as floats."""
-    rows = T.tolist()
+    rows: list[list[float]] = T.tolist()
     return [rows[row][column] for column in range(4) for row in range(3)]
 
 

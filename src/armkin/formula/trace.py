@@ -48,7 +48,7 @@ class StraightLineCode:
             kept[length] = buffers
         return buffers
 
-    def run(self, inputs: Sequence[Array], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
+    def run(self, inputs: Sequence[Any], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
         """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
         assert self._batch is not None  # written for the workspace
         if len(inputs[0]) < 2 * UNCOPIED:
@@ -59,7 +59,7 @@ class StraightLineCode:
         finally:
             np.setbufsize(before)
 
-    def exactly(self, inputs: Sequence[Array]) -> list[Array]:
+    def exactly(self, inputs: Sequence[Any]) -> list[Array]:
         """The formula's outputs for inputs (N,), to the last digit those of `numbers`, in arrays of their own."""
         from armkin.formula import numpy_code
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -123,7 +123,7 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     entries = pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
     candidates = geometry.pairs(entries, prefer)
-    values = np.broadcast_arrays(*candidates.values())
+    values = np.broadcast_arrays(*cast("list[Array]", candidates.values()))
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     B = q.shape[1]
     missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))

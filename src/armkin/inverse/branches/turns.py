@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array, Entry, wrapped
+from armkin.formula.arrays import Array, Truth, wrapped
 from armkin.forward import one_pose
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.model.arm import actual
@@ -24,7 +24,7 @@ HALF = np.pi + SLACK  # how far above `near` a copy may be
 MOST = 50_000  # copies of one branch that `turns` gives
 
 
-def nearest_copy(value: Array, near: Entry, lower: float, upper: float) -> tuple[Array, Entry]:
+def nearest_copy(value: Array, near: Array | float, lower: float, upper: float) -> tuple[Array, Truth]:
     """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
 
     value: any shape, in [-pi, pi]; near: broadcastable [rad]. Returns the values and
@@ -77,7 +77,7 @@ def _principal(value: Array) -> Array:
     return np.where(negative, value + TURN, value) if negative.any() else value
 
 
-def _half_turned(value: Array, near: Entry, low: float, high: float) -> Array:
+def _half_turned(value: Array, near: Array | float, low: float, high: float) -> Array:
     """Principal values; of half a turn the copy that is legal and nearer."""
     some = np.flatnonzero(value > np.pi - SLACK)
     if not len(some):
@@ -138,7 +138,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         if arm.prismatic[i]:
-            ok: Entry = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
+            ok: Truth = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
         else:
             principal = wrapped(q[..., i])
             out[..., i], ok = nearest_copy(principal, near[..., i], lower, upper)

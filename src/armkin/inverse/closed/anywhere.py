@@ -19,7 +19,7 @@ the loop is a planar arm of three joints, or a wrist: 8 branches.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,7 +126,7 @@ class _Ends:
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
         free = (across < LOOSE) | (doubt.edge & (across < LOOSE_DOUBLE))
         if prefer[1] is not None and np.any(free):
-            second = Pair(np.where(free, prefer[1].c, second.c), np.where(free, prefer[1].s, second.s))
+            second = Pair(arrays.where(free, prefer[1].c, second.c), arrays.where(free, prefer[1].s, second.s))
         return [first, second, last], doubt | Doubt(free, free)
 
     def _quartic(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
@@ -185,6 +185,8 @@ class _Loop:
         goal = [*goal[:9], *(arrays.mul(self.unit, v) for v in goal[9:])]
         back = pose.inverse(pose.times(pose.times(self.from_base, goal), self.from_tool))
         before, between = (self.before, back) if self.first == 1 else (back, self.between)
+        height: Entry
+        known: Sequence[Entry | None]
         out, height = pose.constant(self.out), 0.0
         if self.points is None:
             assert self.three_link is not None

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry
@@ -57,7 +58,7 @@ class Recorded:
         miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
         values = found.values()
         if len(self.task.sums):
-            miss = np.maximum(miss, _sum_miss(self.task, values, goal))
+            miss = arrays.maximum(miss, _sum_miss(self.task, values, goal))
         return [*values, miss, found.doubt.edge, found.doubt.free]
 
     @cached_property
@@ -201,7 +202,7 @@ def preferred(arm: Arm, near: Array) -> list[Pair]:
     return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
 
 
-def as_rows(values: list[Entry], count: int) -> Array:
+def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
     """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
     shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
     rows = [np.broadcast_to(v, shape).reshape(math.prod(shape[:-1]), count).T for v in values]
@@ -245,7 +246,7 @@ def _miss(arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: 
     return total
 
 
-def _sum_miss(task: Task, values: list[Array], goal: list[Entry]) -> Entry:
+def _sum_miss(task: Task, values: list[Entry], goal: list[Entry]) -> Entry:
     """Squared residual of the sums of joint values, modulo whole turns."""
     total: Entry = 0.0
     for k, weights in enumerate(task.sums):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Entry
+from armkin.formula.arrays import Entry, Truth
 from armkin.inverse.closed.elbow import together
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
@@ -80,6 +80,7 @@ class NewtonSteps:
         """
         p = self.link[-1][9:12]
         slopes: list[list[Entry]] = []
+        slope: list[Entry]
         for i in range(self.arm.n - 1, -1, -1):
             c, s = pairs[i]
             if s is None:
@@ -139,9 +140,9 @@ def steps(
     return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
 
 
-def _merged(pairs: list[Pair], unit: list[float]) -> Entry:
+def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
     """Whether a branch is one with another, on any of the branch axes."""
-    merged: Entry = False
+    merged: Truth = False
     for axes in ((0,), (1,), (0, 1)):
         away: Entry = 0.0
         for (c, s), size in zip(pairs, unit, strict=True):
@@ -160,7 +161,7 @@ def _merged(pairs: list[Pair], unit: list[float]) -> Entry:
 
 def _other(v: Entry, axis: int) -> Entry:
     """What stands on the other branch of an axis; the value itself if it is one for both."""
-    return v if isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4) else np.flip(v, axis)
+    return v if isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4) else arrays.flip(v, axis)
 
 
 def _adjugate(columns: list[list[Entry]]) -> tuple[list[list[Entry]], Entry]:

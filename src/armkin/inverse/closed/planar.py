@@ -194,8 +194,8 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
         end = pose.times(P, link[3])
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
-        parallel = np.abs(det) < NO_AREA
-        inverse_det = np.sign(det) / np.maximum(np.abs(det), NO_AREA)
+        parallel = arrays.absolute(det) < NO_AREA
+        inverse_det = arrays.sign(det) / arrays.maximum(arrays.absolute(det), NO_AREA)
         d1 = (arrays.mul(x, b[1]) - arrays.mul(y, b[0])) * inverse_det
         d3 = (arrays.mul(a[0], y) - arrays.mul(a[1], x)) * inverse_det
         return [Pair(d1, None), second, Pair(d3, None)], Doubt(parallel, parallel)

@@ -47,5 +47,5 @@ def turn(six: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Pair, Doub
     Pairs of complex roots stay off the unit circle, no longer than 2: normalised they may be a real root once more.
     """
     pair, doubt = trig_quadratic(six, size * size, prefer)
-    shorter = 1.0 / np.maximum(1.0, 0.5 * np.sqrt(pair.c * pair.c + pair.s * pair.s))
+    shorter = 1.0 / arrays.maximum(1.0, 0.5 * arrays.sqrt(pair.c * pair.c + pair.s * pair.s))
     return Pair(pair.c * shorter, pair.s * shorter), doubt

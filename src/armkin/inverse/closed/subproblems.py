@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Bool, Entry, Truth
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.numeric.tolerances import (
     AT_INFINITY,
@@ -39,7 +39,7 @@ class Pair(NamedTuple):
     """Cosine and sine of a joint's angle [rad], or the value [mm] of a prismatic joint and None."""
 
     c: Entry
-    s: Entry
+    s: Any  # an Entry, or None: who knows that a joint is revolute need not ask
 
 
 # What to give a joint that a target leaves free, or None.
@@ -55,7 +55,7 @@ class Doubt:
     """
 
     edge: Bool
-    free: Entry = False
+    free: Truth = False
 
     __array_ufunc__ = None  # an array on the left of | leaves it to this class
 
@@ -85,7 +85,7 @@ class Candidates(NamedTuple):
         """Joint values [rad | mm]."""
         angles = self.angles or [None] * len(self.pairs)
         return [
-            c if s is None else np.arctan2(s, c) if angle is None else angle
+            c if s is None else arrays.arctan2(s, c) if angle is None else angle
             for (c, s), angle in zip(self.pairs, angles, strict=True)
         ]
 
@@ -94,7 +94,7 @@ class Candidates(NamedTuple):
         return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
 
 
-def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:
+def spin(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:
     """``Rz(q) v``.
 
     >>> spin(0.0, 1.0, [2.0, 0.0, 5.0])
@@ -104,7 +104,7 @@ def spin(c: Entry, s: Entry, v: list[Entry]) -> list[Entry]:
     return [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), v[2]]
 
 
-def distance2(u: list[Entry], v: list[Entry]) -> Entry:
+def distance2(u: Sequence[Entry], v: Sequence[Entry]) -> Entry:
     """Squared distance of two vectors."""
     total: Entry = 0.0
     for a, b in zip(u, v, strict=False):
@@ -140,15 +140,15 @@ def linear(
     if disc is None:
         disc = h2 - c * c
     close = precision()
-    edge = np.abs(disc) < (close.tangent if tangent is None else tangent) * h2
-    root = np.sqrt(np.maximum(disc, 0.0)) * sign
+    edge = arrays.absolute(disc) < (close.tangent if tangent is None else tangent) * h2
+    root = arrays.sqrt(arrays.maximum(disc, 0.0)) * sign
     least = close.free * scale * scale
     if isinstance(h2, float) and isinstance(least, float):
-        free: Entry = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
+        free: Truth = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
         inverse: Entry = 1.0 / max(h2, least)
     else:
         free = h2 < least
-        inverse = 1.0 / np.maximum(h2, least)
+        inverse = 1.0 / arrays.maximum(h2, least)
     ci, ri = c * inverse, root * inverse
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
@@ -160,13 +160,13 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
     """``a^2 + b^2 - c^2`` for `linear`, zero where rounding alone parts the two roots."""
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     disc = h2 - c * c
-    out: Entry = np.where(np.abs(disc) < precision().one_root * h2, 0.0, disc)
+    out: Entry = arrays.where(arrays.absolute(disc) < precision().one_root * h2, 0.0, disc)
     return out
 
 
 def normalised(pair: Pair) -> Pair:
     """The pair on the unit circle: the closest angle where `linear` found no real root."""
-    size = np.sqrt(np.maximum(pair.c * pair.c + pair.s * pair.s, TINY))
+    size = arrays.sqrt(arrays.maximum(pair.c * pair.c + pair.s * pair.s, TINY))
     return Pair(pair.c / size, pair.s / size)
 
 
@@ -189,14 +189,14 @@ def rotation_between(
     least = close.free * scale * scale
     if length2 is not None:
         free, nearly = length2 < least, length2 < close.nearly_free * scale * scale
-        inverse = 1.0 / np.maximum(length2, least)
+        inverse = 1.0 / arrays.maximum(length2, least)
         vx, vy = arrays.mul(inverse, vx), arrays.mul(inverse, vy)
     c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
     s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
     if length2 is None:
         h2 = arrays.add(arrays.mul(c, c), arrays.mul(s, s))
         free, nearly = h2 < least * least, h2 < (close.nearly_free * scale * scale) ** 2
-        inverse = 1.0 / np.sqrt(np.maximum(h2, least * least))
+        inverse = 1.0 / arrays.sqrt(arrays.maximum(h2, least * least))
         c, s = c * inverse, s * inverse
     return _prefer(Pair(c, s), free, prefer), Doubt(nearly, free)
 
@@ -205,12 +205,12 @@ def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     """The pair, with the preferred angle where it is free."""
     if prefer is None or not np.any(free):
         return pair
-    return Pair(np.where(free, prefer.c, pair.c), np.where(free, prefer.s, pair.s))
+    return Pair(arrays.where(free, prefer.c, pair.c), arrays.where(free, prefer.s, pair.s))
 
 
 def quadratic(
     a: Entry, b: Entry, c: Entry, axis: int, scale: Entry, least: Entry, prefer: Pair | None
-) -> tuple[Array, Doubt]:
+) -> tuple[Entry, Doubt]:
     """Solve ``a d^2 + b d + c = 0`` for both roots d.
 
     scale: a length of the size of d; least: the size of c below which, if all three are, the equation says
@@ -220,12 +220,12 @@ def quadratic(
     a, b = arrays.mul(a, scale * scale), arrays.mul(b, scale)
     size = arrays.add(arrays.add(abs(a), abs(b)), abs(c))
     free = size < least
-    inverse = 1.0 / np.maximum(size, least)
+    inverse = 1.0 / arrays.maximum(size, least)
     a, b, c = a * inverse, b * inverse, c * inverse
     pair, doubt = linear(c - a, b, -(a + c), axis, 1.0, None)
     d = scale * half_tangent(pair)
     if prefer is not None and np.any(free):
-        d = np.where(free, prefer.c, d)
+        d = arrays.where(free, prefer.c, d)
     return d, doubt | Doubt(free, free)
 
 
@@ -233,10 +233,10 @@ def half_tangent(pair: Pair) -> Entry:
     """``tan(q/2)``, 1e9 where it is infinite: inf would turn into nan on its way."""
     # s / (1 + c) = (1 - c) / s: the form without cancellation
     ahead = pair.c > 0.0
-    below = np.where(ahead, 1.0 + pair.c, pair.s)
-    above = np.where(ahead, pair.s, 1.0 - pair.c)
-    far = np.abs(below) < AT_INFINITY
-    return np.where(far, 1e9, above / np.where(far, 1.0, below))
+    below = arrays.where(ahead, 1.0 + pair.c, pair.s)
+    above = arrays.where(ahead, pair.s, 1.0 - pair.c)
+    far = arrays.absolute(below) < AT_INFINITY
+    return arrays.where(far, 1e9, above / arrays.where(far, 1.0, below))
 
 
 def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> tuple[Pair, Doubt]:
@@ -256,7 +256,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     size = arrays.add(abs(ecc), abs(ess))
     for v in (e0, ec, es, ecs):
         size = arrays.add(size, abs(v))
-    inverse = 1.0 / np.maximum(size, NO_SIZE * scale)
+    inverse = 1.0 / arrays.maximum(size, NO_SIZE * scale)
     # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
@@ -274,12 +274,14 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     ]
     squares = [columns[i][i] for i in range(3)]
     column = _longest(squares, columns)
-    down = 1.0 / np.sqrt(np.maximum(np.maximum(squares[0], np.maximum(squares[1], squares[2])), ROUNDING))
+    down = 1.0 / arrays.sqrt(
+        arrays.maximum(arrays.maximum(squares[0], arrays.maximum(squares[1], squares[2])), ROUNDING)
+    )
     px, py, pz = (down * value for value in column)
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
     flipped = [list(row) for row in zip(*rows, strict=True)]
     lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
-    lx, ly, lz = (np.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
+    lx, ly, lz = (arrays.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
     # a line at infinity has no direction
     lx = lx + UNDERFLOW
     h2 = lx * lx + ly * ly
@@ -290,12 +292,12 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     for _ in range(2):
         value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
         slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
-        step = np.where(real, value * slope / (slope * slope + NO_SLOPE), 0.0)
-        step = np.minimum(np.maximum(step, -0.01), 0.01)
+        step = arrays.where(real, value * slope / (slope * slope + NO_SLOPE), 0.0)
+        step = arrays.minimum(arrays.maximum(step, -0.01), 0.01)
         c, s = c + s * step, s - c * step
-        shorter = np.where(real, 1.0 / np.sqrt(np.maximum(c * c + s * s, 0.5)), 1.0)
+        shorter = arrays.where(real, 1.0 / arrays.sqrt(arrays.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
-    merging = (real & (np.abs(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
+    merging = (real & (arrays.absolute(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
     free = rest * size < NO_SIZE * scale
     return _prefer(Pair(c, s), free, prefer), Doubt(merging | triple | free, free)
 
@@ -317,29 +319,29 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     p3 = p / 3.0
     disc = q * q + p3 * p3 * p3
     # one real root (Cardano) or three (Viete): the largest and the smallest of them
-    root = np.sqrt(np.abs(disc))
-    A = np.cbrt(np.abs(q) + root + TINY)
-    alone = np.copysign(A - p3 / A, -q)
-    size = 2.0 * np.sqrt(np.maximum(-p3, 0.0))
-    c, s = arrays.cos_sin(np.arctan2(root, -q) / 3.0)
+    root = arrays.sqrt(arrays.absolute(disc))
+    A = arrays.cbrt(arrays.absolute(q) + root + TINY)
+    alone = arrays.copysign(A - p3 / A, -q)
+    size = 2.0 * arrays.sqrt(arrays.maximum(-p3, 0.0))
+    c, s = arrays.cos_sin(arrays.arctan2(root, -q) / 3.0)
     most = size * c
     least = -0.5 * size * (c + np.sqrt(3.0) * s)
-    span = np.sqrt(h) + NO_SIZE  # at an end, where two roots are double, rounding must not choose the double one
-    above = np.maximum(most + third - span, 0.0)
-    below = np.maximum(-span - least - third, 0.0)
+    span = arrays.sqrt(h) + NO_SIZE  # at an end, where two roots are double, rounding must not choose the double one
+    above = arrays.maximum(most + third - span, 0.0)
+    below = arrays.maximum(-span - least - third, 0.0)
     # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
     upper = (above < below) | ((above <= below) & (most + least > 0.0))
-    x = third + np.where(disc > 0.0, alone, np.where(upper, most, least))
+    x = third + arrays.where(disc > 0.0, alone, arrays.where(upper, most, least))
     for _ in range(2):
         value = ((x - w) * x + linear_) * x + rest
         slope = (3.0 * x - 2.0 * w) * x + linear_
         x = x - value * slope / (slope * slope + NO_CUBIC_SLOPE)
-    return x, np.abs(slope) < LEVEL_ROOT
+    return x, arrays.absolute(slope) < LEVEL_ROOT
 
 
-def _longest(sizes: list[Entry], vectors: list[list[Entry]]) -> list[Entry]:
+def _longest(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:
     """That of three vectors whose size is the largest."""
     later = sizes[1] > sizes[0]
-    size = np.maximum(sizes[0], sizes[1])
+    size = arrays.maximum(sizes[0], sizes[1])
     last = sizes[2] > size
-    return [np.where(last, z, np.where(later, y, x)) for x, y, z in zip(*vectors, strict=True)]
+    return [arrays.where(last, z, arrays.where(later, y, x)) for x, y, z in zip(*vectors, strict=True)]

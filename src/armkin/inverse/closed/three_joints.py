@@ -15,7 +15,7 @@ Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -116,7 +116,7 @@ class Position:
         x, y, z = pose.apply(self.from_base, p)
         square = x * x + y * y + z * z
         # a slide may be far longer than the links
-        size = np.sqrt(self.scale**2 + square) if any(self.prismatic) else self.scale
+        size = arrays.sqrt(self.scale**2 + square) if any(self.prismatic) else self.scale
         known = [x, y] if self.prismatic[0] else [z, 0.5 * square]
         known = [arrays.sub(value, float(rest)) for value, rest in zip(known, self.rest, strict=True)]
         if self.prismatic[1]:
@@ -148,7 +148,7 @@ class Position:
         if not self.prismatic[2]:
             # |y|^2 is affine in (cos, sin) although its form is quadratic: cos^2 + sin^2 = 1
             fixed[[0, 3, 5]] += fixed[5] * np.array([1.0, -1.0, -1.0])
-        six: list[Entry] = fixed.tolist()
+        six = cast("list[Entry]", fixed.tolist())
         six[0] = arrays.add(six[0], arrays.dot(weights.tolist(), known))
         return six
 
@@ -181,7 +181,7 @@ class Position:
                 turn, doubt = trig_quadratic(form, size * size)
                 d = size * half_tangent(turn)
                 if prefer[2] is not None and np.any(doubt.free):
-                    d = np.where(doubt.free, prefer[2].c, d)
+                    d = arrays.where(doubt.free, prefer[2].c, d)
                 third = Pair(d, None)
         gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
         y = self._tip(third)

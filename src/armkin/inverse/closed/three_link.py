@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.elbow import TwoLink, together
@@ -37,8 +35,8 @@ class ThreeLink:
         c23, s23 = together(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
         # its angle is what is left of the sum: one arctangent for both elbows
-        q2, q3 = (np.arctan2(pair.s, pair.c) for pair in (second, third))
-        left = arrays.wrapped(arrays.sub(np.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
+        q2, q3 = (arrays.arctan2(pair.s, pair.c) for pair in (second, third))
+        left = arrays.wrapped(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
         return [second, third, fourth], [q2, q3, arrays.mul(self.sense4, left)], doubt
 
     def miss(self, pairs: list[Pair], p: list[Entry]) -> tuple[Entry, Entry]:

@@ -9,12 +9,13 @@ convention). The chain walked from the tool to the base covers axes 3, 4 and 5.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.precision import precision
@@ -145,6 +146,6 @@ class ThreeParallel:
         return Candidates([first, *pairs, fifth, sixth], doubt, miss, [None, *angles, None, None])
 
 
-def _unrotate(c: Array, s: Array, v: list[Array]) -> list[Array]:
+def _unrotate(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:
     """``Rz(-q) v``."""
     return [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]

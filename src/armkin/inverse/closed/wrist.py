@@ -83,14 +83,14 @@ class Wrist:
     ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]
-        fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, np.sqrt(disc)))
+        fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, arrays.sqrt(disc)))
         fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
         sign = signs(2)
         flipped = 0.5 - 0.5 * sign
-        q4, q6 = (np.arctan2(s, c) for c, s in (fourth, sixth))
+        q4, q6 = (arrays.arctan2(s, c) for c, s in (fourth, sixth))
         angles: list[Entry | None] = [
-            q4 - flipped * np.copysign(np.pi, q4),
-            sign * np.arctan2(fifth.s, fifth.c),
-            q6 - flipped * np.copysign(np.pi, q6),
+            q4 - flipped * arrays.copysign(np.pi, q4),
+            sign * arrays.arctan2(fifth.s, fifth.c),
+            q6 - flipped * arrays.copysign(np.pi, q6),
         ]
         return [fourth, fifth, sixth], angles, (disc < precision().sharp) | doubt4, wrong

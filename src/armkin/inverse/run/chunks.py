@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Bool, Entry, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
@@ -73,7 +73,7 @@ def solve(
             found, workspace = _candidates(runner, goal, columns, workspace)
             there = None
             if examine:
-                first = goal[:, 0] if columns is None else columns[9]
+                first = goal[:, 0] if columns is None else cast("Array", columns[9])
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
             left.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
@@ -117,6 +117,7 @@ def _keep(
     there: `near_itself.reached`, if that is asked.
     """
     arm = goals.arm
+    doubt: Any  # flags
     *values, miss, doubt, _ = found
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
@@ -158,7 +159,7 @@ def _every_branch(B: int, N: int) -> NDArray[np.int8]:
     return np.tile(np.arange(B, dtype=np.int8), (N, 1))
 
 
-def _doubted(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.intp]:
+def _doubted(miss: Array, valid: Bool, doubt: Truth, full: bool) -> NDArray[np.intp]:
     """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
 
     miss, valid: (B, N); full: valid everywhere.
@@ -174,7 +175,7 @@ def _doubted(miss: Array, valid: Bool, doubt: Entry, full: bool) -> NDArray[np.i
     return np.unique(edge) if len(edge) else edge
 
 
-def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Entry]:
+def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Truth]:
     """A joint's values at their nearest legal copies, and whether they are within limits."""
     lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
     if not arm.prismatic[joint]:

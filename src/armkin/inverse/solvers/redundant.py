@@ -112,7 +112,7 @@ def _moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> 
         return pose.times(G, goal)
     p = free.task.position
     out = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
-    angle = np.arctan2(s, c)
+    angle = arrays.arctan2(s, c)
     for k, by in enumerate(free.task.sums[:, 0].tolist(), p):
         out.append(arrays.sub(goal[k], arrays.mul(by, angle)))
     return [*out, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]

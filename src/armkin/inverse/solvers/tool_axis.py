@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula import pose
+from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Prefer
@@ -64,7 +64,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
 def pose_of(goal: list[Entry]) -> pose.Pose:
     """A pose at x y z whose z axis is ax ay az; x is across, without a jump near the poles' axis (Duff et al. 2017)."""
     x, y, z = goal[3:6]
-    sign = np.copysign(1.0, z)
+    sign = arrays.copysign(1.0, z)
     a = -1.0 / (sign + z)
     b = x * y * a
     return [1.0 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y, x, y, z, *goal[:3]]

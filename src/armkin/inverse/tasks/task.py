@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -157,9 +157,9 @@ def rotation_check() -> StraightLineCode:
         x, y, z = P[0:3], P[3:6], P[6:9]
         off = [arrays.dot(x, x) - 1.0, arrays.dot(z, z) - 1.0, arrays.dot(x, z)]
         off += [arrays.sub(a, b) for a, b in zip(arrays.cross(z, x), y, strict=True)]
-        worst = np.abs(off[0])
+        worst = arrays.absolute(off[0])
         for e in off[1:]:
-            worst = np.maximum(worst, np.abs(e))
+            worst = arrays.maximum(worst, arrays.absolute(e))
         return [worst]
 
     return StraightLineCode(formula, 12)
@@ -179,6 +179,9 @@ def nearest_rotation(R: Array) -> Array:
     Two steps of Newton and Schulz, R (3 - R^T R) / 2, each of which squares the distance
     (Higham, Functions of Matrices, 2008, eq. 8.20).
     """
+    x: list[Any]
+    y: list[Any]
+    z: list[Any]
     x, y, z = ([R[:, row, column] for row in range(3)] for column in range(3))
     for _ in range(2):
         xx, yy, zz = (1.5 - 0.5 * arrays.dot(v, v) for v in (x, y, z))
