@@ -22,13 +22,14 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
+from armkin.formula.shapes import Figures, Frames, Jacobians, Joints, Points, Poses
 from armkin.formula.trace import LazyCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def fk(arm: Arm, q: ArrayLike) -> Array:
+def fk(arm: Arm, q: ArrayLike) -> Poses:
     """Pose of the tool for joint values.
 
     q: (..., n) [rad | mm]. Returns (..., 4, 4) [mm].
@@ -45,7 +46,7 @@ def fk(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, values, (4, 4), tip_formula)
 
 
-def position(arm: Arm, q: ArrayLike) -> Array:
+def position(arm: Arm, q: ArrayLike) -> Points:
     """Position of the tool alone, at about half the cost of `fk`.
 
     q: (..., n) [rad | mm]. Returns (..., 3) [mm].
@@ -62,7 +63,7 @@ def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
     return _recorded(arm, point_formula).always().numbers()
 
 
-def frames(arm: Arm, q: ArrayLike) -> Array:
+def frames(arm: Arm, q: ArrayLike) -> Frames:
     """Pose of the base, of every joint's frame and of the tool.
 
     q: (..., n) [rad | mm]. Returns (..., n + 2, 4, 4) [mm]. Joint frames are those of the
@@ -73,7 +74,7 @@ def frames(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames)
 
 
-def jacobian(arm: Arm, q: ArrayLike) -> Array:
+def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
     """Geometric Jacobian of the tool in the base's axes, linear rows first.
 
     q: (..., n) [rad | mm]. Returns (..., 6, n) [mm/rad, 1; prismatic: 1, 0]
@@ -83,7 +84,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Array:
     return _batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
 
 
-def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
+def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
     values = as_joints(arm, q)
     both = _batched(arm, values, (16 + 6 * arm.n,), _both)
@@ -91,7 +92,7 @@ def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     return both[..., :16].reshape(*lead, 4, 4), both[..., 16:].reshape(*lead, 6, arm.n)
 
 
-def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
     """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
 
     q: (..., n) [rad | mm]; rows: which rows of the Jacobian count, by default the linear
@@ -104,7 +105,7 @@ def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None
     return product
 
 
-def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Array:
+def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
     """Condition number of the Jacobian, its linear rows divided by the arm's reach.
 
     q: (..., n) [rad | mm]; rows as in `manipulability`. Returns (...), inf at a singularity.
@@ -148,7 +149,7 @@ def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
     return values
 
 
-def as_joints(arm: Arm, q: ArrayLike) -> Array:
+def as_joints(arm: Arm, q: ArrayLike) -> Joints:
     """``q`` as a float array with the arm's number of joints on its last axis."""
     values = arrays.real(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n:

@@ -2,6 +2,7 @@
 
 arrays.py       entries: arrays over the batch, or numbers known to be constant
 pose.py         transforms as twelve entries
+shapes.py       names for the shapes of arrays
 recording.py    a formula run once on symbols, its operations kept as a list
 numpy_code.py   that list as numpy calls, for batches
 python_code.py  as plain Python, for one pose

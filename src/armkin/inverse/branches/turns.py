@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Truth, wrapped
+from armkin.formula.shapes import Joints
 from armkin.forward import one_pose
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.model.arm import actual
@@ -146,7 +147,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     return out, inside
 
 
-def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Array:
+def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
     q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n); of equal motions the copy above `near` is first.

@@ -1,0 +1,15 @@
+"""Names for the shapes of arrays: what a signature returns; n is the arm's number of joints, ... the batch.
+
+They are `Array` for the type checker and at run time; the name tells the reader the shape.
+"""
+
+from __future__ import annotations
+
+from armkin.formula.arrays import Array
+
+Joints = Array  # (..., n) joint values [rad | mm]
+Points = Array  # (..., 3) positions of the tool [mm]
+Poses = Array  # (..., 4, 4) homogeneous transforms [mm]
+Frames = Array  # (..., n + 2, 4, 4) base, joints' frames and tool [mm]
+Jacobians = Array  # (..., 6, n) linear rows first [mm/rad, 1; prismatic: 1, 0]
+Figures = Array  # (...) one number a posture
