@@ -43,8 +43,9 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, 
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
-# of a span, where |g| is compared: what rises above `SOLUTION` between two of them does so by less than a thousandth
-POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 0.005, 24), np.linspace(0.01, 1.0, 199)])
+STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
+# of a span, where |g| is compared
+POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 HALVINGS = 20  # of an interval between two points: to a millionth of it
