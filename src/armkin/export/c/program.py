@@ -72,6 +72,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "first": "9" if task.orientation == "full" else "0",
         "reach": number(arm.reach, single),
         "orientation": _orientation(arm, task, single),
+        "most": "arm_most(target)" if task.orientation == "full" else "ARM_SOLUTION",
         "elsewhere": part("elsewhere").replace("@reach@", number(arm.reach, single))
         if geometry.pairs is not None
         else "",

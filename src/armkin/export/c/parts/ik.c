@@ -111,7 +111,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int 
         one->residual = ARM_SQRT(miss[b]);
         count++;
     }
-    return arm_stay(near, stand, goal, q, out, count, arm_most(target));
+    return arm_stay(near, stand, goal, q, out, count, @most@);
 }
 
 int arm_best(const arm_solution *found, int count, const arm_real *near)

@@ -15,10 +15,3 @@ static int arm_read(const arm_real *target, arm_real *goal)
         goal[i] /= length;
     return 1;
 }
-
-/* The square of what `near` may miss a target by. */
-static arm_real arm_most(const arm_real *target)
-{
-    (void)target;
-    return ARM_SOLUTION;
-}

@@ -9,10 +9,3 @@ static int arm_read(const arm_real *target, arm_real *goal)
     }
     return 1;
 }
-
-/* The square of what `near` may miss a target by. */
-static arm_real arm_most(const arm_real *target)
-{
-    (void)target;
-    return ARM_SOLUTION;
-}
