@@ -42,10 +42,8 @@ class Knots:
         c2, c3 = 3 * chord - 2 * d0 - d1, d0 + d1 - 2 * chord
         return self.q[i] + f * (d0 + f * (c2 + f * c3)), (d0 + f * (2 * c2 + 3 * f * c3)) / h
 
-    def second(self) -> tuple[Array, Array]:
-        """q'' at the left and the right end of every interval: (N - 1, n) twice."""
-        h = self.h[:, None]
-        chord = (self.q[1:] - self.q[:-1]) / h
-        left = (6 * chord - 4 * self.d[:-1] - 2 * self.d[1:]) / h
-        right = (-6 * chord + 2 * self.d[:-1] + 4 * self.d[1:]) / h
-        return left, right
+    def second(self, some: slice | Int = slice(None)) -> tuple[Array, Array]:
+        """q'' at the left and the right end of intervals, by default of all: (M, n) twice."""
+        h, d0, d1 = self.h[some, None], self.d[:-1][some], self.d[1:][some]
+        chord = (self.q[1:][some] - self.q[:-1][some]) / h
+        return (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h

@@ -75,15 +75,13 @@ class Bound:
     def of(self, some: Some) -> Motion:
         """What is bounded along some of the intervals."""
         path = self.path
-        h, d0, d1 = path.h[some, None], path.d[:-1][some], path.d[1:][some]
-        chord = (path.q[1:][some] - path.q[:-1][some]) / h
-        left, right = (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h
+        first, (left, right) = path.d[:-1][some], path.second(some)
         low = np.minimum(self.accel[:-1][some], self.accel[1:][some])  # between two limits the lower one counts
         if self.weights is not None:
             weights, most = self.weights
-            d0, left, right = (np.concatenate([x, x @ weights.T], axis=1) for x in (d0, left, right))
+            first, left, right = (np.concatenate([x, x @ weights.T], axis=1) for x in (first, left, right))
             low = np.concatenate([low, np.broadcast_to(most, (len(low), len(most)))], axis=1)
-        first, left, right, low = (np.ascontiguousarray(each.T) for each in (d0, left, right, low))
+        first, left, right, low = (np.ascontiguousarray(each.T) for each in (first, left, right, low))
         return Motion(first, left, right - left, path.h[some], low)
 
 
