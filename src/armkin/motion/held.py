@@ -13,6 +13,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
+from armkin.motion import path_numbers
 from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.free import checked
@@ -52,7 +53,7 @@ def path_held(
         name: np.asarray(value)[kept] for name, value in (("near", near), ("jerk", jerk)) if value is not None
     }
     try:
-        plan = planned(free, moves, start=here[kept], **parts, **options)
+        plan = planned(free, path_numbers.moves(free, moves, options.get("task")), start=here[kept], **parts, **options)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.motion import path_numbers, wrist_turn
+from armkin.motion import wrist_turn
 from armkin.motion.branch_path import Pace
 from armkin.motion.free import checked
 from armkin.motion.moves import MOVES
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import check_jerk, check_rates, check_share
+from armkin.motion.plan import check_jerk, check_share
 from armkin.motion.walk import Walk, Wishes
 from armkin.motors import settled, undriven
 
@@ -29,7 +27,7 @@ HOLD = 1.5  # of max_accel, on a hold
 
 def planned(
     arm: Arm,
-    moves: str | os.PathLike[str] | PathFile | Mapping[str, Any] | ArrayLike,
+    file: PathFile,
     *,
     start: ArrayLike | None = None,
     near: ArrayLike | None = None,
@@ -46,12 +44,10 @@ def planned(
     split: bool = False,
     samples: int | None = None,
 ) -> PathPlan:
-    """`armkin.path` of an arm none of whose joints is redundant: arguments and errors are those."""
+    """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
     from armkin.path_file import check_robot
     from armkin.path_file.model import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
-    check_rates(arm)
-    file = path_numbers.moves(arm, moves, task)
     check_robot(file, arm.name, arm.path)
     for name, value in (("speed", speed), ("accel", accel)):
         check_share(name, value)
