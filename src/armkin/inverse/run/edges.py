@@ -26,18 +26,17 @@ class Doubts(NamedTuple):
     free: Bool
 
 
-def as_doubts(runner: Recorded, found: list[Array], rows: NDArray[np.intp], some: NDArray[np.intp]) -> Doubts:
-    """Some of the targets that candidates were found for, as targets `rows` of a batch."""
-    shape = (*runner.axes, len(some))
+def _doubts(runner: Recorded, found: list[Array], rows: NDArray[np.intp]) -> Doubts:
+    """The targets that candidates were found for, as targets `rows` of a batch."""
+    shape = (*runner.axes, len(rows))
 
-    def of_some(entry: Array) -> Array:
+    def of_each(entry: Array) -> Array:
         """Of every branch and target, (K, B)."""
-        own = entry[..., some] if np.ndim(entry) and entry.shape[-1] > 1 else entry  # constants are numbers
-        return np.broadcast_to(own, shape).reshape(-1, len(some)).T
+        return np.broadcast_to(entry, shape).reshape(-1, len(rows)).T
 
     *values, _, _, free = found
-    q = np.stack([of_some(value) for value in values], axis=2)
-    return Doubts(rows, q, np.asarray((of_some(free) > 0).any(axis=1)))
+    q = np.stack([of_each(value) for value in values], axis=2)
+    return Doubts(rows, q, np.asarray((of_each(free) > 0).any(axis=1)))
 
 
 def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) -> Batch:
@@ -47,7 +46,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
     """
     _, _, target, near = goals
     # what is singular hangs on the last digit
-    some = as_doubts(runner, runner.in_numbers(target[rows]), rows, np.arange(len(rows)))
+    some = _doubts(runner, runner.in_numbers(target[rows]), rows)
     freed = _freed(goals, runner, some)
     out, done = _on_linkages(goals, runner, out, some, freed)
     open_ = ~done
