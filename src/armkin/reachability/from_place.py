@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 BLOCK = 8_192  # targets that are asked together: what is known of them stays in the cache
+BEYOND = 1e-6  # reaches: farther away nothing solves a target
 
 
 class Question(NamedTuple):
@@ -82,25 +83,55 @@ def _counted(question: Question, at: Array, legal: NDArray[np.bool_]) -> NDArray
 
 def _legal_yaws(question: Question, at: Array) -> NDArray[np.bool_]:
     """Which targets are reached from positions (P, 2) at each yaw: (P, N, K)."""
-    arm, N, K = question.arm, len(question.targets), question.yaws
-    turns = (np.arange(K) * question.step).tolist()
-    if not question.arcs:
+    N, K = len(question.targets), question.yaws
+    if question.arm.keep_out or question.around.keep_out:
+        turns = (np.arange(K) * question.step).tolist()
         return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in at])
     target, place = np.tile(np.arange(N), len(at)), np.repeat(at, N, axis=0)
-    goals = seen_from(question._replace(targets=question.targets[target]), place, 0.0)
-    legal = np.zeros((len(goals), K), bool)
-    near = np.linalg.norm(positions_of(question.task, goals), axis=1) <= 2 * arm.reach + np.linalg.norm(arm.base[:3, 3])
-    some = np.flatnonzero(near)
+    legal = (_by_arcs if question.arcs else _yaw_by_yaw)(question, target, place)
+    return legal.reshape(len(at), N, K)
+
+
+def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
+    """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
+    arm, K = question.arm, question.yaws
+    legal = np.zeros((len(target), K), bool)
+    some = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
     if len(some):
-        s = ik(arm, goals[some], question.task.name)
+        goals = seen_from(question._replace(targets=question.targets[target[some]]), place[some], 0.0)
+        s = ik(arm, goals, question.task.name)
         allowed = s.valid & inside(arm, s.q, range(1, arm.n))
         first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
         legal[some] = _covered(first, np.where(allowed, length, 0), K)
         edge = some[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
-        if len(edge):
-            asked = question._replace(targets=question.targets[target[edge]])
-            legal[edge] = np.stack([legal_from(asked, place[edge], turn) for turn in turns], axis=1)
-    return legal.reshape(len(at), N, K)
+        legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
+    return legal
+
+
+def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
+    """The same by a solve for each yaw, many together."""
+    turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
+    legal = _within_reach(question, target, place, turns)
+    row, turn = np.nonzero(legal)
+    for start in range(0, len(row), BLOCK):
+        m, k = row[start : start + BLOCK], turn[start : start + BLOCK]
+        goals = seen_from(question._replace(targets=question.targets[target[m]]), place[m], turns[k])
+        legal[m, k] = ik(question.arm, goals, question.task.name).within_limits.any(axis=1)
+    return legal
+
+
+def _within_reach(question: Question, target: NDArray[np.intp], place: Array, turns: Array) -> NDArray[np.bool_]:
+    """Which targets (M,) are near enough to joint 1, of an arm at places (M, 2) and yaws (K,), to be reached: (M, K).
+
+    Others are not asked: no point of an arm is farther from its joint 1 than its reach.
+    """
+    arm = question.arm
+    foot = arm.link[0][:3, 3] @ np.swapaxes(rotation_about(2, turns), 1, 2) + [0.0, 0.0, question.z]
+    p = positions_of(question.task, question.targets)[target]
+    away = np.zeros((len(p), len(turns)))
+    for i in range(p.shape[1]):
+        away += ((p[:, i] - (place[:, i] if i < 2 else 0.0))[:, None] - foot[:, i]) ** 2
+    return np.asarray(away <= (arm.reach * (1.0 + BEYOND)) ** 2)
 
 
 def _covered(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
@@ -152,19 +183,24 @@ def free_from(question: Question, at: Array, turn: float, within: bool = True) -
     return s, np.asarray(legal)
 
 
-def seen_from(question: Question, at: Array, turn: float) -> Array:
-    """The targets in the frame of an arm at a place (2,), or each in that of one at a place of its own (N, 2)."""
+def seen_from(question: Question, at: Array, turn: float | Array) -> Array:
+    """The targets in the frame of an arm at a place (2,) and yaw, or each from a place (N, 2) and yaw of its own."""
     task, targets = question.task, question.targets.copy()
-    R = rotation_about(2, -turn)
     shift = np.concatenate([at, np.full((*at.shape[:-1], 1), question.z)], axis=-1)
+    c, s = np.asarray(np.cos(turn)), np.asarray(np.sin(turn))
     if task.orientation == "full":
-        targets[:, :3, 3] = (targets[:, :3, 3] - shift) @ R.T
-        targets[:, :3, :3] = R @ targets[:, :3, :3]
+        targets[:, :3, 3] -= shift
+        _turn_back(targets[:, 0], targets[:, 1], np.expand_dims(c, -1), np.expand_dims(s, -1))
         return targets
     k = task.position
-    targets[:, :k] = (targets[:, :k] - shift[..., :k]) @ R[:k, :k].T
-    if task.orientation == "axis":
-        targets[:, 3:6] = targets[:, 3:6] @ R.T
+    targets[:, :k] -= shift[..., :k]
+    for first in (0, 3) if task.orientation == "axis" else (0,):
+        _turn_back(targets[:, first], targets[:, first + 1], c, s)
     if task.name in ("xy_theta", "xyz_yaw"):
         targets[:, k] -= turn
     return targets
+
+
+def _turn_back(x: Array, y: Array, c: Array, s: Array) -> None:
+    """Coordinates x and y, in place, in a frame turned about z by the angle of that cosine and sine."""
+    x[...], y[...] = c * x + s * y, c * y - s * x
