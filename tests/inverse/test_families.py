@@ -158,3 +158,12 @@ def test_where_no_branch_is_real_the_linking_of_an_elimination_goes_on() -> None
     there = find.one(np.zeros(2, int), np.zeros(2, int), np.array([0.1, 0.2]), np.zeros((2, 7)))
     assert not there.valid.any()
     assert there.q.shape == (2, 7)
+
+
+def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:
+    arm = armkin.load("panda")
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, (3000, 7))[7]
+    found = armkin.ik(arm, armkin.fk(arm, q))
+    assert found.status == Status.EXACT
+    assert found.valid.any()
+    assert not found.within_limits.any()

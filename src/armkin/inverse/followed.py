@@ -121,7 +121,7 @@ class Follower(NamedTuple):
     def motion(self, rows: NDArray[np.intp], q: Array) -> Array:
         """Sum of |change| from near [deg | mm]: q (M, ..., n) -> (M, ...); inf where there is no posture."""
         unit = np.where(self.arm.prismatic, 1.0, 180 / np.pi)
-        near = self.near[rows].reshape(len(rows), *[1] * (q.ndim - 2), -1)
+        near = self.near[rows].reshape(len(rows), *[1] * (q.ndim - 2), self.near.shape[1])
         total = (np.abs(q - near) * unit).sum(axis=-1)
         return np.where(np.isnan(total), np.inf, total)
 
