@@ -89,6 +89,8 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
         ("wx250s", [-90, 90, 90, -90, -90, 0]),  # rings of four self-motions, each of which crosses two others
         ("thor", [-90, 0, 0, 0, 0, -90]),  # home is half a turn off, which has no sine: it is no solution
         ("puma560", [0, 0, 0, 0, -180, 90]),
+        # eight roots, of which two are 0.05 rad apart with a residual of 1.013e-9 between them
+        ("puma560", [-4.813044711, 145.125268461, 92.595802989, -165.626017016, -44.831758543, 29.670348965]),
         ("xarm6", [90, 135, 45, 0, -180, 180]),  # a root of third order, whose second difference is zero
         ("niryo_ned2", [-180, 180, -90, 0, 0, -180]),  # a root known to 4e-4 rad, and nowhere along it a better one
     ],

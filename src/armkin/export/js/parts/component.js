@@ -5,6 +5,10 @@ const NODES = 10;
 const SMOOTH = 1e-5; // of a span: how far the series may be off their curve
 const ARRIVED = 1e-9; // [rad, reaches] a step that ends the iteration
 const FINEST = 3e-6; // of a span: the first point at which |g| is compared
+const STEPS = 200; // equal ones of a span: what rises above SOLUTION within one does so by less than a thousandth
+// of a span, where |g| is compared
+const POINTS = [0, ...Array.from({ length: 24 }, (_, k) => FINEST * (1 / STEPS / FINEST) ** (k / 23))];
+for (let k = 2; k <= STEPS; k++) POINTS.push(k / STEPS);
 const FINE = 32; // parts of a component at whose ends its slope is compared
 
 /** @typedef {{span: number, v: number[], second: number, low: number, high: number, moves: number[], boundary: boolean,
@@ -138,8 +142,7 @@ function decided(x, g, span) {
   const over = (/** @type {number} */ s) => Math.hypot(...chebyshev(g, s)) > SOLUTION;
   const [low, high] = [-1, 1].map((sign) => {
     let inner = 0;
-    for (let k = 0; k <= 40; k++) {
-      let outer = k < 40 ? FINEST * (0.9 / FINEST) ** (k / 39) : 1;
+    for (let outer of POINTS) {
       if (!over(sign * outer)) {
         inner = outer;
         continue;

@@ -5,6 +5,7 @@ const SOLUTION = 1e-9; // of the reach, rad
 const REACH = 0.1; // rad or reaches: a component in which a joint moves so far is a self-motion
 const SPLIT = 1e-3; // singular value below which a direction is nearly lost; a turning point within SOLUTION needs 1e-4
 const STRIDE = 0.05; // rad or reaches between neighbouring postures of a self-motion
+const MOVED = 1e-3; // of the way: a joint that moves less along a self-motion does not move
 const FREE = 1e-5; // joints that a self-motion holds move by less
 
 /** @param {Numbers} q @param {Numbers} v @param {number} by [rad, reaches] */
@@ -125,16 +126,18 @@ function ways(V) {
  * What the solution set is around a posture that solves the target.
  * @param {number[]} q @param {Numbers} goal @param {number[][][]} known self-motions that need not be followed again
  * @returns {{kind: 'exact' | 'boundary' | 'curve' | 'surface', paths: number[][][], crossings: number[][], moves?: number[], at?: Component}} paths of the
- *   self-motions through it, and where others meet them; of a surface, how far each joint moves along it
+ *   self-motions through it, and where others meet them; how far each joint moves along it, as far as that is known
  */
 function structure(q, goal, known) {
   const { V } = lost(q, SPLIT);
   if (!V.length) return { kind: 'exact', paths: [], crossings: [] };
   if (V.length === 1) {
     const at = component(q, goal);
-    if (at && Math.max(...at.moves) < REACH) return { kind: at.boundary ? 'boundary' : 'exact', paths: [], crossings: [], at };
+    const most = Math.max(0, ...(at?.moves ?? []));
+    if (at && most < REACH) return { kind: at.boundary ? 'boundary' : 'exact', paths: [], crossings: [], at };
     const { path, extent, crossings } = follow(q, V[0], goal);
-    return extent >= REACH ? { kind: 'curve', paths: [path], crossings } : { kind: 'exact', paths: [], crossings: [] };
+    if (extent < REACH) return { kind: 'exact', paths: [], crossings: [] };
+    return { kind: 'curve', paths: [path], crossings, moves: at?.moves.map((x) => (x > MOVED * most ? x : 0)) };
   }
   // several directions: self-motions that cross here are met again beside it
   /** @type {number[][][]} */
