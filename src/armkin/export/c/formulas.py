@@ -23,11 +23,13 @@ def goal_size(task: Task) -> int:
     return 12 if task.orientation == "full" else len(task.labels)
 
 
-def candidates(arm: Arm, task: Task, geometry: Geometry, prefer: bool = True) -> recording.Recording:
+def candidates(
+    arm: Arm, task: Task, geometry: Geometry, prefer: bool = True, measured: bool = False
+) -> recording.Recording:
     """A closed form's candidates: joint values, their squared residual, doubt.
 
-    Inputs: the target's numbers; with `prefer` also what a free joint is given: a cosine and a sine for each joint, or
-    the value of a slide.
+    `measured`: before the doubt the residual's two parts, of lengths and of angles. Inputs: the target's numbers; with
+    `prefer` also what a free joint is given: a cosine and a sine for each joint, or the value of a slide.
     """
     recorded, n, entries = Recorded(arm, task, geometry), arm.n, goal_size(task)
 
@@ -38,7 +40,8 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, prefer: bool = True) ->
             for j in range(n):
                 held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
                 at += 1 if arm.prismatic[j] else 2
-        return recorded.candidates(inputs[:entries], held)[:-1]  # which joints are free is of no use here
+        of = recorded.measured if measured else recorded.candidates
+        return of(inputs[:entries], held)[:-1]  # which joints are free is of no use here
 
     return recording.record(formula, entries + (sum(1 if p else 2 for p in arm.prismatic) if prefer else 0))
 

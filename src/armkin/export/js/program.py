@@ -123,18 +123,19 @@ def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
     n, entries = arm.n, formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
     for j in range(n):
-        turn = [(f"c{j}", f"Math.cos(near[{j}])"), (f"s{j}", f"Math.sin(near[{j}])")]
-        declared += [(f"p{j}", f"near[{j}]")] if arm.prismatic[j] else turn
-    recorded = formulas.candidates(arm, task, geometry)
+        # what is preferred for a joint is asked where that is free, and computed there
+        preferred = [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
+        declared += [(text, "") for text in preferred]
+    recorded = formulas.candidates(arm, task, geometry, measured=True)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
-    *values, miss, _ = formulas.by_branch(recorded, code)
+    *values, miss, length, angle, _ = formulas.by_branch(recorded, code)
     stores = [f"q[{b * n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
-    stores += [f"miss[{b}] = {miss[b]};" for b in range(len(miss))]
+    stores += [f"miss[{k}] = {text};" for k, text in enumerate([*miss, *length, *angle])]
     doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
-    lines = [*(f"const {name} = {text};" for name, text in declared), *code.lines, *stores]
+    lines = [*(f"const {name} = {text};" for name, text in declared if text), *code.lines, *stores]
     lines.append(f"return Boolean({' | '.join(doubts) or 0});")
     head = (
-        "/** Candidate branches, and their squared residual; whether the target is at an edge.\n"
+        "/** Candidate branches; squared residuals, then of lengths and of angles alone; whether it is at an edge.\n"
         " * @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss */\n"
         "function candidates(goal, near, q, miss)"
     )

@@ -16,7 +16,7 @@ from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
 from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import Pair, Prefer, distance2, spin
+from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE, TURNED
@@ -54,12 +54,27 @@ class Recorded:
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
         """Joint values of all candidates, their squared residual, edge and free of `Doubt`: n + 3 arrays."""
         assert self.geometry.pairs is not None
-        found = self.geometry.pairs(goal, prefer)
+        return self._of(self.geometry.pairs(goal, prefer), goal)
+
+    def _of(self, found: Candidates, goal: list[Entry]) -> list[Entry]:
         miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
         values = found.values()
         if len(self.task.sums):
             miss = arrays.maximum(miss, _sum_miss(self.task, values, goal))
         return [*values, miss, found.doubt.edge, found.doubt.free]
+
+    def measured(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
+        """The same, and behind the squared residual its two parts: of lengths [reaches] and of small angles [rad]."""
+        assert self.geometry.pairs is not None
+        found = self.geometry.pairs(goal, prefer)
+        *values, miss, edge, free = self._of(found, goal)
+        length, *turns = _misses(self.arm, self.task, self.link, found.pairs, goal, every=True)
+        angle: Entry = 0.0
+        for turn in turns:  # three axes are a turn's square off twice over
+            angle = arrays.add(angle, arrays.mul(1.0 / max(len(turns) - 1, 1), turn))
+        if len(self.task.sums):
+            angle = arrays.add(angle, _sum_miss(self.task, values, goal))
+        return [*values, miss, length, angle, edge, free]
 
     @cached_property
     def _preferring(self) -> StraightLineCode:
@@ -221,10 +236,20 @@ def entries(task: Task, goal: Array) -> list[Entry]:
 
 
 def _miss(arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:
-    """Squared residual of every branch, from its pairs, lengths in units of the reach.
+    """Squared residual of every branch, from its pairs, lengths in units of the reach."""
+    total, *rest = _misses(arm, task, link, pairs, goal)
+    for one in rest:
+        total = total + one
+    return total
 
-    The tool's point, and for orientations its x and z axes (two columns of a rotation
-    determine the third), carried from the tool back to the base.
+
+def _misses(
+    arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: list[Entry], every: bool = False
+) -> list[Entry]:
+    """Squared distances of every branch: of the tool's point, in units of the reach, and of its axes.
+
+    For orientations the tool's x and z axes (two columns of a rotation determine the third; `every`: that one, too) are
+    carried from the tool back to the base.
     """
     p, axes = link[-1][9:12], {"none": (), "axis": (6,), "full": (0, 6)}[task.orientation]
     columns = [link[-1][k : k + 3] for k in axes]
@@ -239,11 +264,11 @@ def _miss(arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: 
         columns = [pose.turn(link[i], v) for v in columns]
     full = task.orientation == "full"
     where = goal[9:12] if full else goal[: task.position]
-    total = arrays.mul(1.0 / arm.reach**2, distance2(p, where))
     wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
-    for v, w in zip(columns, wanted, strict=False):
-        total = total + distance2(v, w)
-    return total
+    if full and every:
+        columns, wanted = [*columns, arrays.cross(columns[1], columns[0])], [*wanted, goal[3:6]]
+    length = arrays.mul(1.0 / arm.reach**2, distance2(p, where))
+    return [length, *(distance2(v, w) for v, w in zip(columns, wanted, strict=False))]
 
 
 def _sum_miss(task: Task, values: list[Entry], goal: list[Entry]) -> Entry:

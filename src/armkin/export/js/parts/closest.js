@@ -20,7 +20,7 @@ function closest(goal, near, others) {
   const equal = last.filter((one) => one.cost <= least * (1 + 1e-9) + 1e-18);
   const best = equal.reduce((a, b) => (b.moved < a.moved ? b : a));
   misses(best.q, goal);
-  return { q: best.q, distance: missedLength * ARM.reach, angle: missedAngle };
+  return { q: best.q, distance: off2[0] * ARM.reach, angle: off2[1] };
 }
 
 /** A descent within limits. @param {number[]} q @param {Numbers} goal @param {number} damping @param {number} steps */

@@ -6,11 +6,15 @@ const DECIMAL = 4e-16; // relative distance of a number from a decimal one that 
 const STARTS = 48; // postures from which self-motions are searched for
 const DEGREES = 180 / Math.PI;
 
+// of the target that `ik` is asked for; new typed arrays of more than eight numbers cost a microsecond
 const givenNumbers = new Float64Array(ARM.orientation === 'full' ? 16 : ARM.labels.length);
+const goalNumbers = new Float64Array(ARM.orientation === 'full' ? 12 : ARM.labels.length);
+const closeTo = new Float64Array(ARM.joints);
 
 /**
- * A target's numbers as the formulas take them: the columns x, y, z of a pose and its position; an axis of length one.
- * @param {Target} target @returns {{goal: Float64Array, rounding: number}}
+ * A target's numbers as the formulas take them, in `goalNumbers`: the columns x, y, z of a pose and its position; an axis of
+ * length one.
+ * @param {Target} target @returns {number} by how much its pose may be rounded
  */
 function read(target) {
   const wanted = ARM.orientation === 'full' ? 16 : ARM.labels.length;
@@ -30,8 +34,11 @@ function read(target) {
     if (!(length > 1e-12)) throw new RangeError("a target's axis ax ay az has no length; give the direction of the tool's z axis");
     for (let k = 3; k < 6; k++) flat[k] /= length;
   }
-  if (ARM.orientation !== 'full') return { goal: flat.slice(), rounding: 0 };
-  const goal = new Float64Array(12);
+  const goal = goalNumbers;
+  if (ARM.orientation !== 'full') {
+    goal.set(flat);
+    return 0;
+  }
   for (let k = 0; k < 12; k++) goal[k] = flat[4 * (k % 3) + ((k / 3) | 0)];
   let rounding = orthonormalised(goal);
   const given = rounding;
@@ -41,7 +48,7 @@ function read(target) {
   const z = goal[3] * goal[7] - goal[4] * goal[6];
   if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
     throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
-  return { goal, rounding: given > ROUNDED ? Math.max(4 * given, 12 * lastPlace(flat)) : 0 };
+  return given > ROUNDED ? Math.max(4 * given, 12 * lastPlace(flat)) : 0;
 }
 
 /** Half a unit of the last digit of a rotation's entries, or of single precision; 0 where of neither. @param {Float64Array} T */
@@ -80,7 +87,7 @@ function orthonormalised(R) {
 }
 
 const allJoints = new Float64Array(ARM.branches * ARM.joints);
-const allMisses = new Float64Array(ARM.branches);
+const allMisses = new Float64Array(3 * ARM.branches); // squared; of a closed form then of lengths [reaches] and of angles [rad] alone
 
 /**
  * @typedef {object} Row
@@ -95,30 +102,34 @@ function candidate(b) {
   return q;
 }
 
-/**
- * One row for each solution of a target.
- * @param {Float64Array} goal @param {Numbers} near actual joint values
- */
-function solutions(goal, near) {
+/** Candidates of a target, in `allJoints` and `allMisses`; whether it is at an edge. @param {Float64Array} goal @param {Numbers} near */
+function doubted(goal, near) {
   let edge = candidates(goal, near, allJoints, allMisses);
-  /** @type {Row[]} */
-  const rows = [];
   for (let b = 0; b < ARM.branches; b++) {
     const miss = allMisses[b];
     edge = edge || (!(miss <= ACCEPTED) && !(miss > NEARBY));
-    if (miss <= SOLUTION * SOLUTION) rows.push({ q: candidate(b), branch: b, path: undefined });
   }
+  return edge;
+}
+
+/**
+ * One row for each solution of a target of which there are candidates.
+ * @param {Float64Array} goal @param {Numbers} near actual joint values @param {boolean} edge
+ */
+function solutions(goal, near, edge) {
+  /** @type {Row[]} */
+  const rows = [];
+  for (let b = 0; b < ARM.branches; b++) if (allMisses[b] <= SOLUTION ** 2) rows.push({ q: candidate(b), branch: b });
   const status = /** @type {Status} */ (rows.length ? 'exact' : 'unreachable');
   if (!edge) return { rows, status, complete: true, free: /** @type {number[]} */ ([]) };
-  /** @type {Row[]} */
-  const seeds = [...rows];
+  const seeds = rows.slice();
   const seed = (/** @type {Numbers} */ at, /** @type {Numbers} */ prefer, /** @type {number} */ most) => {
     const doubt = candidates(at, prefer, allJoints, allMisses);
     for (let b = 0; b < ARM.branches; b++) {
       if (!(allMisses[b] <= most) || seeds.some((one) => apart(one.q, candidate(b)) < 1e-7)) continue;
       const found = newton(candidate(b), goal, 40);
       const known = seeds.some((one) => apart(one.q, found.q) < 1e-7);
-      if (found.missed <= SOLUTION && !known) seeds.push({ q: found.q, branch: b, path: undefined });
+      if (found.missed <= SOLUTION && !known) seeds.push({ q: found.q, branch: b });
     }
     return doubt;
   };
@@ -139,7 +150,7 @@ function solutions(goal, near) {
         const even = one.q.map((x, j) => (ARM.slides[j] ? x : (Math.PI / 4) * rint(x / (Math.PI / 4))));
         one = newton(even, goal, 10);
       }
-      if (one.missed <= SOLUTION && !seeds.some((other) => apart(other.q, one.q) < 1e-7)) seeds.push({ q: one.q, branch: 0, path: undefined });
+      if (one.missed <= SOLUTION && !seeds.some((other) => apart(other.q, one.q) < 1e-7)) seeds.push({ q: one.q, branch: 0 });
     }
     found = components(seeds, goal);
   }
@@ -237,19 +248,28 @@ function straight(a, b, goal) {
   );
 }
 
+const LOWEST = ARM.lower.map((x) => x - SLACK);
+const HIGHEST = ARM.upper.map((x) => x + SLACK);
 let copyInside = true;
-let copyMotion = 0; // in degrees and mm
+const copyMotion = new Float64Array(2); // sums of |change|: [degrees, mm] and [rad, mm]
 
 /** Turns a posture into its legal copy nearest to `near`; `copyInside` and `copyMotion` tell of it. @param {number[]} q @param {Numbers} near */
 function legal(q, near) {
-  copyInside = true;
-  copyMotion = 0;
+  let [inside, degrees, plain] = [true, 0, 0];
   for (let j = 0; j < ARM.joints; j++) {
-    const value = nearestCopy(q[j], near[j], ARM.lower[j], ARM.upper[j], ARM.slides[j]);
-    q[j] = value;
-    copyInside = copyInside && value >= ARM.lower[j] - SLACK && value <= ARM.upper[j] + SLACK;
-    copyMotion += (Math.abs(value - near[j]) / ARM.ratio[j]) * (ARM.slides[j] ? 1 : DEGREES);
+    let value = q[j];
+    if (!(Math.abs(value - near[j]) < Math.PI - SLACK && value >= LOWEST[j] && value <= HIGHEST[j])) {
+      value = nearestCopy(value, near[j], ARM.lower[j], ARM.upper[j], ARM.slides[j]);
+      q[j] = value;
+      inside = inside && value >= LOWEST[j] && value <= HIGHEST[j];
+    }
+    const change = CALIBRATED ? Math.abs(value - near[j]) / ARM.ratio[j] : Math.abs(value - near[j]);
+    degrees += ARM.slides[j] ? change : change * DEGREES;
+    plain += change;
   }
+  copyInside = inside;
+  copyMotion[0] = degrees;
+  copyMotion[1] = plain;
   return q;
 }
 
@@ -258,7 +278,7 @@ function nearest(row, near, goal) {
   let best = { q: row.q, rank: -1, motion: Infinity };
   const take = (/** @type {number[]} */ posture) => {
     const q = legal(posture.slice(), near);
-    const { inside, motion } = { inside: copyInside, motion: copyMotion };
+    const { inside, motion } = { inside: copyInside, motion: copyMotion[0] };
     const free = !KEEPS_OUT || hitsOf(q).hits.length === 0;
     const rank = (inside ? 2 : 0) + (free ? 1 : 0);
     const better = rank !== best.rank ? rank > best.rank : motion < best.motion - 1 / EQUAL;
@@ -290,14 +310,29 @@ function nearest(row, near, goal) {
   return legal(best.q, near);
 }
 
+const stoodAt = new Float64Array(ARM.joints).fill(NaN); // the last `near`, and its pose
+const stoodPose = new Float64Array(16);
+
+/** Whether `near` is within limits and solves the target. @param {Float64Array} near @param {Float64Array} goal @param {number} rounding */
+function solvesIt(near, goal, rounding) {
+  let same = true;
+  for (let j = 0; j < ARM.joints; j++) {
+    if (!(near[j] >= LOWEST[j] && near[j] <= HIGHEST[j])) return false;
+    same = same && near[j] === stoodAt[j];
+  }
+  if (!same) {
+    stoodAt.set(near);
+    poseOf(near, stoodPose);
+  }
+  apartFrom(stoodPose, near, goal);
+  return off2[0] * off2[0] + off2[1] * off2[1] <= (SOLUTION + rounding) ** 2;
+}
+
 /**
- * `near` itself, where it is within limits and solves the target: the arm that stands there stays.
+ * `near`, which is within limits and solves the target, is one of its rows: the arm that stands there stays.
  * @param {Found[]} found @param {Numbers} near @param {Float64Array} goal @param {number} rounding
  */
 function stay(found, near, goal, rounding) {
-  for (let j = 0; j < ARM.joints; j++) if (!(near[j] >= ARM.lower[j] - SLACK && near[j] <= ARM.upper[j] + SLACK)) return;
-  misses(near, goal);
-  if (!(missedLength * missedLength + missedAngle * missedAngle <= (SOLUTION + rounding) ** 2)) return;
   const stand = Array.from(near);
   const own = found.findIndex((one) => {
     if (one.path) return onPath(stand, one.path, goal);
@@ -310,28 +345,36 @@ function stay(found, near, goal, rounding) {
   else found[own] = one;
 }
 
-/** @typedef {Row & {rank: number, row: Branch}} Found a row at its nearest legal copy; rank: its motion in degrees and mm */
+/** @typedef {{q: number[], branch: number, path?: number[][], rank: number, row: Branch}} Found a row at its nearest legal copy;
+ * rank: its motion in degrees and mm */
 
 /** @param {Row} solution @param {Numbers} near @param {Float64Array} goal @returns {Found} */
 function placed(solution, near, goal) {
   const q = solution.path || solution.wide ? nearest(solution, near, goal) : legal(solution.q, near);
-  misses(q, goal);
-  let joints = q;
-  let motion = 0;
-  if (CALIBRATED) joints = q.map((x, j) => x / ARM.ratio[j]);
-  for (let j = 0; j < ARM.joints; j++) motion += Math.abs(q[j] - near[j]) / ARM.ratio[j];
+  const [degrees, row] = [copyMotion[0], branchOf(q, solution.branch, goal, false)];
+  return { q, branch: solution.branch, path: solution.path, rank: degrees, row };
+}
+
+/** What is told of a posture that `legal` has turned. @param {number[]} q @param {number} b its branch @param {Float64Array} goal
+ * @param {boolean} measured whether `allMisses` has what it misses */
+function branchOf(q, b, goal, measured) {
+  if (measured) {
+    off2[0] = Math.sqrt(allMisses[ARM.branches + b]);
+    off2[1] = Math.sqrt(allMisses[2 * ARM.branches + b]);
+  } else misses(q, goal);
+  const joints = CALIBRATED ? q.map((x, j) => x / ARM.ratio[j]) : q;
   /** @type {Branch} */
   const row = {
     joints,
-    name: ARM.names[solution.branch],
+    name: ARM.names[b],
     within_limits: copyInside,
     violations: copyInside ? [] : violations(q),
-    residual_mm: missedLength * ARM.reach,
-    residual_deg: missedAngle * DEGREES,
-    motion,
+    residual_mm: off2[0] * ARM.reach,
+    residual_deg: off2[1] * DEGREES,
+    motion: copyMotion[1],
   };
   if (KEEPS_OUT) Object.assign(row, hitsOf(q));
-  return { q, branch: solution.branch, path: solution.path, rank: copyMotion, row };
+  return row;
 }
 
 /** The joints outside their limits. @param {Numbers} q @returns {Violation[]} */

@@ -1,25 +1,45 @@
 /** Names of all branches that a target may have. */
 export const branch_names = ARM.names;
 
-/** Whether a row hits nothing. @param {Found} one */
-const free = (one) => !one.row.hits?.length;
+/** @type {number[]} */
+const ranks = []; // of the branches of one answer: motions in degrees and mm,
+/** @type {number[]} */
+const places = []; // and which ones they are
 
-/** Rows within limits and free of hits first, then those that hit, then by motion; of equal ones the first branch. @param {Found[]} found */
-function sort(found) {
+/** Whether a row hits nothing. @param {Branch} row */
+const free = (row) => !row.hits?.length;
+
+/** Rows within limits and free of hits first, then those that hit, then by motion; of equal ones the first branch. @param {Branch[]} rows */
+function sort(rows) {
   let least = Infinity;
-  for (let k = 0; k < found.length; k++) least = Math.min(least, found[k].rank);
-  const after = (/** @type {Found} */ a, /** @type {Found} */ b) => {
-    if (a.row.within_limits !== b.row.within_limits) return b.row.within_limits;
-    if (a.row.within_limits && free(a) !== free(b)) return free(b);
-    const more = rint((a.rank - least) * EQUAL) - rint((b.rank - least) * EQUAL);
-    return more === 0 ? a.branch > b.branch : more > 0;
-  };
-  for (let k = 1; k < found.length; k++) {
-    const one = found[k];
+  for (let k = 0; k < rows.length; k++) least = Math.min(least, ranks[k]);
+  for (let k = 0; k < rows.length; k++) ranks[k] = rint((ranks[k] - least) * EQUAL);
+  for (let k = 1; k < rows.length; k++) {
+    const row = rows[k];
+    const rank = ranks[k];
+    const place = places[k];
     let at = k;
-    for (; at > 0 && after(found[at - 1], one); at--) found[at] = found[at - 1];
-    found[at] = one;
+    for (; at > 0; at--) {
+      const other = rows[at - 1];
+      let before = ranks[at - 1] === rank ? places[at - 1] < place : ranks[at - 1] < rank;
+      if (other.within_limits !== row.within_limits) before = other.within_limits;
+      else if (KEEPS_OUT && row.within_limits && free(other) !== free(row)) before = free(other);
+      if (before) break;
+      rows[at] = other;
+      ranks[at] = ranks[at - 1];
+      places[at] = places[at - 1];
+    }
+    rows[at] = row;
+    ranks[at] = rank;
+    places[at] = place;
   }
+}
+
+/** Puts a branch at an answer's end. @param {Branch[]} branches @param {Branch} row @param {number} rank @param {number} place */
+function put(branches, row, rank, place) {
+  ranks[branches.length] = rank;
+  places[branches.length] = place;
+  branches.push(row);
 }
 
 /**
@@ -29,30 +49,49 @@ function sort(found) {
  * @returns {Answer} branches within limits and free of hits first, then by motion from `near`; joints and motion [rad | mm]
  */
 export function ik(target, near = home) {
-  const { goal, rounding } = read(target);
-  const close = actual(near);
+  const goal = goalNumbers;
+  const close = closeTo;
+  const rounding = read(target);
+  actual(near, close);
   for (let j = 0; j < ARM.joints; j++) if (!Number.isFinite(close[j])) throw new RangeError('near holds a value that is not finite');
-  const { rows, status, complete, free: loose } = solutions(goal, close);
-  /** @type {Found[]} */
-  const found = [];
-  for (let k = 0; k < rows.length; k++) found.push(placed(rows[k], close, goal));
-  stay(found, close, goal, rounding);
-  sort(found);
+  const edge = doubted(goal, close);
+  const stands = solvesIt(close, goal, rounding);
+  /** @type {Branch[]} */
   const branches = [];
-  for (let k = 0; k < found.length; k++) branches.push(found[k].row);
-  const legal = found.length > 0 && found[0].row.within_limits;
-  const best = legal && free(found[0]) ? 0 : null;
+  let status = /** @type {Status} */ ('exact');
+  let complete = true;
+  /** @type {string[]} */
+  let loose = [];
+  if (CLOSED_FORM && !edge && !stands) {
+    for (let b = 0; b < ARM.branches; b++) {
+      if (!(allMisses[b] <= SOLUTION * SOLUTION)) continue;
+      const q = legal(candidate(b), close);
+      put(branches, branchOf(q, b, goal, true), copyMotion[0], b);
+    }
+    if (!branches.length) status = 'unreachable';
+  } else {
+    const told = solutions(goal, close, edge);
+    const found = told.rows.map((row) => placed(row, close, goal));
+    if (stands) stay(found, close, goal, rounding);
+    for (const { row, rank, branch } of found) put(branches, row, rank, branch);
+    status = told.status === 'unreachable' && found.length ? 'boundary' : told.status;
+    complete = told.complete;
+    loose = told.free.map((j) => names[j]);
+  }
+  sort(branches);
+  const inside = branches.length > 0 && branches[0].within_limits;
+  const best = inside && free(branches[0]) ? 0 : null;
   let nearby = null;
-  if (!legal) {
-    const { q, distance, angle } = closest(goal, close, found.map((one) => one.q));
+  if (!inside) {
+    const { q, distance, angle } = closest(goal, close, branches.map((row) => actual(row.joints)));
     const joints = q.map((x, j) => x / ARM.ratio[j]);
     nearby = { joints, position_mm: fk(joints).slice(0, 3).map((row) => row[3]), distance_mm: distance, angle_deg: angle * DEGREES };
   }
   return {
-    status: status === 'unreachable' && found.length ? 'boundary' : status,
+    status,
     complete,
     best,
-    free_joints: loose.map((j) => names[j]),
+    free_joints: loose,
     closest: nearby,
     branches,
   };

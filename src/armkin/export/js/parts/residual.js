@@ -38,13 +38,18 @@ function residual(q, goal) {
   return out;
 }
 
-let missedLength = 0; // [reaches]
-let missedAngle = 0; // [rad]
+/** What joint values miss, as `misses` leaves it: a length [reaches], an angle [rad]. An array: V8 boxes every number that is
+ * given to a variable outside functions. */
+const off2 = new Float64Array(2);
 
-/** What joint values miss: `missedLength`, `missedAngle`. @param {Numbers} q @param {Numbers} goal */
+/** What joint values miss: `off2`. @param {Numbers} q @param {Numbers} goal */
 function misses(q, goal) {
-  const T = pose16;
-  poseOf(q, T);
+  poseOf(q, pose16);
+  apartFrom(pose16, q, goal);
+}
+
+/** What a pose of joint values misses: `off2`. @param {Float64Array} T @param {Numbers} q @param {Numbers} goal */
+function apartFrom(T, q, goal) {
   if (ARM.orientation !== 'full') {
     let [length, angle] = [0, 0];
     for (let i = 0; i < ARM.position; i++) length += (goal[i] - T[4 * i + 3]) ** 2;
@@ -58,8 +63,8 @@ function misses(q, goal) {
       const c = T[2] * goal[4] - T[6] * goal[3];
       angle += Math.atan2(Math.sqrt(a * a + b * b + c * c), T[2] * goal[3] + T[6] * goal[4] + T[10] * goal[5]) ** 2;
     }
-    missedLength = Math.sqrt(length) / ARM.reach;
-    missedAngle = Math.sqrt(angle);
+    off2[0] = Math.sqrt(length) / ARM.reach;
+    off2[1] = Math.sqrt(angle);
     return;
   }
   const x = T[3] - goal[9];
@@ -68,11 +73,11 @@ function misses(q, goal) {
   const a = T[4] * goal[2] - T[8] * goal[1] + T[5] * goal[5] - T[9] * goal[4] + T[6] * goal[8] - T[10] * goal[7];
   const b = T[8] * goal[0] - T[0] * goal[2] + T[9] * goal[3] - T[1] * goal[5] + T[10] * goal[6] - T[2] * goal[8];
   const c = T[0] * goal[1] - T[4] * goal[0] + T[1] * goal[4] - T[5] * goal[3] + T[2] * goal[7] - T[6] * goal[6];
-  missedLength = Math.sqrt(x * x + y * y + z * z) / ARM.reach;
+  off2[0] = Math.sqrt(x * x + y * y + z * z) / ARM.reach;
   const sine = Math.sqrt(a * a + b * b + c * c) / 2;
   const trace =
     T[0] * goal[0] + T[1] * goal[3] + T[2] * goal[6] + T[4] * goal[1] + T[5] * goal[4] + T[6] * goal[7] + T[8] * goal[2] + T[9] * goal[5] + T[10] * goal[8];
-  missedAngle = trace > 2 ? sine : Math.atan2(sine, (trace - 1) / 2); // half a turn has no sine
+  off2[1] = trace > 2 ? sine : Math.atan2(sine, (trace - 1) / 2); // half a turn has no sine
 }
 
 /** The rows of the residual's Jacobian, joints in rad and reaches. @param {Numbers} q @returns {number[][]} */
