@@ -23,6 +23,7 @@ from armkin.inverse.solvers.redundant import redundancy  # noqa: E402
 
 ARMS = ("panda", "iiwa7", "kinova_gen3")
 AT_ONCE = 250
+END = 1e-8  # [rad]
 
 
 def main() -> None:
@@ -67,7 +68,8 @@ def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int
     assert s.interval is not None
     for k in range(len(target)):
         legal = s.interval[k][s.within_limits[k]]
-        ends = np.unique(legal.ravel())
+        ends = np.sort(legal.ravel())
+        ends = ends[np.diff(ends, prepend=-np.inf) > END]  # between ends that rounding parts is no place
         beside = np.deg2rad(1e-6) * np.array([[-1.0], [1.0]]) + ends
         for value in [*beside.ravel(), *(0.5 * (ends[1:] + ends[:-1]))]:
             if arm.lower[joint] < value < arm.upper[joint]:

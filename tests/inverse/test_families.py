@@ -148,6 +148,62 @@ def test_a_nearly_stretched_arm_has_its_short_families() -> None:
     assert covers(arm, s.interval[1][s.within_limits[1]], q[6]).any()
 
 
+@pytest.mark.parametrize("joint", [1, 3, 5])
+@pytest.mark.parametrize("degrees", [0.013, 1e-4, 0.0])
+def test_an_arm_with_an_all_but_straight_joint_loses_no_posture(joint: int, degrees: float) -> None:
+    """iiwa7 with its elbow 0.013 degrees from straight was called unreachable: families shorter than a sample."""
+    arm = armkin.load("iiwa7")
+    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (30, 7))
+    q[:, joint] = np.deg2rad(degrees)
+    target = armkin.fk(arm, q)
+    s = armkin.ik(arm, target)
+    assert s.interval is not None
+    assert all(covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
+    assert np.nanmax(s.residual()) <= 1e-9
+    assert s.complete.all() or joint != 3
+    assert not s.complete.any() or joint == 3 or degrees  # a straight shoulder or wrist turns by itself
+    again = armkin.ik(arm, target, near=q)
+    assert np.take_along_axis(again.motion, again.best[:, None], axis=1).max() <= 1e-9
+
+
+def test_a_posture_that_only_touches_the_limits_is_an_interval_without_length() -> None:
+    arm = armkin.load("iiwa7")
+    q = np.where(np.random.default_rng(1).random((20, 7)) < 0.5, arm.lower, arm.upper)
+    s = armkin.ik(arm, armkin.fk(arm, q))
+    assert s.interval is not None
+    assert all(covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
+
+
+def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbow() -> None:
+    """Zeros of the joints turned, the elbow moved off both lines, flange and base anywhere: the same intervals are
+    right."""
+    rng, arm = np.random.default_rng(3), armkin.load("iiwa7")
+    links = arm.link.copy()
+    for k in range(8):
+        turn = np.eye(4)
+        a = rng.uniform(-np.pi, np.pi)
+        turn[:2, :2] = [[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]
+        links[k] = links[k] @ turn
+    links[3, :3, 3] += links[3, :3, :3] @ [50.0, 20.0, 0.0]
+    links[4, :3, 3] += [-40.0, 10.0, 0.0]
+    limits = np.stack([arm.lower, arm.upper], axis=1)
+    limits[2] = -4.0, 1.0
+    limits[6] = -np.inf, np.inf
+    other = from_links(links, [False] * 7, limits=limits)
+    q = rng.uniform(np.maximum(limits[:, 0], -3), np.minimum(limits[:, 1], 3), (40, 7))
+    s = armkin.ik(other, armkin.fk(other, q), near=q)
+    assert s.why.endswith("arm angle")
+    assert s.complete.all()
+    assert np.nanmax(s.residual()) <= 1e-9
+    assert s.motion[np.arange(40), s.best].max() <= 1e-9
+    s = armkin.ik(other, armkin.fk(other, q[:1]))
+    assert s.interval is not None
+    legal = s.interval[0][s.within_limits[0]]
+    for value in rng.uniform(-np.pi, np.pi, 8):
+        own = held_answers(other, 6, float(value), s.target[0], None)
+        assert covers(other, legal, float(value), 0.0).sum() == len(own)
+
+
 def test_where_no_branch_is_real_the_linking_of_an_elimination_goes_on() -> None:
     """kinova_gen3 alone, at values of J7 that have no answer, ended in a traceback."""
     arm = armkin.load("kinova_gen3")

@@ -1,172 +1,40 @@
 """One joint more than the target asks for: curves of answers, as intervals of the redundant joint.
 
 The redundant joint is the last or the first one, whichever leaves a closed form. Its motion only moves the target of
-the other joints, T = Z(q) T' or T' Z(q), so one solver, prepared once, answers every value of it. Its answers are
-followed along a whole turn by their branches; where a branch begins or ends to be real, or to be within limits, is
-found by bisection. A family is a piece of the curve along which the joint is monotone; a row is a legal interval of
-one.
+the other joints, T = Z(q) T' or T' Z(q), so one solver, prepared once, answers every value of it. A family is a piece
+of a curve of answers along which the joint is monotone; a row is a legal interval of one. The curves are known by the
+arm angle (`arm_angle`), or followed along the joint (`followed`).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula import arrays
+from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.followed import Follower, Ik, Postures
+from armkin.inverse.arm_angle import Turning, arm_angle
+from armkin.inverse.followed import Followed, Follower, Ik
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import REACH, SOLUTION
+from armkin.inverse.numeric.tolerances import PROBE, SAME
+from armkin.inverse.pieces import Curves, Pieces, motion
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
-from armkin.inverse.tasks.task import distance, read_near, read_targets
+from armkin.inverse.tasks.task import read_near, read_targets, shaped
 from armkin.keep_out.clearance import clear
 from armkin.model import units
 from armkin.model.arm import actual
+from armkin.model.limits import outside
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 AT_ONCE = 24_000  # targets of the other joints solved together
-FINER = 24  # times as many values where none had an answer
-HALVINGS = 24  # of half a degree: 3e-8 degrees
-GOLDEN = 34  # steps to the posture nearest to `near`
-FREE = np.deg2rad(0.1)  # [rad] and reaches / 573: step between postures that are asked whether they are free
-
-
-_Place = tuple[bool, int, int, int]  # legal, target, branch, sample
-
-
-class _Pieces(NamedTuple):
-    """Legal intervals, and families without one: of which target and branch (P,), ends a <= b (P,) [rad]."""
-
-    row: NDArray[np.intp]
-    branch: NDArray[np.intp]
-    a: Array
-    b: Array
-    legal: Bool
-    start: Array  # (P, n) the posture of some sample inside, the nearest to near
-    at: Array  # (P,) its value of the redundant joint
-
-    def of(self, some: Bool) -> _Pieces:
-        """Some of them."""
-        row, branch, a, b, legal, start, at = self
-        return _Pieces(row[some], branch[some], a[some], b[some], legal[some], start[some], at[some])
-
-
-def _ends(
-    find: Follower, t: Array, found: Postures, kinds: dict[bool, Bool]
-) -> dict[tuple[bool, int, int, int], float]:
-    """Where good (N, K, B) changes between samples k and k + 1: where -> value of the joint.
-
-    kinds: for legal postures and for those that are there which samples are good.
-    """
-    h = t[1] - t[0]
-    places = [(legal, good, np.nonzero(good != np.roll(good, -1, axis=1))) for legal, good in kinds.items()]
-    row, k, branch = (np.concatenate([place[i] for *_, place in places]) for i in range(3))
-    inside = np.concatenate([good[place] for _, good, place in places])
-    of_legal = np.concatenate([np.full(len(place[0]), legal) for legal, _, place in places])
-    low = t[k]
-    lo, hi = np.where(inside, low, low + h), np.where(inside, low + h, low)  # good at lo
-    like = np.where(inside[:, None], found.q[row, k, branch], found.q[row, (k + 1) % len(t), branch])
-    for _ in range(HALVINGS if len(row) else 0):
-        middle = 0.5 * (lo + hi)
-        there = find.one(row, branch, middle, like)
-        keep = np.where(of_legal, there.legal, there.valid)
-        lo, hi = np.where(keep, middle, lo), np.where(keep, hi, middle)
-        like = np.where(keep[:, None], there.q, like)
-    keys = zip(of_legal.tolist(), row.tolist(), branch.tolist(), k.tolist(), strict=True)
-    return dict(zip(keys, lo.tolist(), strict=True))
-
-
-def _pieces(find: Follower, t: Array, found: Postures) -> _Pieces:
-    """All pieces of the curves of some targets."""
-    K, h = len(t), float(t[1] - t[0])
-    motion = find.motion(np.arange(len(find.target)), found.q)
-    kinds = {True: found.legal, False: _families_without(found)}
-    ends, rows = _ends(find, t, found, kinds), []
-    costs = np.concatenate([motion, motion], axis=1).transpose(0, 2, 1).copy()  # a piece may pass the end of the turn
-    for legal, good in kinds.items():
-        first = good & ~np.roll(good, 1, axis=1)
-        first[:, 0] |= good.all(axis=1)
-        places = np.argwhere(first)
-        counts = _lengths(good)[tuple(places.T)].tolist()
-        for (row, k, branch), count in zip(places.tolist(), counts, strict=True):
-            at = int(costs[row, branch, k : k + count].argmin())
-            inside = t[k] + at * h
-            if count == K:
-                a, b = -np.pi, np.pi
-            else:
-                a, b = ends[legal, row, branch, (k - 1) % K], ends[legal, row, branch, (k + count - 1) % K]
-                a, b = inside - (inside - a) % (2 * np.pi), inside + (b - inside) % (2 * np.pi)
-            rows.append((row, branch, a, b, legal, found.q[row, (k + at) % K, branch], inside))
-    if not rows:
-        none = np.zeros(0)
-        return _Pieces(none.astype(int), none.astype(int), none, none, none > 0, np.zeros((0, find.arm.n)), none)
-    return _Pieces(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def _lengths(good: Bool) -> NDArray[np.intp]:
-    """How many samples of good (N, K, B) follow one another from each on, itself included, K at most."""
-    K = good.shape[1]
-    index = np.arange(2 * K)[:, None]
-    bad = np.where(np.concatenate([good, good], axis=1), 2 * K, index)
-    next_bad = np.minimum.accumulate(bad[:, ::-1], axis=1)[:, ::-1]
-    return np.asarray(np.minimum(next_bad - index, K)[:, :K])
-
-
-def _families_without(found: Postures) -> Bool:
-    """Samples (N, K, B) of families that have no legal posture: pieces between places where a branch is not real."""
-    valid = found.valid
-    first = valid & ~np.roll(valid, 1, axis=1)
-    number = np.cumsum(first, axis=1)
-    number = np.where(number == 0, number[:, -1:], number)  # what begins before the turn ends at its end
-    N, K, B = valid.shape
-    legal = np.zeros((N, K + 1, B), bool)
-    row, branch = np.arange(N)[:, None, None], np.arange(B)
-    np.logical_or.at(legal, (row, number, branch), found.legal)
-    return np.asarray(valid & ~legal[row, number, branch])
-
-
-def _nearest(find: Follower, pieces: _Pieces, h: float) -> Array:
-    """The postures (P, n) of intervals that move the joints least: golden section around the best sample.
-
-    Of families without a legal posture it is that sample.
-    """
-    if not pieces.legal.all():
-        out, some = pieces.start.copy(), pieces.legal
-        out[some] = _nearest(find, pieces.of(some), h)
-        return out
-    row, branch, like = pieces.row, pieces.branch, pieces.start
-    whole = pieces.b - pieces.a >= 2 * np.pi
-    low = np.where(whole, pieces.at - h, np.maximum(pieces.a, pieces.at - h))
-    high = np.where(whole, pieces.at + h, np.minimum(pieces.b, pieces.at + h))
-    best, least = like.copy(), find.motion(row, like)
-
-    def motion(t: Array) -> Array:
-        there = find.one(row, branch, t, like)
-        cost = np.where(there.legal, find.motion(row, there.q), np.inf)
-        better = cost < least
-        best[better], least[better] = there.q[better], cost[better]
-        return cost
-
-    own = find.near[row, find.free.joint]
-    own = own + np.round((pieces.at - own) / (2 * np.pi)) * 2 * np.pi
-    motion(np.where((own >= pieces.a) & (own <= pieces.b), own, pieces.at))
-    motion(low)
-    motion(high)
-    ratio = (5**0.5 - 1) / 2
-    left, right = high - ratio * (high - low), low + ratio * (high - low)
-    at_left, at_right = motion(left), motion(right)
-    for _ in range(GOLDEN):
-        go = at_left <= at_right
-        low, high = np.where(go, low, left), np.where(go, right, high)
-        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
-        cost = motion(new)
-        left, right = np.where(go, new, right), np.where(go, left, new)
-        at_left, at_right = np.where(go, cost, at_right), np.where(go, at_left, cost)
-    return best
+CIRCLES = 64  # targets whose arm angles are worked on together
+FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
 
 def families(
@@ -177,29 +45,31 @@ def families(
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
     task = free.task
-    goal, lead, off = read_targets(task, targets)
+    values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
+    goal, lead, off = read_targets(task, values)
     close = read_near(arm, near, lead)
-    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n)) * arm.ratio
     true = actual(arm)
     turned = free if true is arm else redundancy(true, task.name)
     assert turned is not None
-    some = max(AT_ONCE // free.samples, 1)
-    parts = [
-        _of_chunk(Follower(ik, true, turned, goal[k : k + some], each[k : k + some] * arm.ratio))
-        for k in range(0, len(goal), some)
-    ]
-    B = max((part.q.shape[1] for part in parts), default=0)
-    q = np.concatenate([np.zeros((0, B, arm.n)), *(_wider(part.q, B, np.nan) for part in parts)])
-    interval = np.concatenate([np.zeros((0, B, 2)), *(_wider(part.interval, B, np.nan) for part in parts)])
-    legal = np.concatenate([np.zeros((0, B)), *(_wider(part.legal, B, 0.0) for part in parts)])
-    branch = np.concatenate([np.zeros((0, B)), *(_wider(part.branch, B, -1.0) for part in parts)])
-    boundary = np.concatenate([np.zeros(0, bool), *(part.boundary for part in parts)])
+    of = arm_angle(true) if free.joint else None
+    numbers = (shaped(task, values)[0], off)
+    known, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
+    stands = (newton.missing(true, task, each, goal) <= most) & ~outside(true, each).any(axis=1)
+    rows = _Rows(true, turned.joint, each, stands)
+    some = CIRCLES if of else max(AT_ONCE // free.samples, 1)
+    for k in range(0, len(goal), some):
+        if of:
+            rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
+        else:
+            rows.add(k, Followed.along(Follower(ik, true, turned, goal[k : k + some], each[k : k + some])))
+    q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
-    status = np.where(valid.any(axis=1), np.where(boundary, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
-    given = off if rounding is None else np.broadcast_to(np.asarray(rounding, float), lead).reshape(-1)
+    B = valid.shape[1]
+    status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
-    joint = arm.joint_names[free.joint]
+    method, why, _ = described(arm, free)
     return Solutions(
         arm=arm,
         task=task,
@@ -207,112 +77,141 @@ def families(
         near=np.broadcast_to(close.copy(), (*lead, arm.n)),
         q=(q / arm.ratio).reshape(*lead, B, arm.n),
         valid=valid.reshape(*lead, B),
-        within_limits=(legal > 0).reshape(*lead, B),
-        branch=branch.astype(np.int8).reshape(*lead, B),
+        within_limits=legal.reshape(*lead, B),
+        branch=branch.reshape(*lead, B),
         status=status.astype(np.int8).reshape(lead),
         free=np.zeros((*lead, arm.n), bool),
         names=names,
-        method=f"families of {joint}",
-        why=f"{joint} is redundant; the other joints: {free.geometry.name}, at {free.samples} values of it",
-        complete=np.zeros(lead, bool),
-        rounding=given.reshape(lead),
+        method=method,
+        why=why,
+        complete=rows.complete.reshape(lead),
+        rounding=known.reshape(lead),
         interval=(interval / arm.ratio[free.joint]).reshape(*lead, B, 2),
     )
 
 
-class _Rows(NamedTuple):
-    """Of some targets: q (N, B, n), interval (N, B, 2), legal (N, B), branch (N, B), boundary (N,)."""
-
-    q: Array
-    interval: Array
-    legal: Array
-    branch: Array
-    boundary: Bool
-
-
-def _joined(parts: list[_Rows], rows: NDArray[np.intp]) -> _Rows:
-    """Parts one below the other, in the order of rows (N,)."""
-    B, order = max(part.q.shape[1] for part in parts), np.argsort(rows)
-    q, interval, legal, branch = (
-        np.concatenate([_wider(np.asarray(part[i]), B, none) for part in parts])[order]
-        for i, none in enumerate((np.nan, np.nan, 0.0, -1.0))
+def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
+    """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
+    joint = arm.joint_names[free.joint]
+    closed = bool(free.joint) and arm_angle(actual(arm)) is not None
+    how = "in closed form by the arm angle" if closed else f"{free.geometry.name}, at {free.samples} values of it"
+    return (
+        f"families of {joint}",
+        f"{joint} is redundant: ik lists the intervals of its values; the others: {how}",
+        closed,
     )
-    return _Rows(q, interval, legal, branch, np.concatenate([part.boundary for part in parts])[order])
 
 
-def _wider(values: Array, B: int, none: float) -> Array:
-    out = np.full((len(values), B, *values.shape[2:]), none)
-    out[:, : values.shape[1]] = values
-    return out
+class _Rows:
+    """Answers of N targets, chunk after chunk."""
+
+    def __init__(self, arm: Arm, joint: int, near: Array, stands: Bool) -> None:
+        """near: (N, n); stands: (N,) it is within limits and solves its target."""
+        self.arm, self.joint, self.near, self.stands = arm, joint, near, stands
+        self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
+        self.parts: list[tuple[NDArray[np.intp], Array, Array, Bool, NDArray[np.intp]]] = []
+
+    def add(self, begin: int, curves: Curves) -> None:
+        """Those of targets from begin on."""
+        count, pieces = len(curves.complete), curves.pieces
+        rows = slice(begin, begin + count)
+        self.complete[rows], self.short[rows] = curves.complete, curves.short
+        near = self.near[begin + pieces.row]
+        q = _nearest(self.arm, curves, near)
+        some = np.flatnonzero(self.stands[begin + pieces.row])
+        q[some] = _standing(self.arm, self.joint, pieces.of(some), q[some], near[some])
+        if self.arm.keep_out:
+            q = _free(self.arm, curves, q, near)
+        whole = pieces.b - pieces.a >= 2 * np.pi
+        ends = np.stack([pieces.a, pieces.b], axis=1)
+        # of the turns of the interval that in which the posture lies
+        ends += (2 * np.pi) * np.round((q[:, self.joint] - ends.mean(axis=1)) / (2 * np.pi))[:, None]
+        order = np.lexsort((~pieces.legal, pieces.row))
+        interval = np.where(whole[:, None], [-np.pi, np.pi], ends)[order]
+        self.parts.append((begin + pieces.row[order], q[order], interval, pieces.legal[order], pieces.branch[order]))
+
+    def stacked(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
+        """q (N, B, n), intervals (N, B, 2), whether legal and the branch (N, B), -1 where there is no row."""
+        N, n = self.near.shape
+        row = np.concatenate([np.zeros(0, np.intp), *(part[0] for part in self.parts)])
+        count = np.bincount(row, minlength=N)
+        B = int(count.max(initial=0))
+        where = row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        q, interval = np.full((N, B, n), np.nan), np.full((N, B, 2), np.nan)
+        legal, branch = np.zeros((N, B), bool), np.full((N, B), -1, np.int8)
+        if len(row):
+            for k, out in enumerate((q, interval, legal, branch), 1):
+                out[where] = np.concatenate([part[k] for part in self.parts])
+        return q, interval, legal, branch
 
 
-def _of_chunk(find: Follower, finer: int = 1) -> _Rows:
-    """Of some targets; what has no answer is asked again alone: all of a nearly stretched arm's lie within a degree."""
-    N, K = len(find.target), find.free.samples * finer
-    t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
-    found = find.along(t)
-    if finer == 1 and find.labelled:
-        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
-        none = np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough)
-        if len(none):
-            parts = [_of_chunk(find._replace(target=find.target[[k]], near=find.near[[k]]), FINER) for k in none]
-            rest = np.setdiff1d(np.arange(N), none)
-            if len(rest):
-                parts.append(_of_chunk(find._replace(target=find.target[rest], near=find.near[rest])))
-            return _joined(parts, np.concatenate([none, rest]))
-    pieces = _pieces(find, t, found)
-    q = _nearest(find, pieces, float(t[1] - t[0])) if len(pieces.row) else pieces.start
-    if not find.labelled and len(q):  # an elimination's answers near singular postures are less exact
-        q = newton.correct(find.arm, find.free.task, q, find.target[pieces.row])[0]
-    if find.arm.keep_out:
-        q = _free(find, pieces, q)
-    own = pieces.at + 2 * np.pi * np.round((q[:, find.free.joint] - pieces.at) / (2 * np.pi))
-    shift = (own - pieces.at)[:, None]
-    interval = np.stack([pieces.a, pieces.b], axis=1)
-    whole = pieces.b - pieces.a >= 2 * np.pi
-    interval = np.where(whole[:, None], [-np.pi, np.pi], interval + shift)
-    count = np.bincount(pieces.row, minlength=N)
-    B = int(count.max(initial=0))
-    order = np.lexsort((~pieces.legal, pieces.row))
-    place = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    out = _Rows(
-        np.full((N, B, find.arm.n), np.nan), np.full((N, B, 2), np.nan), np.zeros((N, B)), np.full((N, B), -1.0),
-        _all_short(find, found),
-    )  # fmt: skip
-    where = pieces.row[order], place
-    out.q[where], out.interval[where] = q[order], interval[order]
-    out.legal[where], out.branch[where] = pieces.legal[order], pieces.branch[order]
-    return out
+def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
+    """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample.
+
+    Of families without a legal posture they are that sample.
+    """
+    best = curves.pieces.start.copy()
+    least = motion(arm, best, near)
+
+    def costs(some: NDArray[np.intp], t: Array) -> Array:
+        """Of legal postures; better ones are kept."""
+        q, legal = curves.at(curves.pieces.of(some), t)
+        cost = np.where(legal, motion(arm, q, near[some]), np.inf)
+        better = cost < least[some]
+        best[some[better]], least[some[better]] = q[better], cost[better]
+        return np.asarray(cost)
+
+    some = np.flatnonzero(curves.pieces.legal)
+    if not len(some):
+        return best
+    for t in curves.tried(curves.pieces.of(some), near[some]):
+        costs(some, t)
+    # beside a kink or a limit the motion grows on both sides: it is the nearest posture
+    p = curves.pieces.of(some)
+    beside = [costs(some, p.at + PROBE * (end - p.at)) for end in (p.low, p.high)]
+    some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
+    p = curves.pieces.of(some)
+    low, high = p.low, p.high
+    ratio = (5**0.5 - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    at_left, at_right = costs(some, left), costs(some, right)
+    for _ in range(curves.steps if len(some) else 0):
+        go = at_left <= at_right
+        low, high = np.where(go, low, left), np.where(go, right, high)
+        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
+        cost = costs(some, new)
+        left, right = np.where(go, new, right), np.where(go, left, new)
+        at_left, at_right = np.where(go, cost, at_right), np.where(go, at_left, cost)
+    return best
 
 
-def _all_short(find: Follower, found: Postures) -> Bool:
-    """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
-    if not find.labelled:  # the pieces of a linked branch say nothing of the whole curve
-        return np.zeros(len(found.valid), bool)
-    together = found.valid
-    for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
-        together = together & np.roll(found.valid, -shift, axis=1)
-    short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
-    for k in np.flatnonzero(short).tolist():
-        q, valid = found.q[k], found.valid[k]
-        step = np.abs(np.remainder(np.roll(q, -1, axis=0) - q + np.pi, 2 * np.pi) - np.pi)
-        way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
-        short[k] = 2.0 * way.max(initial=0.0) < REACH
-    return short
+def _standing(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> Array:
+    """Postures (P, n) of pieces; near (P, n) that solves its target in place of the one nearest to it.
 
-
-def _free(find: Follower, pieces: _Pieces, q: Array) -> Array:
-    """The nearest postures of legal intervals that hit nothing, to `FREE`; where there is none, q as it is."""
+    It may be a posture with a joint that is free, or one that its target's rounding moves far.
+    """
+    middle, half = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
+    inside = np.abs(wrapped(near[:, joint] - middle)) <= half + SAME
+    cost = np.where(pieces.legal & inside, motion(arm, q, near), np.inf)
     out = q.copy()
-    for p in np.flatnonzero(pieces.legal & ~clear(find.arm, q)):
-        a, b = pieces.a[p], pieces.b[p]
+    for row in np.unique(pieces.row).tolist():
+        own = np.flatnonzero(pieces.row == row)
+        best = own[cost[own].argmin()]
+        if np.isfinite(cost[best]):
+            out[best] = near[best]
+    return out
+
+
+def _free(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
+    """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE`; where there is none, q as it is."""
+    out, pieces = q.copy(), curves.pieces
+    for p in np.flatnonzero(pieces.legal & ~clear(arm, q)):
+        a, b = pieces.first[p], pieces.last[p]
         t = np.linspace(a, b, max(int((b - a) / FREE) + 2, 2))[1:-1]
-        rows = np.full(len(t), pieces.row[p])
-        there = find.one(rows, np.full(len(t), pieces.branch[p]), t, np.broadcast_to(q[p], (len(t), find.arm.n)))
-        good = there.legal & clear(find.arm, np.nan_to_num(there.q))
+        there, legal = curves.at(pieces.of(np.full(len(t), p)), t)
+        good = legal & clear(arm, np.nan_to_num(there))
         if good.any():
-            motion = np.where(good, find.motion(rows, there.q), np.inf)
-            out[p] = there.q[motion.argmin()]
+            out[p] = there[np.where(good, motion(arm, there, near[p]), np.inf).argmin()]
     return out
 
 

@@ -9,20 +9,28 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
-from armkin.inverse.numeric.tolerances import ACCEPTED
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import ACCEPTED, REACH, SOLUTION
+from armkin.inverse.pieces import Pieces, best_samples, motion, runs
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved
+from armkin.inverse.tasks.task import distance
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets of a formula: they stay in the cache
+FINER = 24  # times as many values where none had an answer
+HALVINGS = 24  # of half a degree: 3e-8 degrees
+STEPS = 34  # of the golden section
+POLISH = 8  # Newton steps to a posture that continues another one
+ASTRAY = 0.5  # [rad] and how far it is from that at most
 
 
 class Postures(NamedTuple):
@@ -108,22 +116,21 @@ class Follower(NamedTuple):
         return Postures(q, ~np.isnan(q[..., 0]), legal)
 
     def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array, like: Array) -> Postures:
-        """One branch each (M,): that of its index, or, of an elimination, the one nearest to postures like (M, n)."""
-        q, each = self.found(rows, t), np.arange(len(rows))
-        if not self.labelled:
-            apart = np.abs(np.remainder(q - like[:, None] + np.pi, 2 * np.pi) - np.pi).max(axis=2)
-            apart = np.where(apart < 0.5, apart, np.inf)
-            branch = apart.argmin(axis=1)
-            q[np.isinf(apart)] = np.nan
-        one = self._legal(rows, q[each, branch][:, None])
+        """One branch each (M,): that of its index, or, of an elimination, what continues postures like (M, n)."""
+        q = self.found(rows, t)[np.arange(len(rows)), branch] if self.labelled else self._continued(rows, t, like)
+        one = self._legal(rows, q[:, None])
         return Postures(one.q[:, 0], one.valid[:, 0], one.legal[:, 0])
 
-    def motion(self, rows: NDArray[np.intp], q: Array) -> Array:
-        """Sum of |change| from near [deg | mm]: q (M, ..., n) -> (M, ...); inf where there is no posture."""
-        unit = np.where(self.arm.prismatic, 1.0, 180 / np.pi)
-        near = self.near[rows].reshape(len(rows), *[1] * (q.ndim - 2), self.near.shape[1])
-        total = (np.abs(q - near) * unit).sum(axis=-1)
-        return np.where(np.isnan(total), np.inf, total)
+    def _continued(self, rows: NDArray[np.intp], t: Array, like: Array) -> Array:
+        """Postures (M, n) near postures like (M, n), nan where there is none."""
+        kept = [j for j in range(self.arm.n) if j != self.free.joint]
+        goal = moved(self.arm, self.free, self.target[rows], t)
+        six, missing = newton.newton(self.free.rest, self.free.task, like[:, kept], goal, POLISH)
+        far = np.abs(wrapped(six - like[:, kept])).max(axis=1)
+        q = np.empty((len(t), self.arm.n))
+        q[:, kept], q[:, self.free.joint] = six, t
+        q[(missing > SOLUTION) | (far > ASTRAY)] = np.nan
+        return q
 
 
 def in_columns(q: Array, number: NDArray[np.integer]) -> Array:
@@ -132,3 +139,120 @@ def in_columns(q: Array, number: NDArray[np.integer]) -> Array:
     out = np.full((M, B + 1, n), np.nan)
     out[np.arange(M)[:, None], np.where(number < 0, B, number)] = q
     return out[:, :B]
+
+
+class Followed(NamedTuple):
+    """`Curves` followed along the redundant joint, a turn by samples: it is their parameter."""
+
+    find: Follower
+    pieces: Pieces
+    short: Bool
+    steps: int = STEPS
+
+    @classmethod
+    def along(cls, find: Follower, finer: int = 1) -> Followed:
+        """Of some targets; one without an answer is asked again: all of a nearly stretched arm lie within a degree."""
+        K = find.free.samples * finer
+        t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
+        found = find.along(t)
+        pieces, short = _pieces(find, t, found), _all_short(find, found)
+        if finer == 1 and find.labelled:
+            near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
+            for k in np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough):
+                alone = cls.along(find._replace(target=find.target[[k]], near=find.near[[k]]), FINER)
+                more = alone.pieces._replace(row=alone.pieces.row + k)
+                pieces = Pieces(*(np.concatenate(pair) for pair in zip(pieces, more, strict=True)))
+                short[k] = alone.short[0]
+        return cls(find, pieces, short)
+
+    @property
+    def complete(self) -> Bool:
+        """Never: what lies between two samples may be missing."""
+        return np.zeros(len(self.find.target), bool)
+
+    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
+        """Where near has the joint, and beside the best sample."""
+        own = near[:, self.find.free.joint]
+        own = own + np.round((pieces.at - own) / (2 * np.pi)) * 2 * np.pi
+        return [np.where((own >= pieces.a) & (own <= pieces.b), own, pieces.at), pieces.low, pieces.high]
+
+    def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
+        """As `Curves.at`."""
+        there = self.find.one(pieces.row, pieces.branch, parameter, pieces.start)
+        return there.q, there.legal
+
+
+def _ends(find: Follower, t: Array, found: Postures, kinds: dict[bool, Bool]) -> dict[bool, Array]:
+    """Of legal postures and of those that are there the values (N, K, B) where samples good end to be so before the
+    sample k + 1, or begin to be so; nan where nothing changes."""
+    h = t[1] - t[0]
+    places = {legal: np.nonzero(good != np.roll(good, -1, axis=1)) for legal, good in kinds.items()}
+    row, k, branch = (np.concatenate([place[i] for place in places.values()]) for i in range(3))
+    inside = np.concatenate([kinds[legal][place] for legal, place in places.items()])
+    of_legal = np.concatenate([np.full(len(place[0]), legal) for legal, place in places.items()])
+    low = t[k]
+    lo, hi = np.where(inside, low, low + h), np.where(inside, low + h, low)  # good at lo
+    like = np.where(inside[:, None], found.q[row, k, branch], found.q[row, (k + 1) % len(t), branch])
+    for _ in range(HALVINGS if len(row) else 0):
+        middle = 0.5 * (lo + hi)
+        there = find.one(row, branch, middle, like)
+        keep = np.where(of_legal, there.legal, there.valid)
+        lo, hi = np.where(keep, middle, lo), np.where(keep, hi, middle)
+        like = np.where(keep[:, None], there.q, like)
+    out = {}
+    for legal, place in places.items():
+        out[legal] = np.full(found.valid.shape, np.nan)
+        out[legal][place] = lo[of_legal == legal]
+    return out
+
+
+def _pieces(find: Follower, t: Array, found: Postures) -> Pieces:
+    """All pieces of the curves of some targets, from samples along t."""
+    K, B = found.valid.shape[1:]
+    h = float(t[1] - t[0])
+    cost = motion(find.arm, found.q, find.near[:, None, None]).transpose(0, 2, 1).reshape(-1, K)
+    kinds = {True: found.legal, False: _families_without(found)}
+    ends, parts = _ends(find, t, found, kinds), []
+    for legal, good in kinds.items():
+        samples = good.transpose(0, 2, 1).reshape(-1, K)
+        curve, first, length = runs(samples, np.zeros_like(samples))
+        row, branch = curve // B, curve % B
+        best = best_samples(cost, curve, first, length)
+        at = t[first] + best * h
+        a, b = ends[legal][row, first - 1, branch], ends[legal][row, (first + length - 1) % K, branch]
+        a, b = at - (at - a) % (2 * np.pi), at + (b - at) % (2 * np.pi)
+        all_round = length == K
+        a, b = np.where(all_round, -np.pi, a), np.where(all_round, np.pi, b)
+        low, high = (np.where(all_round, beside, np.clip(beside, a, b)) for beside in (at - h, at + h))
+        start = found.q[row, (first + best) % K, branch]
+        parts.append(Pieces(row, branch, np.full(len(row), legal), a, b, a, b, low, at, high, start))
+    return Pieces(*(np.concatenate(pair) for pair in zip(*parts, strict=True)))
+
+
+def _families_without(found: Postures) -> Bool:
+    """Samples (N, K, B) of families that have no legal posture: pieces between places where a branch is not real."""
+    valid = found.valid
+    first = valid & ~np.roll(valid, 1, axis=1)
+    number = np.cumsum(first, axis=1)
+    number = np.where(number == 0, number[:, -1:], number)  # what begins before the turn ends at its end
+    N, K, B = valid.shape
+    legal = np.zeros((N, K + 1, B), bool)
+    row, branch = np.arange(N)[:, None, None], np.arange(B)
+    np.logical_or.at(legal, (row, number, branch), found.legal)
+    return np.asarray(valid & ~legal[row, number, branch])
+
+
+def _all_short(find: Follower, found: Postures) -> Bool:
+    """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
+    if not find.labelled:  # the pieces of a linked branch say nothing of the whole curve
+        return np.zeros(len(found.valid), bool)
+    together = found.valid
+    for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
+        together = together & np.roll(found.valid, -shift, axis=1)
+    short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
+    for k in np.flatnonzero(short).tolist():
+        q, valid = found.q[k], found.valid[k]
+        step = np.abs(np.remainder(np.roll(q, -1, axis=0) - q + np.pi, 2 * np.pi) - np.pi)
+        way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
+        short[k] = 2.0 * way.max(initial=0.0) < REACH
+    return short

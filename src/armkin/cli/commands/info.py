@@ -99,6 +99,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
 def _task(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
     import armkin
+    from armkin.inverse.families import described
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.inverse.tasks.fitting import task_for
     from armkin.model.arm import actual
@@ -117,10 +118,9 @@ def _task(arm: Arm, name: str | None) -> Solving:
         "ik_refuses": None,
     }
     if spare := redundancy(actual(arm), task.name):
-        name = arm.joint_names[spare.joint]
-        why = f"{name} is redundant: ik lists the intervals of its values; the others: {spare.geometry.name}"
-        found["redundant"] = name
-        found["solver"] = {"method": f"families of {name}", "why": why, "complete": False}
+        method, why, complete = described(arm, spare)
+        found["redundant"] = arm.joint_names[spare.joint]
+        found["solver"] = {"method": method, "why": why, "complete": complete}
         return found
     try:
         method, why, complete = armkin.method(arm, task.name)

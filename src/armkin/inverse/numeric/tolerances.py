@@ -85,6 +85,7 @@ HELD = 1e-9  # [rad, mm] a joint that is held differs by less
 ACROSS = 1e-10  # square of a singular value from which on a step across a curve uses it
 NO_COST = 1e-18  # costs that differ by less are equal
 EQUAL_COST = 1e-9  # share by which costs of one minimum differ
+PROBE = 1e-6  # of the way to the next sample of a curve, where it is asked whether the motion falls
 LAST_STEP = 1e-9  # [rad, reaches] a step of the descent after which none is worth while
 SHORTENED = 0.005  # shortest part of a step that is tried
 LEAST_DAMPING = 1e-12  # of Levenberg-Marquardt steps

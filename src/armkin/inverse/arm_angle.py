@@ -1,0 +1,296 @@
+"""Seven joints, a spherical shoulder, an elbow and a spherical wrist: all families in closed form by the arm angle.
+
+The elbow turns by psi about the line from the shoulder to the wrist, so that every entry of the rotations before and
+behind the elbow is e0 + ec cos(psi) + es sin(psi). A joint stands on a limit, or at `near`, where an equation
+a cos(psi) + b sin(psi) = c holds; the redundant joint, the last one, turns back at two roots of such an equation
+(Shimizu, Kakuya, Yoon, Kitagaki and Kosuge, Analytical inverse kinematic computation for 7-DOF redundant manipulators
+with joint limits and its application to redundancy resolution, IEEE Transactions on Robotics 24, 2008). The roots part
+the turn of psi into pieces that are legal or not as a whole. Shoulder and wrist have two halves each and the elbow two
+values: eight curves.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.branches.turns import nearest_copy, nearest_row
+from armkin.inverse.closed.wrist import meeting_point
+from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
+from armkin.inverse.pieces import Int, Pieces, best_samples, none, runs
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+TURN = 2 * np.pi
+EVEN = 24  # samples of a turn besides the roots
+STEPS = 20  # of the golden section: the kinks of the motion from near are samples
+JOINTS = (0, 1, 2), (4, 5, 6)  # of the shoulder and of the wrist
+
+
+def _offsets(A: Array, B: Array) -> Array | None:
+    """Three axes at right angles, Rz(q1) A Rz(q2) B Rz(q3) = Rz(t1) Rx(90) Rz(t2) Rx(90) Rz(t3): t - q (3,)."""
+    if max(abs(A[2, 2]), abs(B[2, 2])) > EXACT:
+        return None
+    # Rz(u) Rx(90) Rz(v) has the third column (sin u, -cos u, 0) and the third row (sin v, cos v, 0)
+    (u, v), (x, y) = ((np.arctan2(L[0, 2], -L[1, 2]), np.arctan2(L[2, 0], L[2, 1])) for L in (A, B))
+    return np.array([u, v + x, y])
+
+
+class ArmAngle(NamedTuple):
+    """What is constant of such an arm."""
+
+    arm: Arm
+    shoulder: Array  # (3,) seen before joint 1
+    upper: Array  # (3,) from the shoulder to axis 4, seen before joint 4
+    fore: Array  # (3,) from there to the wrist, seen behind joint 4
+    wrist: Array  # (3,) seen before joint 7
+    offset: Array  # (3, 2) of the angles t of shoulder and wrist from joint values
+
+
+@lru_cache(maxsize=64)
+def arm_angle(arm: Arm) -> ArmAngle | None:
+    """What is constant of an arm of seven joints with a spherical shoulder and wrist at right angles, else None."""
+    if arm.n != 7 or arm.prismatic.any():
+        return None
+    L = arm.link
+    shoulder, wrist = (meeting_point(L[k], L[k + 1], EXACT * arm.reach) for k in (1, 5))
+    first, second = (_offsets(L[k], L[k + 1]) for k in (1, 5))
+    if shoulder is None or wrist is None or first is None or second is None:
+        return None
+    upper = L[3][:3, :3].T @ (L[3][:3, 3] - shoulder[1])
+    fore = L[4][:3, :3] @ wrist[0] + L[4][:3, 3]
+    if min(np.hypot(*upper[:2]), np.hypot(*fore[:2])) <= NO_LENGTH:
+        return None  # joint 4 does not move the wrist away from the shoulder
+    return ArmAngle(arm, shoulder[0], upper, fore, wrist[1], np.stack([first, second], axis=1))
+
+
+class _Circles(NamedTuple):
+    """Elbows M of some targets N, each turning about the line from its shoulder to its wrist."""
+
+    R: Array  # (3, 3, 3, 2, M) rotations of shoulder and wrist: the first axis are their parts 1, cos(psi), sin(psi)
+    q4: Array  # (M,)
+    row: Int  # (M,) whose target
+    half: Int  # (M,) which of its two elbows
+    complete: Bool  # (N,) no posture on a circle has a straight shoulder or wrist
+
+
+def _frame(v: Array) -> Array:
+    """Right-handed frames (M, 3, 3) whose third column is along v (M, 3)."""
+    z = v / np.linalg.norm(v, axis=1, keepdims=True)
+    x = np.cross(np.eye(3)[np.abs(z).argmin(axis=1)], z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def _circles(of: ArmAngle, target: Array) -> _Circles:
+    """Those of targets (N, 4, 4)."""
+    L, u, p = of.arm.link, of.upper, of.fore
+    hand = inverse(L[0]) @ target @ inverse(L[7])
+    d = hand[:, :3, :3] @ of.wrist + hand[:, :3, 3] - of.shoulder
+    far = np.linalg.norm(d, axis=1)
+    # far^2 = |upper + Rz(q4) fore|^2 = still + 2 swing cos(q4 - middle)
+    a, b = u[0] * p[0] + u[1] * p[1], u[1] * p[0] - u[0] * p[1]
+    still, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
+    cos = np.clip((far * far - still) / (2.0 * swing), -1.0, 1.0)
+    miss = np.abs(far - np.sqrt(np.maximum(still + 2.0 * swing * cos, 0.0)))
+    there = (miss <= SOLUTION * of.arm.reach) & (far > NO_SIZE * of.arm.reach)
+    apart = np.arccos(cos)
+    apart = np.where(apart < SAME, 0.0, np.where(apart > np.pi - SAME, np.pi, apart))
+    one = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
+    row, half = np.nonzero(np.stack([there, there & ~one], axis=1))
+    q4 = np.arctan2(b, a) + np.where(half == 0, apart[row], -apart[row])
+    c, s = np.cos(q4), np.sin(q4)
+    Z = np.zeros((len(q4), 3, 3))
+    Z[:, 0, 0], Z[:, 0, 1], Z[:, 1, 0], Z[:, 1, 1], Z[:, 2, 2] = c, -s, s, c, 1.0
+    elbow = L[3][:3, :3] @ Z
+    # columns first, targets last
+    f, g = (_frame(v).transpose(2, 1, 0) for v in (d[row], elbow @ p + L[3][:3, :3] @ u))
+    dyad = np.einsum("aim,bjm->abijm", f, g)
+    upper = np.stack([dyad[2, 2], dyad[0, 0] + dyad[1, 1], dyad[1, 0] - dyad[0, 1]])  # f Rz(psi) g'
+    fore = np.einsum("mjk,eijm->ekim", elbow @ L[4][:3, :3], upper)
+    hand = np.einsum("ekim,mil->eklm", fore, hand[row, :3, :3])
+    R = np.stack([upper, hand], axis=3)
+    straight = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - SHARP).any(axis=0)
+    complete = far > SOLUTION * of.arm.reach
+    complete[row[straight]] = False
+    return _Circles(R, q4, row, half, complete)
+
+
+def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
+    """Angles t (3, 2, M, ...) of shoulder and wrist, their first halves, at psi (M, ...); R: of `_Circles`."""
+    parts = R.reshape(3, 3, 3, 2, len(psi), *[1] * (psi.ndim - 1))[:, :, ::2]
+    (x0, z0), (x1, z1), (x2, z2) = parts[0] + parts[1] * np.cos(psi) + parts[2] * np.sin(psi)
+    r = np.hypot(z0, z1)
+    size = np.where(r > ROUNDING, r, 1.0)
+    c, s = np.where(r > ROUNDING, z0 / size, 1.0), z1 / size
+    t3 = np.arctan2(s * x0 - c * x1, r * x2 - z2 * (c * x0 + s * x1))
+    return np.stack([np.arctan2(s, c), np.arctan2(r, -z2), t3])
+
+
+def _joints(of: ArmAngle, t: Array, flip: Array) -> Array:
+    """Joint values (3, 2, ...) of shoulder and wrist: of the first half, or where flip of t + pi, -t, t + pi."""
+    other = np.stack([t[0] + np.pi, -t[1], t[2] + np.pi])
+    return np.asarray(np.where(flip, other, t) - of.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
+
+
+def _roots(a: Array, b: Array, c: Array) -> Array:
+    """The two angles (M, 2) where a cos + b sin = c; where there is none the one that comes closest, twice."""
+    apart = np.arccos(np.clip(c / np.maximum(np.hypot(a, b), TINY), -1.0, 1.0))
+    middle = np.arctan2(b, a)
+    return np.stack([middle - apart, middle + apart], axis=1)
+
+
+def _turning(R: Array) -> tuple[Array, Array, Array]:
+    """a, b, c (M,): the last joint turns at the rate (a cos(psi) + b sin(psi) + c) / (R31^2 + R32^2)."""
+    x, y = R[:, 2, 0, 1], -R[:, 2, 1, 1]
+    return x[0] * y[2] - y[0] * x[2], y[0] * x[1] - x[0] * y[1], x[1] * y[2] - y[1] * x[2]
+
+
+def _places(of: ArmAngle, R: Array, near: Array) -> Array:
+    """Values of psi (M, K), sorted, where a joint may stand on a limit or at near (M, n), or the last one turns back,
+    and some between."""
+    turning = _turning(R)
+    out = [_roots(turning[0], turning[1], -turning[2])]
+    for k, joints in enumerate(JOINTS):
+        e = R[:, :, :, k]
+        for i, joint in enumerate(joints):
+            lower, upper = of.arm.lower[joint], of.arm.upper[joint]
+            for value in [near[:, joint], *([lower, upper] if upper - lower < TURN else [])]:
+                t = value + of.offset[i, k]
+                c, s = np.cos(t), np.sin(t)
+                if i == 1:
+                    out.append(_roots(e[1, 2, 2], e[2, 2, 2], -c - e[0, 2, 2]))
+                else:
+                    f = e[:, 0, 2] * s - e[:, 1, 2] * c if i == 0 else e[:, 2, 0] * s + e[:, 2, 1] * c
+                    out.append(_roots(f[1], f[2], -f[0]))
+    out.append(np.broadcast_to(np.arange(EVEN) * (TURN / EVEN), (len(near), EVEN)))
+    return np.sort(np.remainder(np.concatenate(out, axis=1), TURN), axis=1)
+
+
+class _Samples(NamedTuple):
+    """On curves (M, 2, 2), the halves of shoulder and wrist, at 2 K samples: K places and the middles behind them."""
+
+    psi: Array  # (M, 2 K + 1)
+    cost: Array  # (M, 2, 2, 2 K) motion from near
+    legal: Bool  # (M, 2, 2, 2 K)
+    up: Bool  # (M, K) whether the last joint grows behind a place
+    between: Bool  # (M, 2, 2, K) legal behind a place
+    point: Bool  # (M, 2, 2, K) legal at a place, and neither before nor behind it
+    turned: Array  # (M, 2 K) the last joint, of the first half
+
+
+def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
+    """Those of circles M; near: (M, n)."""
+    arm = of.arm
+    psi = _places(of, circles.R, near)
+    M, K = psi.shape
+    ends = np.concatenate([psi, psi[:, :1] + TURN], axis=1)
+    psi = np.empty((M, 2 * K + 1))
+    psi[:, ::2], psi[:, 1::2] = ends, 0.5 * (ends[:, 1:] + ends[:, :-1])
+    t = _angles(of, circles.R, psi[:, :-1])
+    elbow, reached = nearest_copy(wrapped(circles.q4), near[:, 3], float(arm.lower[3]), float(arm.upper[3]))
+    cost = np.broadcast_to(np.abs(elbow - near[:, 3])[:, None, None, None], (M, 2, 2, 2 * K)).copy()
+    legal = np.broadcast_to(np.broadcast_to(reached, M)[:, None, None, None], cost.shape).copy()
+    for half in range(2):
+        q = _joints(of, t, np.array(half == 1))
+        for k, joints in enumerate(JOINTS):
+            some = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
+            for i, joint in enumerate(joints):
+                close = near[:, joint, None]
+                value, ok = nearest_copy(wrapped(q[i, k]), close, float(arm.lower[joint]), float(arm.upper[joint]))
+                moved, fits = np.abs(value - close), np.broadcast_to(ok, (M, 2 * K))
+                cost[some] += moved[:, None]
+                legal[some] &= fits[:, None]
+    a, b, c = (x[:, None] for x in _turning(circles.R))
+    middle = psi[:, 1::2]
+    up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < NO_SIZE)
+    # a piece shorter than rounding tells nothing: it is as the one before it
+    wide = np.diff(ends, axis=1) > EXACT
+    before = np.maximum.accumulate(np.where(np.tile(wide, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
+    up = np.take_along_axis(up, before, axis=1)
+    between = np.take_along_axis(legal[..., 1::2], before[:, None, None], axis=3)
+    point = legal[..., ::2] & wide[:, None, None] & ~between & ~np.roll(between, 1, axis=3)
+    return _Samples(psi, cost, legal, up, between, point, t[2, 1] - of.offset[2, 1])
+
+
+class Turning(NamedTuple):
+    """`Curves` of targets (N, 4, 4) by the arm angle: it is their parameter."""
+
+    of: ArmAngle
+    circles: _Circles
+    near: Array  # (N, n)
+    pieces: Pieces
+    short: Bool
+    steps: int = STEPS
+
+    @classmethod
+    def along(cls, of: ArmAngle, target: Array, near: Array) -> Turning:
+        """The curves of targets, near (N, n)."""
+        circles = _circles(of, target)
+        found = _pieces(of, circles, near[circles.row]) if len(circles.row) else none(of.arm.n)
+        curves = cls(of, circles, near, found, np.zeros(len(target), bool))
+        return curves._replace(pieces=found._replace(start=curves.at(found, found.at)[0]))
+
+    @property
+    def complete(self) -> Bool:
+        return self.circles.complete
+
+    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
+        """None: they are samples."""
+        return []
+
+    def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
+        """As `Curves.at`."""
+        place = np.zeros((len(self.near), 2), np.intp)
+        place[self.circles.row, self.circles.half] = np.arange(len(self.circles.row))
+        circle = place[pieces.row, pieces.branch // 4]
+        t = _angles(self.of, self.circles.R[..., circle], parameter)
+        q = _joints(self.of, t, np.stack([pieces.branch // 2 % 2 == 1, pieces.branch % 2 == 1]))
+        row = np.stack([*q[:, 0], self.circles.q4[circle], *q[:, 1]], axis=1)
+        return nearest_row(self.of.arm, row, self.near[pieces.row])
+
+
+def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
+    """All pieces of circles M, near (M, n); their starts are not filled in."""
+    s = _samples(of, circles, near)
+    M, K = s.up.shape
+    turns = s.up != np.roll(s.up, 1, axis=1)  # the last joint turns back here
+    of_curves = np.broadcast_to(turns[:, None, None], s.between.shape).reshape(-1, K)
+    between, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
+    found = [runs(between, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
+    other, begin, count = runs(np.ones_like(between), of_curves)
+    so_far = np.cumsum(np.tile(between | point, 2), axis=1)
+    so_far = np.concatenate([np.zeros((len(between), 1), int), so_far], axis=1)
+    empty = so_far[other, begin + count] == so_far[other, begin]
+    found.append((other[empty], begin[empty], count[empty]))
+    legal = np.repeat([True, True, False], [len(curve) for curve, *_ in found])
+    curve, first, length = (np.concatenate(column) for column in zip(*found, strict=True))
+    circle, wrist = curve // 4, curve % 2
+    # the best sample, and how far the last joint turns: it is monotone between samples, which makes it sure
+    costs = np.concatenate([s.cost, np.where(s.legal, s.cost, np.inf)]).reshape(-1, 2 * K)
+    best = best_samples(costs, curve + len(between) * legal, 2 * first, 2 * length + 1)
+    sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)
+    step = np.remainder(sign * (np.roll(s.turned, -1, axis=1) - s.turned), TURN)
+    step[step > TURN - SAME * 10] = 0.0  # rounding, backwards
+    way = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
+    total = way[circle, 2 * (first + length)] - way[circle, 2 * first]
+    total[length == K] = np.where(total[length == K] > np.pi, TURN, 0.0)
+    start = s.turned[circle, 2 * first] + np.pi * wrist
+    end = start + np.where(s.up[circle, first], total, -total)
+
+    def psi(sample: Int) -> Array:
+        return np.asarray(s.psi[circle, sample % (2 * K)] + TURN * (sample // (2 * K)))
+
+    on = 2 * first + best
+    return Pieces(
+        circles.row[circle], circles.half[circle] * 4 + curve % 4, legal,
+        np.minimum(start, end), np.maximum(start, end),
+        psi(2 * first), psi(2 * (first + length)),
+        psi(np.maximum(on - 1, 2 * first)), psi(on), psi(np.minimum(on + 1, 2 * (first + length))),
+        np.zeros((len(curve), of.arm.n)),
+    )  # fmt: skip

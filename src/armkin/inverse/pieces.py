@@ -1,0 +1,108 @@
+"""Pieces of curves of answers: legal intervals of the redundant joint, and families that have none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Int = NDArray[np.intp]
+
+
+class Pieces(NamedTuple):
+    """P pieces, each a stretch of the parameter of its curve along which the redundant joint is monotone."""
+
+    row: Int  # (P,) whose target
+    branch: Int  # (P,) which curve of it
+    legal: Bool  # (P,) a legal interval, else a family that has none
+    a: Array  # (P,) ends a <= b of the redundant joint [rad]
+    b: Array
+    first: Array  # (P,) ends of the parameter
+    last: Array
+    low: Array  # (P,) the parameter of the best sample, and those beside it
+    at: Array
+    high: Array
+    start: Array  # (P, n) the posture of the best sample: the one nearest to near
+
+    def of(self, some: Bool | Int) -> Pieces:
+        """Some of them."""
+        row, branch, legal, *real = self
+        return Pieces(row[some], branch[some], legal[some], *(column[some] for column in real))
+
+
+class Curves(Protocol):
+    """The answers of some targets N, as curves with a parameter."""
+
+    @property
+    def complete(self) -> Bool:
+        """Whether no curve can be missing (N,)."""
+        ...
+
+    @property
+    def short(self) -> Bool:
+        """Whether no joint moves by REACH along any family (N,)."""
+        ...
+
+    @property
+    def pieces(self) -> Pieces:
+        """All pieces of their curves."""
+        ...
+
+    @property
+    def steps(self) -> int:
+        """Of the golden section that leads from a best sample to the nearest posture."""
+        ...
+
+    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
+        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample."""
+        ...
+
+    def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
+        """A posture (P, n) on each piece, at its legal copy nearest to near, and whether it is legal."""
+        ...
+
+
+def none(n: int) -> Pieces:
+    """No piece of an arm of n joints."""
+    zero, index = np.zeros(0), np.zeros(0, np.intp)
+    return Pieces(index, index, zero > 0, zero, zero, zero, zero, zero, zero, zero, np.zeros((0, n)))
+
+
+def motion(arm: Arm, q: Array, near: Array) -> Array:
+    """Sum of |change| from near [deg | mm]: (..., n) -> (...); inf where there is no posture."""
+    total = np.abs(q - near) @ np.where(arm.prismatic, 1.0, 180 / np.pi)
+    return np.where(np.isnan(total), np.inf, total)
+
+
+def runs(good: Bool, new: Bool) -> tuple[Int, Int, Int]:
+    """Runs of good (M, K), round the end of the last axis; new (M, K): a run that comes to this sample ends before it.
+
+    Returns of each its row, first sample and length. A run of all samples begins at the first one.
+    """
+    K = good.shape[1]
+    stops = new | ~good
+    begins = good & (new | ~np.roll(good, 1, axis=1))
+    begins[:, 0] |= (good & ~new).all(axis=1)
+    twice = np.where(np.concatenate([stops, stops], axis=1), np.arange(2 * K), 2 * K)
+    next_stop = np.minimum.accumulate(twice[:, ::-1], axis=1)[:, ::-1]
+    row, first = np.nonzero(begins)
+    length = np.minimum(next_stop[row, first + 1] - first, K)
+    return row, first, length
+
+
+def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
+    """Of each run the least costly sample, counted from its first one: cost (M, K), a run goes round the end."""
+    begin = np.cumsum(count) - count
+    index = np.arange(int(count.sum())) - np.repeat(begin, count)
+    K = cost.shape[1]
+    sample = np.repeat(first, count) + index
+    costs = cost.ravel()[np.repeat(curve * K, count) + np.where(sample < K, sample, sample - K)]
+    least = np.minimum.reduceat(costs, begin)
+    where = np.flatnonzero(costs == np.repeat(least, count))
+    return np.asarray(index[where[np.searchsorted(where, begin)]])
