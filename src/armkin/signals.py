@@ -52,6 +52,6 @@ def _again(number: int, main: int) -> None:
         if number not in _waiting:
             return
         if sys.platform == "win32":
-            _thread.interrupt_main(number)
+            _thread.interrupt_main(signal.Signals(number))
         else:
             signal.pthread_kill(main, number)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -117,3 +120,36 @@ def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pyte
     port = SerialPort("flood")
     assert len(port.read(0.1)) >= 1000
     port.close()
+
+
+HOLDER = """
+import sys, time
+from armkin.board.ports import port_lock
+from armkin.board.stopping import stoppable
+port_lock._signals = False
+with stoppable() as asked:
+    lock = port_lock.Lock(sys.argv[1])
+    print("holds", flush=True)
+    while not asked():
+        time.sleep(0.01)
+    print("brakes", flush=True)
+    lock.release()
+"""
+
+
+def test_without_signals_a_file_asks_the_holder_to_stop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """On Windows a signal of another process would end the sender before it stops the arm."""
+    name = str(tmp_path / "COM3")
+    monkeypatch.setattr(port_lock, "_signals", False)
+    Path(port_lock._path(name, "stop")).touch()  # of an earlier holder: it stops nobody
+    with subprocess.Popen([sys.executable, "-c", HOLDER, name], stdout=subprocess.PIPE, text=True) as sender:
+        assert sender.stdout is not None
+        assert sender.stdout.readline() == "holds\n"
+        time.sleep(4 * port_lock._POLL_S)
+        assert sender.poll() is None
+        assert holder(name) == sender.pid
+        port_lock.ask_to_stop(name, sender.pid)
+        assert sender.stdout.readline() == "brakes\n"
+        assert sender.wait(30) == 0
+    assert holder(name) is None
+    assert not Path(port_lock._path(name, "stop")).exists()

@@ -155,7 +155,7 @@ def _load(session: Session) -> float:
     """Programs that want to run, for each processor: above 1 this one may have to wait for its turn."""
     if session.port.simulated or not hasattr(os, "getloadavg"):
         return 0.0
-    return max(os.getloadavg()[0], _others_running()) / (os.cpu_count() or 1)
+    return max(float(os.getloadavg()[0]), _others_running()) / (os.cpu_count() or 1)
 
 
 def _others_running() -> int:

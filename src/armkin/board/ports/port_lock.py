@@ -1,14 +1,18 @@
 """The right to a port, so that no two programs talk to one arm.
 
-Who holds it can be found, so that `armkin stop` in another terminal stops the arm.
+Who holds it can be found and asked to stop, so that `armkin stop` in another terminal stops the arm.
 """
 
 from __future__ import annotations
 
+import _thread
 import hashlib
 import os
+import signal
 import sys
 import tempfile
+import threading
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -17,6 +21,9 @@ from armkin.errors import PortInUseError
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
+
+_POLL_S = 0.05
+_signals = os.name == "posix"  # elsewhere a signal of another process ends this one on the spot: a file asks instead
 
 
 class Lock:
@@ -40,6 +47,20 @@ class Lock:
             os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
         with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
             file.write(f"{os.getpid()} {_born(os.getpid())} {rate}")
+        if not _signals:
+            self._request = _path(name, "stop")
+            with suppress(OSError):
+                os.unlink(self._request)  # it was meant for who had the port before
+            threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        """Raise in this process the signal that others cannot send to it."""
+        while self._lock is not None:
+            with suppress(OSError):
+                os.unlink(self._request)
+                heard = signal.getsignal(signal.SIGTERM) not in (signal.SIG_DFL, signal.SIG_IGN)
+                _thread.interrupt_main(signal.SIGTERM if heard else signal.SIGINT)
+            time.sleep(_POLL_S)
 
     def release(self) -> None:
         """Let others have the port."""
@@ -62,6 +83,15 @@ def holder(name: str) -> int | None:
         return _read_pid(name)
     lock.release()
     return None
+
+
+def ask_to_stop(name: str, process: int) -> None:
+    """Ask the process that holds a port to stop its arm and to give the port back. Raises OSError."""
+    if sys.platform == "win32" or not _signals:
+        with open(_path(name, "stop"), "w", encoding="ascii"):
+            return
+    os.kill(process, signal.SIGTERM)
+    os.kill(process, signal.SIGCONT)  # a suspended one hears it only when it goes on
 
 
 def holder_rate(name: str) -> int | None:
@@ -95,7 +125,9 @@ def _acquired(name: str) -> BaseFileLock | None:
 def _path(name: str, end: str) -> str:
     real = name if "://" in name else os.path.realpath(name)
     key = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:16]
-    user = os.getuid() if sys.platform != "win32" else "user"  # on Windows the folder is the user's own
+    user = "user"  # on Windows the folder is the user's own
+    if sys.platform != "win32":
+        user = str(os.getuid())
     return os.path.join(tempfile.gettempdir(), f"armkin-{user}-{key}.{end}")
 
 

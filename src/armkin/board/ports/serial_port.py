@@ -170,6 +170,8 @@ def _open_serial(name: str, baud: int, reset: bool) -> Any:
 
 def _keep_dtr(port: Any) -> None:
     """Do not let closing the port drop DTR: the next opening then does not reset an Uno."""
+    if sys.platform == "win32":
+        return
     with suppress(Exception):
         import termios
 

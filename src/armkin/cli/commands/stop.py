@@ -77,16 +77,12 @@ def _port(given: str | None, baud: int, reset: bool) -> str:
 
 
 def _end(process: int, port: str) -> None:
-    import os
-    import signal
     import time
 
-    from armkin.board.ports import holder
+    from armkin.board.ports import ask_to_stop, holder
 
     try:
-        os.kill(process, signal.SIGTERM)
-        if hasattr(signal, "SIGCONT"):
-            os.kill(process, signal.SIGCONT)  # a suspended one hears it only when it goes on
+        ask_to_stop(port, process)
     except OSError as error:
         raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
     end = time.monotonic() + _PATIENCE
