@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, wrapped
 from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CONVERGING, FAR_OFF, LEFT_OUT, ROUNDING, TINY, WEAK
+from armkin.inverse.numeric.tolerances import CONVERGING, LEFT_OUT, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -112,31 +112,6 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
         gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, TINY), 0.0)
         step[few] = (Vt * (gain * (U * r[few, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
     return step
-
-
-def newton(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> tuple[Array, Array]:
-    """Newton's method for tasks with as many constraints as joints, from starts (M, n) close to a solution.
-
-    Returns the best q met and its `missing`.
-    """
-    unit = radian_or_reach(arm)
-    q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
-    active = np.arange(len(q))
-    for _ in range(steps + 1):
-        if not len(active):
-            break
-        r, J = scaled(arm, task, q[active], target[active])
-        size = np.linalg.norm(r, axis=1)
-        better = size < best_size[active]
-        gained = size < 0.5 * best_size[active]
-        rows = active[better]
-        best[rows], best_size[rows] = q[rows], size[better]
-        step = nudged(np.linalg.solve, J, r[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
-        q[active] += step * unit
-        # a residual of rounding's size falls no further; a step that gains nothing is the last one
-        active = active[(size > ROUNDING) & (gained | (size > FAR_OFF))]
-    return best, best_size
 
 
 def difference(arm: Arm, a: Array, b: Array) -> Array:

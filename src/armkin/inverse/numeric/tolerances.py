@@ -110,7 +110,6 @@ NO_BLOCK = 1e-10  # determinant of a block of it that loses a direction
 NOISE = 1e-13  # relative size of noise that makes a matrix regular
 LEFT_OUT = 1e-10  # singular value that a step of least norm leaves out
 CONVERGING = 1e-11  # residual below which a step has to halve it
-FAR_OFF = 1e-3  # residual above which a step may gain nothing
 MOVED = 1e-3  # of the way: a joint that moves less along a component does not move
 DOUBLE_ROOT = 3e-4  # [rad] how far rounding parts a candidate from its root at most
 ROOT_ROUNDING = 1e-13  # that way times the smallest singular value

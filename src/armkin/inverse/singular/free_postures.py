@@ -1,6 +1,6 @@
 """Self-motions beside keep-outs: one whose listed posture hits something is listed by its nearest free one instead.
 
-A self-motion is followed both ways from the posture that is listed, in steps that are filled in to 0.1 degrees.
+A self-motion is followed both ways from the posture that is listed, by `curves`, and filled in to 0.1 degrees.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SOLUTION, WEAK
+from armkin.inverse.singular.curves import Curves
 from armkin.keep_out.clearance import clear
 from armkin.model.units import radian_or_reach
 
@@ -22,9 +23,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-STEP = 0.05  # [rad, reaches] of all joints together
 FINE = np.deg2rad(0.1)  # between the postures that are looked at
-MOST = 600  # steps each way: more than four turns of one joint
 
 
 def with_free_postures(goals: Goals, out: Batch) -> Batch:
@@ -46,43 +45,25 @@ def with_free_postures(goals: Goals, out: Batch) -> Batch:
 
 
 def followed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Postures (M, n) of the self-motion through q (n,), all it has within `MOST` steps each way; none where it rests.
+    """Postures (M, n) of the self-motion through q (n,), as far as it is followed; none where it rests.
 
     Where several directions are lost, those along each of them.
     """
-    unit, goal = radian_or_reach(arm), target[None]
-    _, V, nullity = newton.null_space(arm, task, q[None], goal)
+    unit = radian_or_reach(arm)
+    _, V, nullity = newton.null_space(arm, task, q[None], target[None])
+    lost = V[0, arm.n - max(int(nullity[0]), 1) :]
+    ahead = np.concatenate([lost, -lost])
+    goal = np.repeat(target[None], len(ahead), axis=0)
+    walk = Curves(arm, task, np.tile(q, (len(ahead), 1)), np.ones(ahead.shape, bool), goal, ahead)
     pieces = [np.empty((0, arm.n))]
-    for lost in V[0, arm.n - max(int(nullity[0]), 1) :]:
-        forth, closed = _way(arm, task, q, lost, target)
-        ways = [forth] if closed else [forth, _way(arm, task, q, -lost, target)[0]]
-        for way in ways:
-            count = max(int(np.ceil(STEP / FINE)), 1)
-            share = (np.arange(count) / count)[None, :, None]
-            apart = newton.difference(arm, way[1:], way[:-1]) * unit
-            between = (way[:-1, None] + share * apart[:, None]).reshape(-1, arm.n)
-            there, size = newton.correct(arm, task, between, np.repeat(goal, len(between), axis=0), steps=6, least=WEAK)
-            pieces.append(there[size <= SOLUTION])
+    while walk.going.any():
+        step = walk.step()
+        count = max(int(np.ceil(np.abs(step.chord).max() / FINE)), 1)
+        share = (np.arange(count) / count)[:, None, None]
+        between = (step.before + share * step.chord * unit).reshape(-1, arm.n)
+        goal = np.repeat(target[None], len(between), axis=0)
+        there, size = newton.correct(arm, task, between, goal, steps=6, least=WEAK)
+        good = size <= SOLUTION
+        pieces.append(there[good])
+        walk.going[step.rows] &= good.reshape(count, -1).all(axis=0)  # what else is near is no part of it
     return np.concatenate(pieces)
-
-
-def _way(arm: Arm, task: Task, q: Array, ahead: Array, target: Array) -> tuple[Array, bool]:
-    """Postures (M, n) that are passed from q (n,) on, q among them, and whether the way comes back to it."""
-    unit, goal = radian_or_reach(arm), target[None]
-    passed = [q]
-    for _ in range(MOST):
-        there, size = newton.correct(arm, task, (passed[-1] + STEP * ahead * unit)[None], goal, steps=8, least=WEAK)
-        gone = newton.difference(arm, there[0], passed[-1])
-        far = float(np.linalg.norm(gone))
-        if size[0] > SOLUTION or not 0.3 * STEP < far < 3 * STEP:
-            break
-        passed.append(there[0])
-        if len(passed) > 3 and np.linalg.norm(newton.difference(arm, there[0], q)) < 0.6 * STEP:
-            return np.array([*passed, q]), True
-        _, V, nullity = newton.null_space(arm, task, there, goal)
-        lost = V[0, arm.n - max(int(nullity[0]), 1) :]
-        ahead = lost.T @ (lost @ gone)  # on, in the directions that are lost there
-        if (size_ := float(np.linalg.norm(ahead))) < 0.3 * far:
-            break
-        ahead /= size_
-    return np.array(passed), False

@@ -65,8 +65,8 @@ def drop_contained(
             pairs += [(int(k), int(i), int(j)) for j in mine[(away < CLOSE_BY) & few]]
             if sigma[k, i] < WEAK and i:
                 one = bool((away[few] < 10 * TURNED).any())
-                on = (j for j in mine[(away < TURNED) & ~few] if _leads_to(arm, task, q[k, j], q[k, i], target[k]))
-                chosen[k, i] = not (one or any(True for _ in on))
+                on = (_round(arm, task, q[k, j], curve[k, j], q[k, i], target[k]) for j in mine[(away < TURNED) & ~few])
+                chosen[k, i] = not (one or any(on))
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
@@ -101,30 +101,13 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
-def _leads_to(arm: Arm, task: Task, q: Array, meeting: Array, target: Array) -> bool:
-    """Whether the self-motion through q (n,) arrives at a posture where several directions are lost at once (n,).
-
-    Steps of `STEP` at most along the null direction, the way that comes closer: False where none does.
-    """
-    unit, goal = radian_or_reach(arm), target[None]
-    left = newton.difference(arm, meeting, q)
-    while (far := float(np.linalg.norm(left))) > STEP:
-        _, V, _ = newton.null_space(arm, task, q[None], goal)
-        ahead = V[0, -1] * np.sign(V[0, -1] @ left) * min(3 * STEP, far / 2)
-        there, size = newton.correct(arm, task, (q + ahead * unit)[None], goal, steps=6, least=WEAK)
-        closer = newton.difference(arm, meeting, there[0])
-        if size[0] > SOLUTION or not np.linalg.norm(closer) < far - STEP / 10:
-            return False
-        q, left = there[0], closer
-    return True
-
-
 def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target: Array) -> None:
     """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
 
     curve: (K, M, n) the joints that a posture's self-motion moves. One group's posture may be close to another's;
     where a self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
     """
+    unit = radian_or_reach(arm)
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
     for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
@@ -132,7 +115,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
         for i in np.flatnonzero(chosen[k] & moving[k]):
             apart = newton.difference(arm, q[k, kept], q[k, i])
             close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
-            between = q[k, i] + 0.5 * apart[close] * radian_or_reach(arm)
+            between = q[k, i] + 0.5 * apart[close] * unit
             there = np.repeat(target[k : k + 1], len(between), axis=0)
             # one kept may be where its own self-motion and this one meet
             turned = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
@@ -144,7 +127,10 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
             if (
                 (newton.missing(arm, task, between, there) <= SOLUTION).any()
                 or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])
-                or any(_round(arm, task, q[k, i], curve[k, i], d, target[k]) for d in apart[slow])
+                or any(
+                    _round(arm, task, q[k, i], curve[k, i] | (np.abs(d) > SAME), q[k, i] + d * unit, target[k])
+                    for d in apart[slow]
+                )
             ):
                 chosen[k, i] = False
             else:
@@ -165,11 +151,10 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool
     return bool(good.reshape(3, -1).all(axis=0).any())
 
 
-def _round(arm: Arm, task: Task, q: Array, curve: Bool, way: Array, target: Array) -> bool:
-    """Whether the self-motion of q (n,) goes round to q + way, which other joints than curve (n,) move slowly."""
-    joints = curve | (np.abs(way) > SAME)
-    there = (q + way * radian_or_reach(arm))[None, None]
-    return bool(circuits.on_one(arm, task, q[None], joints[None], there, np.ones((1, 1), bool), target[None]).all())
+def _round(arm: Arm, task: Task, q: Array, joints: Bool, other: Array, target: Array) -> bool:
+    """Whether the self-motion of q (n,), along which joints (n,) move, goes round to another posture (n,)."""
+    there, asked = other[None, None], np.ones((1, 1), bool)
+    return bool(circuits.on_one(arm, task, q[None], joints[None], there, asked, target[None]).all())
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:

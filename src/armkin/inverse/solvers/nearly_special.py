@@ -263,7 +263,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     rough = newton.missing(arm, task, flat, goals)
     some = np.flatnonzero(rough < HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
-    q[some], size[some] = newton.newton(arm, task, flat[some], goals[some], steps=6)
+    q[some], size[some] = newton.correct(arm, task, flat[some], goals[some])
     branch, good = q.reshape(N, B, n), (size <= ANSWERED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)

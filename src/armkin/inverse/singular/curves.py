@@ -1,0 +1,119 @@
+"""One-dimensional solution sets, followed from given postures, all at once.
+
+A step along the direction that is lost, pulled back at right angles to it (Allgower and Georg, Numerical Continuation
+Methods, 1990, ch. 2). Its length is bounded by the second smallest singular value: a curve bends where another is near.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
+from armkin.inverse.tasks.task import Task
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+STEP = 0.2  # [rad, reaches] along a curve
+MOST = 250  # steps
+PASSED = 0.15  # of a step: joint values this close to its chord are on the way; a curve is half as far off it
+BEND = 4.0  # steps are at most so many times the second smallest singular value
+OVER = 0.05  # a step over a crossing
+STRAIGHT = 0.8  # cosine between the directions of two steps
+
+
+class Step(NamedTuple):
+    """A step of some curves: rows (A,) which, before (A, n) where from, chord (A, n) its way in scaled units.
+
+    unsure: (A,) nobody knows where the curve goes on: another crosses it, it is too long, or steps become too short.
+    """
+
+    rows: NDArray[np.intp]
+    before: Array
+    chord: Array
+    unsure: Bool
+
+    def passes(self, arm: Arm, posture: Array, place: NDArray[np.intp]) -> Bool:
+        """Which postures (P, n) the place-th of these steps pass: (P,)."""
+        way, chord = newton.difference(arm, posture, self.before[place]), self.chord[place]
+        size = (chord * chord).sum(axis=1)
+        part = np.clip((way * chord).sum(axis=1) / np.maximum(size, TINY), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))
+
+
+class Curves:
+    """Curves through postures q (M, n), followed along `ahead` (M, n); joints: (M, n) those that move.
+
+    at: (M, n) where they are. going: (M,) those that are not at their end; a caller may end others. closed: (M,) those
+    that came back. Where several directions are lost a curve goes straight on.
+    """
+
+    def __init__(self, arm: Arm, task: Task, q: Array, joints: Bool, target: Array, ahead: Array) -> None:
+        self._arm, self._task, self._joints, self._target = arm, task, joints, target
+        self._start, self._ahead, self._taken = q, ahead, np.zeros(len(q), int)
+        self._pace = _longest(_across(arm, task, q, joints, target)[2])
+        self.at, self.going, self.closed = q.copy(), np.ones(len(q), bool), np.zeros(len(q), bool)
+
+    def step(self) -> Step:
+        """One step of all that are going; one that leads off its curve is not taken, and the next is half as long."""
+        rows = np.flatnonzero(self.going)
+        arm, joints, last, pace = self._arm, self._joints[rows], self._ahead[rows], self._pace[rows]
+        start = self.at[rows] + pace[:, None] * last * radian_or_reach(arm)
+        there, V, second, size = _across(arm, self._task, start, joints, self._target[rows])
+        ahead = _onwards(V, second, last)
+        cosine = np.linalg.norm(ahead, axis=1)
+        good = (size < OFF_CURVE) & (cosine > STRAIGHT)
+        before = self.at[rows]
+        self.at[rows[good]], self._ahead[rows[good]] = there[good], ahead[good] / cosine[good, None]
+        self._pace[rows] = pace = np.minimum(_longest(second), np.where(good, 2.0, 0.5) * pace)
+        self._taken[rows] += 1
+        stuck, long = ~good & (pace < SHORTEST_STEP), self._taken[rows] == MOST
+        unsure = (second < CROSSING) | (stuck & (size < OFF_CURVE)) | long
+        out = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
+        home = out.passes(arm, self._start[rows], np.arange(len(rows)))
+        self.closed[rows] = home & good & (self._taken[rows] > 2)
+        self.going[rows] = ~(self.closed[rows] | stuck | long)
+        return out
+
+
+def directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
+    """Directions (M, n) of curves through postures q (M, n), moving joints (M, n); which are crossings (M,)."""
+    _, V, second, _ = _across(arm, task, q, joints, target)
+    return V[:, :, 0], np.asarray(second < CROSSING)
+
+
+def _longest(second: Array) -> Array:
+    """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
+    return np.asarray(np.where(second < CROSSING, OVER, np.minimum(STEP, BEND * second)))
+
+
+def _onwards(V: Array, second: Array, last: Array) -> Array:
+    """What is lost of the directions last (M, n), those of steps: V (M, n, n) the smallest singular value's first."""
+    along = np.einsum("mij,mi->mj", V, last)
+    along[:, 2:] = 0.0
+    along[second >= CROSSING, 1] = 0.0
+    return np.asarray(np.einsum("mij,mj->mi", V, along))
+
+
+def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
+    """Postures (M, n) moved onto the curve beside them, at right angles to it.
+
+    Also right singular vectors there (M, n, n), the curve's direction first, the second smallest singular value (M,)
+    and what is missed (M,).
+    """
+    r, J = newton.scaled(arm, task, q, target)
+    J = J * joints[:, None]
+    L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
+    gain = np.where(L > ACROSS, 1.0 / np.maximum(L, ACROSS), 0.0)
+    gain[:, 0] = 0.0
+    back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
+    for _ in range(3):
+        q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
+        r = newton.residuals(arm, task, q, target)
+    return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))
