@@ -199,6 +199,18 @@ def test_classes_have_at_most_250_lines() -> None:
     assert not long
 
 
+def test_functions_have_at_most_60_lines() -> None:
+    """Outside `cli`, where a command's options are its function's parameters."""
+    long = {
+        f"{module}.{node.name}"
+        for module, path in MODULES.items()
+        if not module.startswith("armkin.cli.")
+        for node in _nodes(path)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (node.end_lineno or 0) - node.lineno >= 60
+    }
+    assert not long
+
+
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
 LISTED_ELSEWHERE = {  # docs/architecture.md; its table of commands; a kind is one file and no line elsewhere
     SOURCE / "armkin",

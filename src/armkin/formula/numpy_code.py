@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -42,29 +42,18 @@ def workspace(buffers: list[Buffer], length: int) -> list[NDArray[Any]]:
     return made
 
 
-def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
-    """One numpy call a line, its result in a buffer that is free again after its last use.
+class _Buffers:
+    """Which buffer holds which value, constants and parts by name; one is free again after its value's last use."""
 
-    A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``. scalar: functions
-    that numpy may round another way in its vectorised loops are called number by number.
-    Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
-    """
-    names = {id(node): f"i{k}" for k, node in enumerate(recording.inputs)}
-    constants: dict[str, Any] = {}
-    both_signs = _both_signs(recording)
-    reads = {
-        id(node): [y for x in node.args for y in (x.args if id(x) in both_signs else [x]) if isinstance(y, Node)]
-        for node in recording.nodes
-    }
-    last = {id(x): k for k, node in enumerate(recording.nodes) if id(node) not in both_signs for x in reads[id(node)]}
-    last |= {id(x): len(recording.nodes) for x in recording.outputs}
-    free: dict[tuple[tuple[int, ...], type], list[str]] = {}
-    kinds: dict[int, tuple[tuple[int, ...], type]] = {}
-    buffers: list[Buffer] = []
-    parts: dict[tuple[str, str], str] = {}
-    lines = []
+    def __init__(self, recording: Recording) -> None:
+        self.names = {id(node): f"i{k}" for k, node in enumerate(recording.inputs)}
+        self.constants: dict[str, Any] = {}
+        self.all: list[Buffer] = []
+        self._kinds: dict[int, tuple[tuple[int, ...], type]] = {}
+        self._free: dict[tuple[tuple[int, ...], type], list[str]] = {}
+        self._parts: dict[tuple[str, str], str] = {}
 
-    def name(x: Any, half: tuple[int | None, ...] = ()) -> str:
+    def name(self, x: Any, half: tuple[int | None, ...] = ()) -> str:
         """A value, or its part; half: the place on each of the last branch axes, None for all places."""
         axes = axes_of(x)
         place: Place = tuple(
@@ -72,61 +61,87 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
         )
         if not isinstance(x, Node):
             # an array of no axes reaches the loop 0.2 us sooner than a Python number
-            constants[f"k{len(constants)}"] = x[place] if np.ndim(x) else np.array(float(x))
-            return f"k{len(constants) - 1}"
-        whole = names[id(x)]
+            self.constants[f"k{len(self.constants)}"] = x[place] if np.ndim(x) else np.array(float(x))
+            return f"k{len(self.constants) - 1}"
+        whole = self.names[id(x)]
         if all(isinstance(k, slice) for k in place):
             return whole
-        if (whole, str(place)) not in parts:
-            parts[whole, str(place)] = f"b{len(buffers)}"
-            buffers.append(Buffer(*kinds[id(x)], int(whole[1:]), place))
-        return parts[whole, str(place)]
+        if (whole, str(place)) not in self._parts:
+            self._parts[whole, str(place)] = f"b{len(self.all)}"
+            self.all.append(Buffer(*self._kinds[id(x)], int(whole[1:]), place))
+        return self._parts[whole, str(place)]
 
-    def release(nodes: list[Node]) -> None:
-        """Buffers that are free again."""
+    def take(self, node: Node) -> None:
+        """A buffer for a value."""
+        kind = self._kinds[id(node)] = (node.axes, bool if node.op in BOOLEAN else float)
+        if self._free.get(kind):
+            self.names[id(node)] = self._free[kind].pop()
+        else:
+            self.names[id(node)] = f"b{len(self.all)}"
+            self.all.append(Buffer(*kind))
+
+    def release(self, nodes: list[Node]) -> None:
+        """Those of these values are free again."""
         for x in nodes:
-            free.setdefault(kinds[id(x)], []).append(names[id(x)])
+            self._free.setdefault(self._kinds[id(x)], []).append(self.names[id(x)])
 
+
+def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
+    """One numpy call a line, its result in a buffer that is free again after its last use.
+
+    A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``. scalar: functions
+    that numpy may round another way in its vectorised loops are called number by number.
+    Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
+    """
+    both_signs, buffers = _both_signs(recording), _Buffers(recording)
+    reads = {
+        id(node): [y for x in node.args for y in (x.args if id(x) in both_signs else [x]) if isinstance(y, Node)]
+        for node in recording.nodes
+    }
+    last = {id(x): k for k, node in enumerate(recording.nodes) if id(node) not in both_signs for x in reads[id(node)]}
+    last |= {id(x): len(recording.nodes) for x in recording.outputs}
+    lines = []
     for k, node in enumerate(recording.nodes):
         if id(node) in both_signs:
             continue
         term = _term(node)
         signed = term if id(term) in both_signs else None
-        arguments = [name(x) for x in node.args] if signed is None else []
+        arguments = [buffers.name(x) for x in node.args] if signed is None else []
         over = [x for x in {id(x): x for x in reads[id(node)]}.values() if x.op != "input" and last[id(x)] == k]
         if node.op not in FLIPS:  # a flip must not write where it reads
-            release(over)
-        kind = kinds[id(node)] = (node.axes, bool if node.op in BOOLEAN else float)
-        if free.get(kind):
-            names[id(node)] = free[kind].pop()
-        else:
-            names[id(node)] = f"b{len(buffers)}"
-            buffers.append(Buffer(*kind))
+            buffers.release(over)
+        buffers.take(node)
         if node.op in FLIPS:
-            release(over)
+            buffers.release(over)
         if signed is None:
             # numpy deprecates a positional third argument of minimum and maximum
             out = "out=" if node.op in ("minimum", "maximum") else ""
-            lines.append(f"{node.op}({', '.join(arguments)}, {out}{names[id(node)]})")
-            continue
-        plain = node.args[0] if signed is node.args[1] else node.args[1]
-        factors, value = signed.args
-        for at in np.ndindex(factors.shape[:-1]):
-            half = tuple(i if size > 1 else None for i, size in zip(at, factors.shape, strict=False))
-            factor = factors[at][0] if node.op == "add" else -factors[at][0]
-            if factor == 0:
-                lines.append(f"positive({name(plain, half)}, {name(node, half)})")
-            else:
-                op = "add" if factor > 0 else "subtract"
-                lines.append(f"{op}({name(plain, half)}, {name(value, half)}, {name(node, half)})")
-    parameters = [names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers))]
-    outputs = list(map(name, recording.outputs))
-    scope = {**constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
+            lines.append(f"{node.op}({', '.join(arguments)}, {out}{buffers.names[id(node)]})")
+        else:
+            lines += _halves(buffers, node, signed)
+    parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.all))]
+    outputs = list(map(buffers.name, recording.outputs))
+    scope = {**buffers.constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
     scope |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
     if scalar:
         scope |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
     scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in scope}
-    return function_of(parameters, lines, outputs, scope), buffers
+    return function_of(parameters, lines, outputs, scope), buffers.all
+
+
+def _halves(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:
+    """The lines of a sum with both signs of a value, `signed`, one for each half."""
+    plain = node.args[0] if signed is node.args[1] else node.args[1]
+    factors, value = signed.args
+    for at in np.ndindex(factors.shape[:-1]):
+        half = tuple(i if size > 1 else None for i, size in zip(at, factors.shape, strict=False))
+        factor = factors[at][0] if node.op == "add" else -factors[at][0]
+        if factor == 0:
+            yield f"positive({buffers.name(plain, half)}, {buffers.name(node, half)})"
+        else:
+            op = "add" if factor > 0 else "subtract"
+            names = ", ".join(buffers.name(x, half) for x in (plain, value, node))
+            yield f"{op}({names})"
 
 
 def _term(node: Node) -> Node | None:

@@ -71,19 +71,16 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
                 op, args = "negative", [args[1 - args.index("-1.0")]]
             if op == "negative":
                 minus[id(node), index] = args[0]
-            if op == "add" and args[0] in minus:
-                args = args[::-1]
-            if op == "add" and args[1] in minus:
-                op, args = "subtract", [args[0], minus[args[1]]]
+            if op == "add" and (negated := next((k for k in (0, 1) if args[k] in minus), None)) is not None:
+                op, args = "subtract", [args[1 - negated], minus[args[negated]]]
             todo.append(((id(node), index), op, args))
     outputs = [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
     uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
     for result, op, args in reversed(todo):
         if uses[result]:
             uses.update(args * 2 if op == "sign" else args)
-    texts: dict[Value | str, tuple[str, int]] = {
-        (id(node), ()): (f"i{k}", 0) for k, node in enumerate(recording.inputs)
-    }
+    inputs: list[Value] = [(id(node), ()) for node in recording.inputs]
+    texts: dict[Value | str, tuple[str, int]] = {x: (f"i{k}", 0) for k, x in enumerate(inputs)}
     lines: list[str] = []
 
     def text(x: Value | str) -> tuple[str, int]:
@@ -105,7 +102,7 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
         shown = [text(v) for v in every]
         joined = ", ".join(t for t, _ in shown)
         returned.append(f"({joined},)" if axes_of(x) else joined)
-    return function_of([texts[id(x), ()][0] for x in recording.inputs], lines, returned, dict(_FUNCTIONS))
+    return function_of([texts[x][0] for x in inputs], lines, returned, dict(_FUNCTIONS))
 
 
 def function_of(

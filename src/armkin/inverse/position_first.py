@@ -357,10 +357,7 @@ def _descend(arm: Arm, box: _Box, q: Array, target: Array) -> _State:
         hit = (share <= reach[:, None]) & (share < 1.0)
         trial = np.clip(x + np.where(pressed, 0.0, step * reach[:, None]) * box.unit, box.lower, box.upper)
         trial = np.where(hit & (step > 0), box.upper, np.where(hit & (step < 0), box.lower, trial))
-        for _ in range(2):  # back onto the position, with the Jacobian of before
-            T = fk(arm, trial)
-            missed = (goal[:, :3, 3] - T[:, :3, 3]) / arm.reach
-            trial = np.clip(trial + np.einsum("mna,ma->mn", tangent.back, missed) * box.unit, box.lower, box.upper)
+        trial = _back(arm, box, trial, goal, tangent)
         T = fk(arm, trial)
         missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
@@ -375,6 +372,14 @@ def _descend(arm: Arm, box: _Box, q: Array, target: Array) -> _State:
         trust[refused] *= 0.25
         active = active[~rest & (trust[active] > SOLUTION)]
     return _State(q, done)
+
+
+def _back(arm: Arm, box: _Box, q: Array, target: Array, tangent: _Tangent) -> Array:
+    """Postures (M, n) moved back onto their positions, with the Jacobian of before."""
+    for _ in range(2):
+        missed = (target[:, :3, 3] - fk(arm, q)[:, :3, 3]) / arm.reach
+        q = np.clip(q + np.einsum("mna,ma->mn", tangent.back, missed) * box.unit, box.lower, box.upper)
+    return q
 
 
 def _flat(arm: Arm, q: Array, target: Array) -> Bool:

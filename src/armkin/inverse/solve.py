@@ -93,13 +93,22 @@ def ik(
     ):
         return alone
     if (turned := actual(arm)) is not arm:
-        return _commanded(
-            arm,
-            ik(
-                turned, targets, task,
-                near=_actual_near(arm, near), examine=examine, workers=workers, rounding=rounding,
-            ),
-        )  # fmt: skip
+        more: dict[str, Any] = {"examine": examine, "workers": workers, "rounding": rounding}
+        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), **more))
+    return _answered(arm, task, values, near, single, examine, workers, rounding)
+
+
+def _answered(
+    arm: Arm,
+    task: str | None,
+    values: Array,
+    near: ArrayLike | None,
+    single: bool,
+    examine: bool,
+    workers: int,
+    rounding: ArrayLike | None,
+) -> Solutions:
+    """`ik` of an arm whose joints move as they are commanded; single: whether the targets were given in float32."""
     definition, geometry = solver(arm, task)
     given, lead = shaped(definition, values)
     close = read_near(arm, near, lead)

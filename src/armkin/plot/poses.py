@@ -52,23 +52,14 @@ def plot_poses(
     view: elevation and azimuth of the eye [deg]. Arms that move in the xy plane are drawn in that plane.
     out: None opens a window.
     """
-    poses = np.atleast_2d(as_joints(arm, q))
-    if not 1 <= len(poses) <= MOST:
-        raise UsageError(f"{len(poses)} poses in one picture: give 1 to {MOST}")
-    if not np.all(np.isfinite(poses)):
-        raise UsageError("joint values must be finite to be drawn")
-    if names is not None and len(names) != len(poses):
-        raise UsageError(f"{len(poses)} poses and {len(names)} names: give each pose its name")
+    poses = _checked(arm, q, names)
     alone = len(poses) == 1
     shown = poses if names is not None else poses[_spread(len(poses))]
     bones = [skeleton(arm, pose) for pose in shown]
     with_frames = alone if frames is None else frames
     legal = [not outside(arm, pose).any() for pose in shown]
     hit = [_briefly(found) for _, found in hits(arm, shown)] if arm.keep_out else [""] * len(shown)
-    legend = ["start", "end"]
-    if names is not None:
-        legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
-        legend = ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
+    legend = ["start", "end"] if names is None else _legend(names, legal, hit)
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
@@ -101,6 +92,24 @@ def plot_poses(
         if alone:
             drawing.name_joints(bones[0])
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
+
+
+def _checked(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
+    """The poses (K, n); raises UsageError for too many, for other names than poses, and for what is not finite."""
+    poses = np.atleast_2d(as_joints(arm, q))
+    if not 1 <= len(poses) <= MOST:
+        raise UsageError(f"{len(poses)} poses in one picture: give 1 to {MOST}")
+    if not np.all(np.isfinite(poses)):
+        raise UsageError("joint values must be finite to be drawn")
+    if names is not None and len(names) != len(poses):
+        raise UsageError(f"{len(poses)} poses and {len(names)} names: give each pose its name")
+    return poses
+
+
+def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> list[str]:
+    """Names of poses, with what is wrong with them."""
+    legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
+    return ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
 
 
 def _briefly(found: list[Hit]) -> str:

@@ -53,21 +53,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
-    if arm.board is None and any(motor.kind == "bus" for motor in arm.motors):
-        line = "board: {kind: feetech}"
-        raise UsageError(
-            f"{arm.name}: bus servos have a board of their own; add to {arm.path or 'its file'}:\n  {line}",
-            robot_file=arm.path,
-            lines_to_add=[line],
-        )
-    if lacks := missing_keys.lacks(arm, board=not rehearsal):
-        said = ", ".join(words for words, _ in lacks)
-        lines = [line for _, added in lacks for line in added]
-        raise UsageError(
-            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
-            robot_file=arm.path,
-            lines_to_add=lines,
-        )
+    _refuse_incomplete(arm, board=not rehearsal)
     made_up = rehearsal and bool(missing_keys.without_board(arm))
     motors = arm.motors
     if made_up:
@@ -113,6 +99,25 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         meaning=_meaning(arm, grip),
     )
     return Configuration(board, image, axes, grip)
+
+
+def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
+    """Raise UsageError for an arm that lacks what a board, or a plan, must know, all of it at once."""
+    if arm.board is None and any(motor.kind == "bus" for motor in arm.motors):
+        line = "board: {kind: feetech}"
+        raise UsageError(
+            f"{arm.name}: bus servos have a board of their own; add to {arm.path or 'its file'}:\n  {line}",
+            robot_file=arm.path,
+            lines_to_add=[line],
+        )
+    if lacks := missing_keys.lacks(arm, board=board):
+        said = ", ".join(words for words, _ in lacks)
+        lines = [line for _, added in lacks for line in added]
+        raise UsageError(
+            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
+            robot_file=arm.path,
+            lines_to_add=lines,
+        )
 
 
 def _rehearsal_board(arm: Arm) -> Board:

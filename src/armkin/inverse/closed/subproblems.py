@@ -288,6 +288,14 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     disc = h2 - lz * lz
     pair, _ = linear(lx, ly, -lz, 1, UNDERFLOW_SQUARED, None, disc)
     real = disc > -(TOUCHING**2) * h2
+    at, slope = _on_conic(pair, real, a, b, u, v, w)
+    merging = (real & (arrays.absolute(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
+    free = rest * size < NO_SIZE * scale
+    return _prefer(at, free, prefer), Doubt(merging | triple | free, free)
+
+
+def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Pair, Entry]:
+    """Real roots after two Newton steps along the circle, and the slope there; see `trig_quadratic`."""
     c, s = pair
     for _ in range(2):
         value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
@@ -297,9 +305,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
         c, s = c + s * step, s - c * step
         shorter = arrays.where(real, 1.0 / arrays.sqrt(arrays.maximum(c * c + s * s, 0.5)), 1.0)
         c, s = c * shorter, s * shorter
-    merging = (real & (arrays.absolute(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
-    free = rest * size < NO_SIZE * scale
-    return _prefer(Pair(c, s), free, prefer), Doubt(merging | triple | free, free)
+    return Pair(c, s), slope
 
 
 def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:
