@@ -101,6 +101,10 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(browser: Bro
         assert np.linalg.norm(place, axis=1).max() < arm.reach * 1.3
         assert np.ptp(place, axis=0).min() > arm.reach
         page.get_by_role("button", name="Reach").press("Enter")
+        page.get_by_role("button", name="Slice").press("Enter")  # rides along, as voxels
+        expect(page.locator("#legend")).to_contain_text("share of 12 orientations")
+        page.get_by_role("button", name="Slice").press("Enter")
+        expect(page.locator("#legend")).not_to_contain_text("voxels")
         radios = page.get_by_role("radiogroup", name="Branches").get_by_role("radio")
         radios.nth(0).focus()
         posture = page.evaluate("location.hash")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.export.js.program import module
 from armkin.teach.own_solver import about
 from armkin.teach.playing import played
+from armkin.teach.reach_slice import reach_slice
 from armkin.teach.scene import scene
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ def _data(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[s
         "arm": drawn | {"locks": False, "meshes": meshes},
         "solver": solver,
         "plan": None if plan is None else played(arm, plan),
+        "slice": reach_slice(arm) if task_name is None else None,  # of the task that fits the arm
     }
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
 

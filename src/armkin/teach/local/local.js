@@ -3,7 +3,7 @@
 // @ts-ignore: both are made when the page is written
 import * as arm from "armkin/arm.js";
 // @ts-ignore
-import { plan, solver, arm as scene } from "armkin/data.js";
+import { plan, slice, solver, arm as scene } from "armkin/data.js";
 import { absent, get, make } from "../static/js/dom.js";
 import { solving } from "../static/js/solving.js";
 
@@ -22,6 +22,7 @@ function shown(fields) {
 /** Carry out an action. @param {string} name @returns {Promise<any>} */
 export async function act(name) {
   if (name === "stop") return {};
+  if (name === "reach") return slice;
   throw new Refused("this page has no server: start armkin teach for that");
 }
 
@@ -95,6 +96,7 @@ function ready(page) {
   get("keys").querySelector("p")?.replaceChildren("1 to 8 a branch, arrows and Page up, Page down the end effector by 5 mm (with Shift 0.5 mm), P play, F fit the picture");
   if (plan) page.program.carry(plan);
   else absent.append(get("program"));
+  if (!slice) absent.append(get("slice"));
   const title = make("h2", { id: "share-title" }, "Share");
   const buttons = make(
     "div", { class: "row" },
