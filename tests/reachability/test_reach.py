@@ -61,6 +61,13 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
     assert columns[:, 1].max() > 0
 
 
+def test_rings_that_no_branch_reaches_are_counted_as_that() -> None:
+    grid = Grid(armkin.load("moveo"), 60.0, 2, 4, 1, False)
+    found = answered(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
+    assert found["share"].tolist() == found["share_any"].tolist() == [0.0, 0.0]
+    assert np.isnan(found["branches"]).all()
+
+
 @pytest.mark.parametrize("name", ["puma560", "cobra600", "three_dof"])
 def test_pose_by_pose_says_the_same_as_arcs(name: str) -> None:
     """A calibrated arm is asked pose by pose; one whose ratios are all but 1 reaches the same."""

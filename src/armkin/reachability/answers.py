@@ -187,6 +187,8 @@ class _Answers:
     def _summed(self, values: Array, orientations: int, M: int) -> Array:
         """Sums over the solves of a cell: (S, P), each from its place to the next one, or (S, 1) -> (R, M)."""
         R = len(values) // orientations
+        if not values.shape[1]:  # no solve has a branch at all
+            return np.zeros((R, M))
         if values.shape[1] == 1:
             sums = values.reshape(R, orientations).sum(axis=1, keepdims=True)
             return np.broadcast_to(sums, (R, M)).copy()
