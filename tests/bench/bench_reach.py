@@ -1,6 +1,7 @@
 """Reach: CPU time of 10^9 poses by arcs, and the share under keep-outs against a count of its own; CPU time of place.
 
-python tests/bench/bench_reach.py [speed] [keep_outs] [place]
+python tests/bench/bench_reach.py [speed] [keep_outs] [place] [unseen [SEED=1 [POSES=1000000]]]
+unseen: poses of cells of random grids of ten arms by arcs, against `ik` of each: shares, counts of branches.
 """
 
 import json
@@ -17,6 +18,8 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests" / folder) for folder in ("inverse", "reachability")]
 BAR = 2.0  # [s] of one core for 10^9 poses
 PLACE = 30.0  # [s] of one core for all closed-form arms
+TEN = ["ur5e", "puma560", "ar4", "three_dof", "stanford", "planar_3dof", "so101", "wx250s", "kuka_kr6_r700"]
+TEN += ["jaco_j2n6s300"]
 
 
 def speed() -> bool:
@@ -87,6 +90,42 @@ def place() -> bool:
     return total <= PLACE and not different
 
 
+def unseen(seed: int = 1, poses: int = 10**6) -> bool:
+    """Cells of random grids by arcs, against `ik` of each of their poses."""
+    from armkin.reachability.answers import TURN, Question, answered
+    from armkin.reachability.cells import Grid
+
+    rng, total, different = np.random.default_rng(seed), 0, 0
+    for name in TEN:
+        arm, here, cells = armkin.load(name), 0, 0
+        while here < poses / len(TEN):
+            M, N, L = (int(rng.integers(*limits)) for limits in ((3, 60), (2, 40), (2, 30)))
+            grid = Grid(arm, arm.reach / rng.uniform(3.0, 15.0), M, N, L, bool(rng.integers(2)) and arm.n > 3)
+            ring = grid.rings[rng.integers(0, len(grid.rings), 1)]
+            found = answered(Question(grid), ring)
+            D, L = grid.directions_count, grid.rolls_count
+            k, each = np.divmod(np.arange(M * D * L), D * L)
+            goals = grid.targets(np.repeat(ring, len(k), 0), k * TURN / M, each // L, (each % L) * TURN / L)
+            s = armkin.ik(arm, goals)
+            legal = s.within_limits.sum(axis=1).reshape(M, -1)
+            with np.errstate(invalid="ignore"):
+                mean = legal.sum(axis=1) / (legal > 0).sum(axis=1)
+            any_ = s.valid.any(axis=1).reshape(M, -1).mean(axis=1)
+            asked = np.array([(legal > 0).mean(axis=1), any_, mean, (legal == 1).mean(axis=1)])
+            said = np.array([found[column] for column in ("share", "share_any", "branches", "single")])
+            off = ~np.isclose(said, asked, rtol=0, atol=1e-12, equal_nan=True).all(axis=0)
+            if off.any():
+                print(f"{name}: {off.sum()} cells of ring {ring.tolist()}, grid {grid.step}, {M} x {N} x {L}")
+            cells, here, different = cells + M, here + len(k), different + int(off.sum())
+        total += here
+        print(f"{name:16}{here:,} poses, {cells:,} cells", flush=True)
+    print(f"unseen    {different} cells differ, of {total:,} poses")
+    return not different
+
+
+PARTS = {"speed": speed, "keep_outs": keep_outs, "place": place}
+
 if __name__ == "__main__":
-    asked = sys.argv[1:] or ["speed", "keep_outs", "place"]
-    sys.exit(0 if all({"speed": speed, "keep_outs": keep_outs, "place": place}[name]() for name in asked) else 1)
+    if sys.argv[1:2] == ["unseen"]:
+        sys.exit(0 if unseen(*map(int, sys.argv[2:4])) else 1)
+    sys.exit(0 if all(PARTS[name]() for name in sys.argv[1:] or PARTS) else 1)
