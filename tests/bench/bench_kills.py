@@ -13,7 +13,7 @@ from random import Random
 sys.path.insert(0, str(Path(__file__).parents[1] / "engines"))
 from kills import Cluster, batch, digest, disturbed, rows
 
-ROWS = 100_000  # seven parts
+ROWS = 200_000  # seven parts
 
 
 def alike(folder: Path, given: Path, expected: str) -> bool:
@@ -51,7 +51,7 @@ def main() -> int:
         good = early = redone = 0
         cluster = Cluster(folder, 2)
         for i in range(kills):
-            told = disturbed(given, folder / f"out{i}.csv", expected, who, cluster, rng, ROWS // 16_384)
+            told = disturbed(given, folder / f"out{i}.csv", expected, who, cluster, rng, ROWS // 32_768)
             good += told.same
             early += told.killed
             redone += told.redone

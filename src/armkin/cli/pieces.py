@@ -127,16 +127,16 @@ def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:
     """Rows of finite numbers; rows without any are passed over."""
     import numpy as np
 
-    absent = np.isnan(values)
-    numbers = np.arange(piece.first, piece.first + len(values))
+    first, absent = piece.first, np.isnan(values)
     keep = np.asarray(~absent.all(axis=1))
     bad = np.argwhere(~(np.abs(values) <= LARGEST) & keep[:, None])
     end = int(bad[0, 0]) if len(bad) else len(values)
     some = np.flatnonzero(keep[:end])
     if len(some):
-        yield Chunk(numbers[some].tolist(), values[some])
+        whole = len(some) == len(values)
+        yield Chunk(range(first, first + end), values) if whole else Chunk((first + some).tolist(), values[some])
     if len(bad):
         row, column = bad[0].tolist()
         value = values[row, column]
         why = "a number is missing" if np.isnan(value) else f"{value:g} is too large; numbers here go up to {LARGEST:g}"
-        raise UsageError(f"{piece.source}: row {numbers[row]}: {piece.names[column]}: {why}", row=int(numbers[row]))
+        raise UsageError(f"{piece.source}: row {first + row}: {piece.names[column]}: {why}", row=first + row)

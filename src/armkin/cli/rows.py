@@ -6,9 +6,12 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from armkin.formula.arrays import Array
 
-ROWS = 16_384  # rows in memory at a time
+ROWS = 32_768  # rows in memory at a time
 
 
 class Chunk(NamedTuple):
@@ -16,6 +19,13 @@ class Chunk(NamedTuple):
 
     numbers: Sequence[int]
     values: Array
+
+    def numbered(self) -> NDArray[np.integer]:
+        """The numbers (N,)."""
+        import numpy as np
+
+        there = self.numbers
+        return np.arange(there.start, there.stop) if isinstance(there, range) else np.array(there)
 
 
 def one_row(values: Sequence[float]) -> Chunk:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.columns.table import Table, Words, joined
-from armkin.forward import fk
 from armkin.inverse import choose
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
@@ -75,10 +74,7 @@ class _Found(NamedTuple):
 def _listed(request: choose.Request, found: _Found, rows: NDArray[np.integer], every: bool) -> Listed:
     s, some, arm = found.s, found.some, request.arm
     q, within, free, valid = found.q[some], found.within[some], found.free[some], s.valid[some]
-    away = q - found.near
-    np.abs(away, out=away)
-    away /= units.scale(arm)
-    motion = _sum(away)
+    motion = _motion(q, found.near, units.scale(arm))
     key = np.where(valid, motion.round(EQUAL), np.inf)
     wanted = free if request.branch is None else free & np.isin(s.branch[some], found.names)
     unsolved = np.asarray(~wanted.any(axis=1))
@@ -105,6 +101,19 @@ def _ranked(key: Array, valid: Bool, within: Bool, free: Bool) -> NDArray[np.int
         k, v, w, f = key[other], valid[other], within[other], free[other]
         rank[other] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
     return rank
+
+
+def _motion(q: Array, near: Array, scale: Array) -> Array:
+    """Sums of |change| from near (n,), each joint by its scale: (N, B, n) -> (N, B), as numpy would add them up."""
+    if q.shape[-1] > 7:
+        return np.asarray((np.abs(q - near) / scale).sum(axis=-1))
+    total = np.zeros(q.shape[:-1])
+    for i, (start, unit) in enumerate(zip(near, scale, strict=True)):
+        away = q[..., i] - start  # joint by joint: no array of all of them
+        np.abs(away, out=away)
+        away /= unit
+        total += away
+    return total
 
 
 def _sum(values: Array) -> Array:
@@ -155,7 +164,7 @@ def _table(request: choose.Request, s: Solutions, rows: NDArray[np.integer], som
 def _missed(request: choose.Request, s: Solutions, some: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
     q = s.q[some][lines.target, lines.branch] if request.held else lines.q
-    missing = residual(s.task, fk(s.arm, q), q, s.target[some][lines.target])
+    missing = residual(s.task, request.fk(s.arm, q), q, s.target[some][lines.target])
     p = s.task.position
     return _norm(missing[:, :p]), _norm(missing[:, p:])
 

@@ -3,43 +3,64 @@
 from __future__ import annotations
 
 import io
+import json
 import zipfile
 from collections.abc import Callable, Iterable
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.columns.table import Column, Table, Words
 
 
+class _Kept(NamedTuple):
+    """A column of a part: where its numbers begin in the file, how many, of which type; words: they are indices."""
+
+    name: str
+    at: int
+    rows: int
+    dtype: np.dtype[Any]
+    words: tuple[str, ...] | None
+
+    @property
+    def shown(self) -> np.dtype[Any]:
+        """The type that is written."""
+        return self.dtype if self.words is None else np.array([*self.words, ""]).dtype
+
+    def read(self, part: IO[bytes]) -> Column:
+        """Its values."""
+        part.seek(self.at)
+        values = np.frombuffer(part.read(self.rows * self.dtype.itemsize), self.dtype)
+        return values if self.words is None else Words(values, self.words)
+
+
 def encoded(table: Table) -> bytes:
-    """A table as the bytes of an .npz."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, column in table.items():
-            with archive.open(member(name), "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, _array(column), allow_pickle=False)
-    return out.getvalue()
+    """A table as a part: a line of JSON about its columns, then their numbers; `together` makes an .npz of parts."""
+    each = [(column.index, column.names) if isinstance(column, Words) else (column, None) for column in table.values()]
+    head = [[name, len(v), v.dtype.str, words] for name, (v, words) in zip(table, each, strict=True)]
+    return b"".join([json.dumps(head).encode(), b"\n", *(np.ascontiguousarray(values).data for values, _ in each)])
+
+
+def decoded(data: bytes) -> Table:
+    """The table of a part."""
+    part = io.BytesIO(data)
+    return {one.name: one.read(part) for one in _columns(part)}
 
 
 def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     """One .npz of several, column by column: memory does not grow with their number."""
-    heads: dict[str, list[tuple[int, np.dtype[Any]]]] = {}
-    for part in parts():
-        archive = zipfile.ZipFile(part)
-        for name in archive.namelist():
-            heads.setdefault(name, []).append(_header(archive, name))
+    heads = [_columns(part) for part in parts()]
     with zipfile.ZipFile(file, "w") as whole:
-        for name, each in heads.items():
-            dtype = np.result_type(*(dtype for _, dtype in each))
-            with whole.open(member(name.removesuffix(".npy")), "w", force_zip64=True) as out:
-                shape = (sum(count for count, _ in each),)
+        for i, (name, *_) in enumerate(heads[0] if heads else []):
+            dtype = np.result_type(*(head[i].shown for head in heads))
+            with whole.open(member(name), "w", force_zip64=True) as out:
+                shape = (sum(head[i].rows for head in heads),)
                 described = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
                 np.lib.format.write_array_header_1_0(out, described)
-                for part in parts():
-                    with zipfile.ZipFile(part).open(name) as source:
-                        out.write(np.lib.format.read_array(source).astype(dtype, copy=False).tobytes())
+                for part, head in zip(parts(), heads, strict=True):
+                    column = head[i].read(part)
+                    values = column.texts() if isinstance(column, Words) else column
+                    out.write(values.astype(dtype, copy=False).tobytes())
 
 
 def member(name: str) -> zipfile.ZipInfo:
@@ -47,12 +68,12 @@ def member(name: str) -> zipfile.ZipInfo:
     return zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
 
 
-def _array(column: Column) -> NDArray[Any]:
-    return column.texts() if isinstance(column, Words) else column
-
-
-def _header(archive: zipfile.ZipFile, name: str) -> tuple[int, np.dtype[Any]]:
-    with archive.open(name) as file:
-        np.lib.format.read_magic(file)
-        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    return int(shape[0]), dtype
+def _columns(part: IO[bytes]) -> list[_Kept]:
+    """What stands in a part, from where it is read now."""
+    head, found = json.loads(part.readline()), []
+    at = part.tell()
+    for name, count, kind, words in head:
+        dtype = np.dtype(kind)
+        found.append(_Kept(name, at, count, dtype, None if words is None else tuple(words)))
+        at += count * dtype.itemsize
+    return found

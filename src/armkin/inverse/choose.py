@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
+from armkin.forward import fk
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
 from armkin.inverse.answers.solutions import Solutions, Status
@@ -57,6 +58,7 @@ class Request:
     position_first: bool = False  # the position exact, the rotation as near as it goes
     every: bool = True  # keep all branches; False: of the swept values' branches those that an answer shows
     ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
+    fk: Callable[[Arm, Array], Array] = fk  # what says where postures are: called as `armkin.fk` is
 
     @property
     def near_out(self) -> list[float]:

@@ -103,8 +103,7 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 def transforms(xyz: Array, rpy: Array) -> Array:
     """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
-    cosine, sine = _cos_sin_deg(rpy)
-    (cr, cp, cy), (sr, sp, sy) = np.moveaxis(cosine, -1, 0), np.moveaxis(sine, -1, 0)
+    (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(np.moveaxis(rpy, -1, 0)))
     T = np.zeros((*xyz.shape[:-1], 4, 4))
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr

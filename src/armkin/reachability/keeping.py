@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
-
-import numpy as np
 
 from armkin.columns import npz
 from armkin.columns.parts import Parts
@@ -59,7 +56,7 @@ def tables(
     def read() -> Iterator[tuple[int, Table]]:
         while parts is not None and kept:
             number = kept.popleft()
-            yield number, table(parts.read(number))
+            yield number, npz.decoded(parts.read(number))
 
     for number, columns in in_order(engine, work, job, missing()):
         if parts is not None and parts.held:
@@ -67,9 +64,3 @@ def tables(
         yield number, columns
         yield from read()
     yield from read()
-
-
-def table(data: bytes) -> Table:
-    """Columns as they were kept."""
-    with np.load(io.BytesIO(data)) as archive:
-        return dict(archive)

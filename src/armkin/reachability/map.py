@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from armkin import __version__
 from armkin.columns import npz
 from armkin.columns.formats import format_of
 from armkin.columns.parts import Parts
@@ -209,7 +210,7 @@ class _Run:
         def tables() -> Iterator[Any]:
             for number in range(count):
                 data = parts.read(number) if parts.held else npz.encoded(kept[number])
-                yield io.BytesIO(data if format.name == "npz" else format.encoded(keeping.table(data)))
+                yield io.BytesIO(data if format.name == "npz" else format.encoded(npz.decoded(data)))
 
         with whole(self.out, "wb") as file:
             if format.name == "csv":
@@ -225,4 +226,4 @@ def _asked(question: Question) -> dict[str, Any]:
     names = ("step", "azimuths", "directions", "rolls", "tool_down")
     asked = {("grid" if name == "step" else name): getattr(grid, name) for name in names}
     arm_is = {"robot file": arm.sha256, "scene": arm.scene_sha256, "joints": arm.n, "reach": arm.reach}
-    return {"command": "reach", **arm_is, **asked, "measures": question.measures}
+    return {"command": "reach", "armkin": __version__, **arm_is, **asked, "measures": question.measures}

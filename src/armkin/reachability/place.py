@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin import files
+from armkin import __version__, files
 from armkin.columns.parts import Parts, digest
 from armkin.columns.table import Table
 from armkin.engines.run import Engine
@@ -214,7 +214,8 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
         return None
     files.check(os.fspath(out))
     robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways] for one in questions]
-    return Parts(os.fspath(out), {"command": "place", "robots, scene and targets": robots, **settings})
+    asked = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
+    return Parts(os.fspath(out), asked)
 
 
 def _axes(

@@ -104,7 +104,7 @@ def ik(
     if compiled and sweep:
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
-        request = replace(request, ik=_compiled)
+        request = replace(request, ik=_compiled, fk=_compiled_poses)
         import armkin
 
         armkin.compile(arm)  # before there are processes, which then have it, too
@@ -174,6 +174,13 @@ def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, rounding:
     return armkin.compile(arm).ik(targets, task, near, rounding=rounding)
 
 
+def _compiled_poses(arm: Arm, q: Array) -> Array:
+    """`armkin.fk` by machine code."""
+    import armkin
+
+    return armkin.compile(arm).fk(q)
+
+
 @dataclass
 class Questions:
     """What is asked of each row of a batch; continuous: each is compared with the one before."""
@@ -196,15 +203,13 @@ class Questions:
 
     def table(self, chunk: Chunk) -> tuple[Table, Any]:
         """The columns, and which rows have a best branch."""
-        import numpy as np
-
         if self.continuous or self.request.swept or self.request.position_first:
             return self._table_of_objects(chunk)
         from armkin.columns import branches
 
         targets = units.targets_in(self.task.labels, chunk.values)
         rounding = _rounding(self.request.arm, self.task, chunk.values)
-        found = branches.columns(self.request, targets, np.asarray(chunk.numbers), self.all_branches, rounding=rounding)
+        found = branches.columns(self.request, targets, chunk.numbered(), self.all_branches, rounding=rounding)
         return found.table, ~found.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula import arrays
@@ -109,10 +109,10 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
     """
     values = np.asarray(values, float).reshape(-1, len(units))
     if decimals is None:
-        needed = _needed(values)
-        decimals = np.broadcast_to(needed.max(axis=1, keepdims=True), needed.shape)
-    given = np.asarray(decimals).reshape(values.shape)
-    off = np.where(given >= FEWEST, 0.5 * 10.0 ** -np.minimum(given, 300.0), 0.0)
+        given = np.broadcast_to(_needed(values).max(axis=1, keepdims=True), values.shape)
+    else:
+        given = np.asarray(decimals, int).reshape(values.shape)
+    off = _HALF.take(given, mode="clip")
     angles = np.array([unit == "deg" for unit in units])
     scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
     turned = np.radians(off[:, angles].sum(axis=1))
@@ -120,17 +120,21 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
     return size
 
 
-def _needed(values: Array) -> Array:
+# half a unit of the last of so many decimals, 0 below FEWEST; of more than 300 it is nothing, too
+_HALF = np.where(np.arange(300) < FEWEST, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
+
+
+def _needed(values: Array) -> NDArray[np.intp]:
     """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
-    found = np.zeros(values.size)
-    left, number = np.arange(values.size), values.ravel()
-    for decimals in range(MOST):
-        here = _whole(number * 10.0**decimals)
-        if decimals >= FEWEST:
-            found[left[here]] = decimals
-        left, number = left[~here], number[~here]
+    found = np.zeros(values.size, np.intp)
+    number = values.ravel()
+    left = np.flatnonzero(~_whole(number * 10.0 ** (FEWEST - 1)))
+    for decimals in range(FEWEST, MOST):
         if not len(left):
             break
+        here = _whole(number[left] * 10.0**decimals)
+        found[left[here]] = decimals
+        left = left[~here]
     return found.reshape(values.shape)
 
 
