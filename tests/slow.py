@@ -311,6 +311,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_guard.py": ("test_a_thousand_connections_do_not_keep_the_page_out",),
     "teach/test_teach_jog.py": (),
     "teach/test_teach_jog_page.py": (),
+    "teach/test_teach_jog_pins.py": (),
     "teach/test_teach_keep_outs.py": (),
     "teach/test_teach_look.py": (
         "test_every_robot_has_a_scene_and_a_first_picture",
