@@ -21,6 +21,7 @@ from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     BENT,
     CLEAR,
+    CLOSED,
     FINEST,
     FOLD_WAY,
     FOLDED,
@@ -46,6 +47,7 @@ SHRINKS = 3  # as often as this
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
+SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 HALVINGS = 20  # of an interval between two points: to a millionth of it
@@ -78,7 +80,7 @@ class Structure(NamedTuple):
 def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
     """The structure at postures (M, n) that solve their targets (M, m) or (M, 4, 4); at least n numbers a target."""
     M, n = q.shape
-    _, J = newton.scaled(arm, task, q, target)
+    r, J = newton.scaled(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
     rows, lost = J.shape[1], J.shape[1] - n + 1  # with fewer joints than numbers more directions are out of reach
     out = Structure(
@@ -96,8 +98,10 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
     )
     if rows < n:
         return out
-    left = np.arange(M)
-    for _ in range(SHRINKS + 1):
+    if rows == n > 1:
+        _second_order(arm, task, q, target, r, U, S, V, out)
+    left = np.flatnonzero(~out.known)
+    for _ in range(SHRINKS + 1 if len(left) else 0):
         start = _Curve(q[left], target[left], U[left, :, n - 1 :], V[left, -1], out.span[left])
         on, x, g = _polynomials(arm, task, start)
         some = left[on]
@@ -108,6 +112,49 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
             break
         out.span[left] /= SHRINK
     return out
+
+
+def _second_order(
+    arm: Arm, task: Task, q: Array, target: Array, r: Array, U: Array, S: Array, V: Array, out: Structure
+) -> None:
+    """Decide those whose curvature does: g = sigma t + b t^2 / 2, |g'' - b| <= third |t| as far as `SERIES`.
+
+    x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
+    close by, third from g at the ends, where what x(t) misses is counted, too. Where sigma^2 > 2 SOLUTION |g''| as far
+    as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where sigma^2 < 2 SOLUTION |g''| as far as
+    4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
+    """
+    n, unit, span = arm.n, radian_or_reach(arm), out.span
+    u, v, sigma = U[:, :, -1], V[:, -1], S[:, -1]
+
+    def both_ways(h: float, w: Array) -> Array:
+        """The pose's way f (2, M, rows) there and back."""
+        ends = np.concatenate([q + (0.5 * h * h * w + h * v) * unit, q + (0.5 * h * h * w - h * v) * unit])
+        return r - newton.residuals(arm, task, ends, np.concatenate([target, target])).reshape(2, *r.shape)
+
+    bend = both_ways(FOLD_WAY, np.zeros_like(v)).sum(axis=0) / FOLD_WAY**2
+    along = (U * bend[:, :, None]).sum(axis=1)
+    b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), TINY)
+    w = -(V[:, :-1] * (along[:, :-1] / np.maximum(S[:, :-1], TINY))[:, :, None]).sum(axis=1)
+    f = both_ways(SERIES, w)
+    g = (f * u).sum(axis=2)
+    off = np.linalg.norm(f - g[:, :, None] * u, axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
+    cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * SERIES)
+    quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * SERIES**2) + n * SERIES * off
+    third = (6.0 * cubic + 12.0 * quartic) / SERIES**3
+    far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
+    turns = (far < SERIES) & (third * far < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - third * far))
+    alone = (near < SERIES) & (sigma**2 > 2.0 * SOLUTION * (size + third * near))
+    straight = 0.5 * SERIES**2 * np.linalg.norm(w, axis=1) + off < 0.1 * SERIES
+    out.known[...] = (turns | alone) & straight & ((r * r).sum(axis=1) < CLOSED**2)
+    out.boundary[...] = turns & out.known
+    # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
+    ahead = 2.0 * SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * SOLUTION * size))
+    rest = np.sqrt(np.maximum(sigma**2 - 2.0 * SOLUTION * size, 0.0))
+    back = np.where(turns, ahead + 2.0 * sigma / size, 2.0 * SOLUTION / np.maximum(sigma + rest, TINY))
+    out.low[...], out.high[...] = np.where(b > 0.0, [-back, ahead], [-ahead, back])
+    out.x[1], out.x[2] = v * span[:, None], 0.5 * w * (span**2)[:, None]
+    out.g[1, :, 0], out.g[2, :, 0] = sigma * span, 0.5 * b * span**2
 
 
 class _Curve(NamedTuple):
