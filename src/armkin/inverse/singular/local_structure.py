@@ -50,8 +50,8 @@ POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange
 SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
-HALVINGS = 20  # of an interval between two points: to a millionth of it
-FINE = 33  # points of a component at which its slope is compared
+FINE = 33  # points of a component at which its slope is compared, and of an interval in which it ends
+FINER = 4  # times that this interval is the one between two of these: to a millionth of it
 
 
 class Structure(NamedTuple):
@@ -234,29 +234,34 @@ def _size(g: Array, s: Array) -> Array:
     return np.asarray(np.linalg.norm(_values(g, s), axis=-1))
 
 
-def _end(g: Array, sign: float) -> tuple[Array, Bool]:
-    """Where |g| (NODES, M, k) first exceeds `SOLUTION` on one side, as a share of the span, and whether it does."""
-    out, ends = np.ones(g.shape[1]), np.zeros(g.shape[1], bool)
+def _ends(g: Array) -> tuple[Array, Bool]:
+    """Where |g| (NODES, M, k) first exceeds `SOLUTION`, as a share of the span, and whether it does, (2, M): below 0
+    and above."""
+    M = g.shape[1]
+    g = np.concatenate([g * ((-1.0) ** EXPONENTS)[:, None, None], g], axis=1)
+    out, ends = np.ones(2 * M), np.zeros(2 * M, bool)
     # the sum of the coefficients' sizes bounds the polynomial on all of the span
     some = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > SOLUTION)
-    if len(some):
-        g = g[:, some]
-        over: Bool = np.linalg.norm(np.tensordot(sign**EXPONENTS * POWERS_OF_POINTS, g, axes=1), axis=2) > SOLUTION
-        ends[some], first = over.any(axis=0), over.argmax(axis=0)
-        stop = ends[some]
-        low, high = np.where(stop, POINTS[np.maximum(first - 1, 0)], 1.0), np.where(stop, POINTS[first], 1.0)
-        for _ in range(HALVINGS if stop.any() else 0):
-            middle = 0.5 * (low + high)
-            beyond = _size(g, sign * middle) > SOLUTION
-            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-        out[some] = low
-    return sign * out, ends
+    over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, some], axes=1), axis=2) > SOLUTION
+    first, there = over.argmax(axis=0), over.any(axis=0)
+    some, first = some[there], first[there]
+    ends[some] = True
+    low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
+    for _ in range(FINER if len(some) else 0):
+        between = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)
+        beyond = _size(g[:, some], between[1:]) > SOLUTION
+        beyond[-1] = True
+        first = beyond.argmax(axis=0)
+        low, high = between[first, np.arange(len(some))], between[first + 1, np.arange(len(some))]
+    out[some] = low
+    return out.reshape(2, M), ends.reshape(2, M)
 
 
 def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
     g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
-    (low, below), (high, above) = _end(g, -1.0), _end(g, 1.0)
+    (low, high), (below, above) = _ends(g)
+    low = -low
     s = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)  # (FINE, M)
     way = _values(x, s)
     extent = way.max(axis=0) - way.min(axis=0)
