@@ -202,9 +202,11 @@ class _Groups:
 
     def find(self) -> None:
         """Group all candidates."""
-        self._alone()
-        if (~self.asked).sum() <= AT_ONCE:
+        few = self.valid.shape[1] <= FEW
+        if few or (~self.asked).sum() <= AT_ONCE:
             self._ask(*np.nonzero(~self.asked))
+        if few:
+            self._plain()
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
@@ -222,20 +224,31 @@ class _Groups:
         weak = self.chosen & (self.lost.sigma < HIGH) & ~self.curve.any(axis=2)
         return np.asarray(weak.any(axis=1) & self.curve.any(axis=(1, 2)))
 
-    def _alone(self) -> None:
-        """Regular candidates with none close by are branches; so are self-motions where nothing else is weak."""
-        if self.valid.shape[1] > FEW:
-            return
-        weak = self.valid & (self.lost.sigma < FOLDED) & ~self.moves
+    def _plain(self) -> None:
+        """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
+        that are alone on their components or two, and self-motions that were known where nothing else may be on them.
+        """
+        valid, sigma, size = self.valid, self.lost.sigma, self.at.size
+        on: Bool = np.asarray(self.at.sure.any(axis=2))
         with np.errstate(invalid="ignore"):
             away = newton.wrapped_distance(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])
-        close = (away < CLOSE_BY) & (self.valid & ~self.moves)[:, None] & ~np.eye(self.valid.shape[1], dtype=bool)
-        alone = self.valid & ~weak & np.where(self.moves, ~weak.any(axis=1, keepdims=True), ~close.any(axis=2))
-        self.open &= ~alone
-        self.chosen |= alone
-        self.curve |= alone[:, :, None] & self.which
-        self.singular |= (alone & self.moves).any(axis=1)
-        self.free |= (alone[:, :, None] & self.which).any(axis=1)
+        close = (away < CLOSE_BY) & (valid & ~on)[:, None] & ~np.eye(valid.shape[1], dtype=bool)
+        weak = valid & (sigma < FOLDED) & ~on
+        told = weak & self.known & ~self.moves
+        other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
+        one = self.component[self.place] & told[:, :, None] & valid[:, None] & ~np.eye(valid.shape[1], dtype=bool)
+        told &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close & ~told[:, None]).any(axis=2)
+        told &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
+        told &= ~((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
+        told &= (~one | told[:, None]).all(axis=2)
+        alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
+        before = np.tri(valid.shape[1], k=-1, dtype=bool)
+        self.chosen |= alone | told & ~(one & _first(size, before)).any(axis=2)
+        self.double |= (told & self.edge & ~(one & _first(self.rank, before)).any(axis=2)).any(axis=1)
+        self.open &= ~(alone | told)
+        self.curve |= alone[:, :, None] & self.which & on[:, :, None]
+        self.singular |= (alone & on).any(axis=1)
+        self.free |= self.curve.any(axis=1)
 
     def _ask(self, k: Int, b: Int) -> None:
         """What components these candidates lie on, if that is not known."""
@@ -337,6 +350,12 @@ class _Groups:
             np.asarray((self.curve & ~self.at.sure).any(axis=1)),
             beyond,
         )
+
+
+def _first(size: Array, before: Bool) -> Bool:
+    """Whether of candidates (K, M) the second is to be taken rather than the first: it is smaller, or before it."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((size[:, None] < size[:, :, None]) | (size[:, None] == size[:, :, None]) & before)
 
 
 def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, Bool]:
