@@ -203,8 +203,9 @@ class _Groups:
     def find(self) -> None:
         """Group all candidates."""
         few = self.valid.shape[1] <= FEW
-        if few or (~self.asked).sum() <= AT_ONCE:
-            self._ask(*np.nonzero(~self.asked))
+        some = ~self.asked
+        if some.sum() <= AT_ONCE or few:
+            self._ask(*np.nonzero(some if some.sum() <= AT_ONCE else some & (self.lost.nullity < 2)))
         if few:
             self._plain()
         while self.open.any():
