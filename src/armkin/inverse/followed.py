@@ -15,7 +15,7 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, REACH, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, CONVERGING, REACH, SOLUTION
 from armkin.inverse.pieces import Pieces, best_samples, motion, runs
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved
@@ -129,7 +129,7 @@ class Follower(NamedTuple):
         far = np.abs(wrapped(six - like[:, kept])).max(axis=1)
         q = np.empty((len(t), self.arm.n))
         q[:, kept], q[:, self.free.joint] = six, t
-        q[(missing > SOLUTION) | (far > ASTRAY)] = np.nan
+        q[(missing > CONVERGING) | (far > ASTRAY)] = np.nan
         return q
 
 
@@ -156,6 +156,9 @@ class Followed(NamedTuple):
         t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
         found = find.along(t)
         pieces, short = _pieces(find, t, found), _all_short(find, found)
+        if not find.labelled:  # an elimination's answers near singular postures are less exact
+            start = newton.correct(find.arm, find.free.task, pieces.start, find.target[pieces.row])[0]
+            pieces = pieces._replace(start=start)
         if finer == 1 and find.labelled:
             near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
             for k in np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough):
